@@ -19,8 +19,7 @@ from pathlib import Path
 from inputdesign_cli import load_spec, parse_spec
 from inputdesign_cli.outcome import plain
 from inputdesign_cli.questions.campaign.build import build_campaign, build_planner
-from inputdesign_cli.questions.campaign.outcome import way_entry
-from inputdesign_cli.questions.campaign.study import oracle_of, tried, ways_of
+from inputdesign_cli.questions.campaign.study import oracle_of, tried, way_entry, ways_of
 from inputdesign_cli.specification import Spec
 
 ILL1 = (
@@ -76,7 +75,7 @@ def spec_of(case: Case) -> Spec:
         block = f"simulation={{plant: {json.dumps(truth.content['plant'])}}}"
         return parse_spec(case.text + COMMON, overrides=[case.wrong, block, f"campaign={case.campaign}"])
     planner = build_planner(truth)
-    power = ENERGY * planner.cheapest(planner.nominal.model) / SAMPLES
+    power = ENERGY * planner.knowing(planner.nominal.model)[0] / SAMPLES
     pilot = f"campaign={{block: 50, pilot: {{samples: {SAMPLES}, power: {power!r}}}}}"
     return parse_spec(case.text + COMMON, overrides=[pilot])
 

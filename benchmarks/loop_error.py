@@ -157,7 +157,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, default=ROOT / "benchmarks" / "loop_error.json")
     arguments = parser.parse_args()
     task = build_loop_error_task(load_spec(SPEC))
-    study = monte_carlo(design_loop_error(task.problem, "asymptotic", tolerance=task.terms.tolerance))
+    study = monte_carlo(design_loop_error(task.problem, "asymptotic", tolerance=task.tolerance))
     dual = race()
     error = formula_error()
     rows = [

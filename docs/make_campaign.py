@@ -21,7 +21,6 @@ from inputdesign_cli.outcome.record import load_result
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.text_formats import csv_text, read_csv
 from inputdesign_cli.questions.campaign.build import build_campaign
-from inputdesign_cli.questions.campaign.plans import ratio_of
 from inputdesign_cli.questions.campaign.trials import energy_of
 
 ROOT = Path(__file__).parent.parent
@@ -62,8 +61,8 @@ def campaign_in_a_loop(folder: Path) -> None:
     question = study.planner.question(
         study.true.model, FiniteRecord(at_the_truth, len(r), study.planner.step).information(r)
     )
-    ratio = ratio_of(question, question.information)
-    share = energy_of(study.planner, r, study.true) / study.planner.cheapest(study.true.model)
+    ratio = question.ratio(question.information)
+    share = energy_of(study.planner, r, study.true) / study.planner.knowing(study.true.model)[0]
     sys.stdout.write(f"true ratio {ratio:.3f}, energy over that of knowing the plant {share:.3f}\n")
     shutil.copy(run / "campaign.png", IMAGES / "campaign_flexible.png")
 

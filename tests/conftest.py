@@ -5,9 +5,12 @@ import os
 import shutil
 import signal
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
+import typer.main
+import typer.testing
 
 from inputdesign_cli.compute.executor import ONE_THREAD
 
@@ -21,6 +24,9 @@ from tests.support.commands import caller
 SPECS = Path(__file__).parent.parent / "specs"
 # New objects before the collector of cycles looks at them: by itself it does so every 700.
 _NEW_OBJECTS = 50_000
+
+# The tree of commands is made once, not at every call: it depends on nothing.
+typer.main.get_command = typer.testing._get_command = cache(typer.main.get_command)
 
 # `nohup` and the background of a shell hand on that these are ignored, and commands under test would obey.
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):

@@ -15,6 +15,9 @@ from typer.testing import CliRunner
 from inputdesign_cli import parse_spec, plugins, solve
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.signal.kind import SignalKind
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.specification import json_schema
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -230,3 +233,9 @@ def test_a_kind_of_signal_that_nobody_added_is_refused():
     with pytest.raises(SpecError, match="type"):
         chirp_spec()
     assert CliRunner().invoke(app, ["signal", "--kind", "schroeder_chirp"]).exit_code == 2
+
+
+def test_the_registry_names_every_kind_of_this_package_and_specs_take_its_words():
+    kinds = plugins.own("idesign.signals")
+    assert all(isinstance(kind_of(name), SignalKind) for name in kinds)
+    assert set(kinds) <= set(json_schema()["$defs"]["Signal"]["properties"]["type"]["enum"])

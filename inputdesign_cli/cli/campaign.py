@@ -107,7 +107,7 @@ def proceed(
     with computing(directory, quiet=quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.record import SPEC
-        from inputdesign_cli.questions.campaign.directory import advanced, with_earlier_pictures, withdrawn
+        from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
         from inputdesign_cli.specification import parse_spec
 
@@ -124,8 +124,6 @@ def proceed(
                 taken = replace(written.preparation(), operating_point=levels(operating_point))
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
-            if not figures:
-                results = with_earlier_pictures(results, directory)
         renew(results, directory, Shown(figures, json_output=json_output, quiet=quiet))
     code = _EXIT[results.result["status"]]
     if code:

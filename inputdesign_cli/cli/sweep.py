@@ -22,7 +22,7 @@ from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.sweeps.running import Listing, Progress, SweepSummary
+    from inputdesign_cli.sweeps.running import Listing, SweepRun
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def sweep(
 
 
 @contextmanager
-def _watched(directory: Path, *, quiet: bool) -> Iterator[Callable[[Progress], None]]:
+def _watched(directory: Path, *, quiet: bool) -> Iterator[Callable[[SweepRun], None]]:
     """Show how far a sweep is; where it is ended by Ctrl-C or SIGTERM, say how to finish it."""
     started = time.monotonic()
     try:
@@ -130,7 +130,7 @@ def _watched(directory: Path, *, quiet: bool) -> Iterator[Callable[[Progress], N
         raise
 
 
-def _show(done: SweepSummary, *, json_output: bool, quiet: bool) -> None:
+def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
     """Print what a sweep has come to.
 
     Raises:
@@ -163,7 +163,7 @@ def _list(points: Iterable[Listing], *, json_output: bool) -> None:
     typer.echo(f"\n{sum(counts.values())} points: {listed}")
 
 
-def pace(progress: Progress, seconds: float) -> str:
+def pace(progress: SweepRun, seconds: float) -> str:
     """The points, the rate, the time left and the failures. Points done before do not count as speed."""
     told = [f"{progress.passed}/{progress.total}"]
     if progress.computed and seconds > 0:
@@ -175,7 +175,7 @@ def pace(progress: Progress, seconds: float) -> str:
     return "  ".join(told)
 
 
-def _summary(done: SweepSummary) -> str:
+def _summary(done: SweepRun) -> str:
     statuses = ", ".join(f"{n} {status}" for status, n in done.statuses.items())
     before = done.total - done.computed
     lines = [("points", f"{done.total}: {statuses}{f' ({before} done before)' if before else ''}")]

@@ -13,7 +13,7 @@ from inputdesign_cli.cli.options import Changes, Shown, Workers
 from inputdesign_cli.cli.terminal import aligned, computing
 
 if TYPE_CHECKING:
-    from inputdesign_cli.figures.trade import Trade
+    from inputdesign_cli.figures.sweep_table import Trade
     from inputdesign_cli.specification import Spec
 
 WORDS = ("samples", "amplitude")
@@ -44,9 +44,8 @@ def show_trade(
     """Sweep in a directory next to that of the run, draw the trade, and print its table."""
     quiet, directory = shown.quiet or shown.json_output, run.with_name(f"{run.name}-trade")
     with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
-        from inputdesign_cli.figures.sweep_figures import draw_into
+        from inputdesign_cli.figures.sweep import draw_into, draw_trade
         from inputdesign_cli.figures.sweep_table import read_sweep
-        from inputdesign_cli.figures.trade import draw_trade
         from inputdesign_cli.sweeps.plan import build_plan
         from inputdesign_cli.sweeps.running import SweepRun
         from inputdesign_cli.sweeps.trade import trade_of, trade_settings

@@ -47,8 +47,8 @@ def _divisions(parts: Parts) -> Iterator[Division]:
             max(share * total // 100 - int(end) + len(y), 0) for end, (_, y) in zip(ends, parts, strict=True)
         ]
         first, second = cut(parts, [slice(k) for k in at]), cut(parts, [slice(k, None) for k in at])
-        there = [[part for part in some if len(part[1])] for some in (first, second)]
-        yield Division(*there, f"the first {share} % and the rest")
+        first, second = ([part for part in some if len(part[1])] for some in (first, second))
+        yield Division(first, second, f"the first {share} % and the rest")
     for count in _BLOCKS:
         length = max(total // count, 1)
         blocks = [

@@ -57,7 +57,8 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
     Raises:
         TypeError: see `output_error_form`.
     """
-    simulated, errors, kept, spread, missing = ([] for _ in range(5))
+    simulated, errors, spread, missing = (list[Array]() for _ in range(4))
+    kept = list[NDArray[np.bool_]]()
     kind, form = estimator(model, 1.0), output_error_form(model)
     plant = estimator(form, 1.0)
     delay = plant.lateness(form.theta)

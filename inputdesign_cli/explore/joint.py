@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -216,25 +216,23 @@ def _together(
     return identified(joined(taken, inputs, range(inputs)), used)
 
 
-def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
-    """Yield what may be taken for all outputs together, all in s or all in q^-1, the best first.
+def _combinations(found: Sequence[Chosen]) -> list[tuple[tuple[Candidate, ...], bool]]:
+    """Return what may be taken for all outputs together, all in s or all in q^-1, the best first.
 
     With it whether all explain their part of the record about as well as any.
     """
-    first, last = found[0].best.orders.physical, list[tuple[Candidate, ...]]()
+    first, listed = found[0].best.orders.physical, list[tuple[tuple[Candidate, ...], bool]]()
     for kind in (first, not first):
-        good, every = (
-            [[c for c in own if c.orders.physical == kind] for own in chosen]
-            for chosen in ([one.good for one in found], [one.candidates for one in found])
-        )
-        if all(good):
-            # What is open on one part seldom is certain on the whole: after the best it is left out.
-            ranked = [own[:1] + [c for c in own[1:] if c.certain][: _MOST_TRIED - 1] for own in good]
-            for rank in range(max(map(len, ranked))):
-                yield tuple(own[min(rank, len(own) - 1)] for own in ranked), True
-        elif all(every):
-            last.append(tuple(own[0] for own in every))
-    yield from ((taken, False) for taken in last)
+        every = [[c for c in one.candidates if c.orders.physical == kind] for one in found]
+        # What is open on one part seldom is certain on the whole: after the best it is left out.
+        ranked = [
+            own[:1] + [c for c in own[1:] if c.certain and c in one.good][: _MOST_TRIED - 1]
+            for own, one in zip(every, found, strict=True)
+        ]
+        for rank in range(max(map(len, ranked)) if all(ranked) else 0):
+            taken = tuple(own[min(rank, len(own) - 1)] for own in ranked)
+            listed.append((taken, all(c in one.good for c, one in zip(taken, found, strict=True))))
+    return sorted(listed, key=lambda one: not one[1])
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:

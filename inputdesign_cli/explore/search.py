@@ -27,7 +27,6 @@ from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import (
     Regressed,
     Sweep,
-    arx_models,
     delay_ranges,
     lingering,
     noise_model,
@@ -53,7 +52,7 @@ _UNCERTAIN = 0.5
 # gains, time constants and dead times are worth by the same measure, beside polynomials.
 _WORTH, _NAMED = 0.01, 0.02
 _MOST_SAMPLES = 4000
-_HIGHEST, _HIGHEST_ARX, _ARX_KEPT = 5, 8, 2
+_HIGHEST, _HIGHEST_ARX = 5, 8
 # Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
 _PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
 # A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
@@ -69,7 +68,7 @@ Family = Literal["fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"]
 """A structure that a user may fix."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """One structure for one output.
 
@@ -311,14 +310,14 @@ def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
         yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
     if max(swept.by_order) > 1 and not records.feedback:
         yield Orders("ARMAX", swept.near(2).delays, 2, a=2, c=2)
-    yield from _best_arx(records)
+    yield from (Orders("ARX", near.delays, n, a=n) for n in (near.order, near.order + 1))
 
 
 def _fixed(records: _Records, only: Family) -> Iterator[Shape]:
     """Yield the orders of the one family that is asked for."""
     swept = records.swept
     if only == "arx":
-        yield from _best_arx(records)
+        yield from (Orders("ARX", swept.best.delays, n, a=n) for n in range(1, _HIGHEST_ARX + 1))
     elif only == "armax":
         yield from (Orders("ARMAX", one.delays, n, a=n, c=n) for n, one in swept.by_order.items())
     elif only in ("oe", "bj"):
@@ -326,15 +325,3 @@ def _fixed(records: _Records, only: Family) -> Iterator[Shape]:
     else:
         order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
         yield Process(swept.near(order).delays, order, records.step)
-
-
-def _best_arx(records: _Records) -> list[Orders]:
-    """Return the ARX models that the criterion prefers, of the delays of the sweep."""
-    delays, samples = records.swept.best.delays, records.samples
-    highest = max(min(_HIGHEST_ARX, samples // (6 * (len(delays) + 1))), 1)
-    listed = [
-        (float(np.log(max(loss, 1e-300))) + price(len(theta), rows), Orders("ARX", delays, b, a=a))
-        for a, b, theta, loss, rows in arx_models(records.first, highest, delays)
-        if np.all(np.isfinite(theta))
-    ]
-    return [orders for _, orders in sorted(listed, key=lambda one: one[0])[:_ARX_KEPT]]

@@ -15,7 +15,6 @@ from inputdesign_cli.expressions import Expression
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
-    Model,
     Parametrisation,
     PolynomialModel,
     Reparametrised,
@@ -298,7 +297,9 @@ def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance:
     )
 
 
-def _coloured(plant: SampledModel, rows: Sequence[Process], thetas: Sequence[Array]) -> Model:
+def _coloured(
+    plant: SampledModel, rows: Sequence[Process], thetas: Sequence[Array]
+) -> SampledModel | Coloured:
     """Return a plant with the noise of its rows, whose C and D stand last among their parameters."""
     if not any(row.noise for row in rows):
         return plant

@@ -7,6 +7,7 @@ Before a record the inputs count as what they are at its beginning.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -110,7 +111,7 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
         denominators = [np.ones(1), *(found[k].F for k in [n - 1] if k)]
         regressed = Regressed(parts, n, line)
         tried = [regressed.settled(begin, way, F, least) for F in denominators for way in wide.get(n, [None])]
-        found[n] = regressed.polished(min(tried, key=lambda one: one.loss), least)
+        found[n] = min(tried, key=lambda one: one.loss)
         begin, price = found[n].delays, [*price, found[n].criterion(samples)]
         if len(price) - 1 - int(np.argmin(price)) == _WORSE:
             break
@@ -133,32 +134,26 @@ class Regressed:
     def settled(
         self, delays: tuple[int, ...], way: tuple[int, int] | None, F: Array, least: int
     ) -> Regression:
-        """Return a model, its delays of `least` or more from a wide range.
+        """Return a model, its delays of `least` or more from a wide range first, then from the next ones.
 
         Args:
             way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
             F: where the search begins.
         """
         for _ in range(_WIDE if way else 0):
-            (most, skipped), before = way or (0, 0), delays
+            most, skipped = way or (0, 0)
             for j in range(len(delays)):
                 delays = self._best_delay(F, delays, j, (least, max(most, least + 1)), skipped)
             F = self._denominator(F, delays)
-            if delays == before:
-                break
-        return self.output_error(delays, F)
-
-    def polished(self, best: Regression, least: int) -> Regression:
-        """Return the model with the best delays of `least` or more near its own."""
-        for j in range(len(best.delays)):
-            for step in (1, -1):
-                at, misses, tried = best.delays[j] + step, 0, 0
-                while least <= at and misses < 2 and tried < _BESIDE:
-                    other = (*best.delays[:j], at, *best.delays[j + 1 :])
-                    new = self.output_error(other, best.F, _POLISH)
-                    misses, tried = (0 if new.loss < best.loss else misses + 1), tried + 1
-                    best = min(best, new, key=lambda one: one.loss)
-                    at += step
+        best = self.output_error(delays, F)
+        for j, step in itertools.product(range(len(delays)), (1, -1)):
+            at, misses, tried = best.delays[j] + step, 0, 0
+            while least <= at and misses < 2 and tried < _BESIDE:
+                other = (*best.delays[:j], at, *best.delays[j + 1 :])
+                new = self.output_error(other, best.F, _POLISH)
+                misses, tried = (0 if new.loss < best.loss else misses + 1), tried + 1
+                best = min(best, new, key=lambda one: one.loss)
+                at += step
         return best
 
     def output_error(
@@ -305,32 +300,12 @@ def delay_ranges(
     return tuple(found)
 
 
-def arx_models(
-    parts: Parts, most: int, delays: tuple[int, ...]
-) -> Iterator[tuple[int, int, Array, float, int]]:
-    """Yield all ARX models with orders up to `most`: a, b, coefficients, mean squared error, samples."""
-    size, first, rows = most * (len(delays) + 1) + 2, most + max(delays), 0
-    gram = np.zeros((size, size))
-    for u, y in parts:
-        if len(y) > first + 1:
-            x, out = u - u.mean(axis=0), y[:, 0] - y[:, 0].mean()
-            columns = [-lagged(out, lag) for lag in range(1, most + 1)]
-            columns += [lagged(x[:, j], d + lag) for j, d in enumerate(delays) for lag in range(most)]
-            block = np.stack([*columns, np.ones(len(out)), out], axis=1)[first:]
-            gram, rows = gram + block.T @ block, rows + len(block)
-    for a in range(1, most + 1) if rows > size else ():
-        for b in range(1, most + 1):
-            inputs = (range(most * (j + 1), most * (j + 1) + b) for j in range(len(delays)))
-            at = [*range(a), *(i for own in inputs for i in own), size - 2, size - 1]
-            theta, left = _solved(gram[np.ix_(at, at)])
-            yield a, b, theta[:-1], left / rows, rows
-
-
 def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
     """Return C and D of one order, at least `least`, preferred by BIC for the longest errors (n,)."""
     v, tried = max(errors, key=len), list[tuple[float, Array, Array]]()
     for n in range(least, _MOST_NOISE + 1):
-        C, D = (reflected(np.append(1.0, p)) for p in (noise_polynomials(v, n, n) if n else ([], [])))
+        after = noise_polynomials(v, n, n) if n else (np.zeros(0), np.zeros(0))
+        C, D = (reflected(np.append(1.0, p)) for p in after)
         power = max(float(np.mean(filtered(D, C, v) ** 2)), 1e-300)
         tried.append((v.size * np.log(power) + 2 * n * np.log(v.size), C, D))
     return min(tried, key=lambda one: one[0])[1:]

@@ -51,8 +51,7 @@ class Expression:
     @classmethod
     def of(cls, text: str) -> Expression:
         """The expression of a text; raises `ExpressionError` for anything that is not allowed."""
-        _check(_tree_of(text))
-        return cls(text)
+        return cls(text, _read(_tree_of(text)))
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
@@ -96,9 +95,7 @@ class Expression:
         """Its value and its gradient (m,) where the `symbols` have these `values` (m,).
 
         Both are not a number where it is not defined, as one over zero or the root of a negative number.
-
-        Raises:
-            KeyError: a name is not among the symbols.
+        Raises `KeyError`: a name is not among the symbols.
         """
         here = evaluated((self,), symbols, values)
         return float(here.values[0]), here.gradients[0]
@@ -107,8 +104,7 @@ class Expression:
 def evaluated(expressions: tuple[Expression, ...], symbols: Sequence[str], values: Array) -> Evaluated:
     """What expressions are worth where `symbols` have `values` (m,); what they share is worked out once.
 
-    Raises:
-        KeyError: a name is not among the symbols.
+    Raises `KeyError`: a name is not among the symbols.
     """
     steps, places = _together(expressions)
     return worked_through(steps, places, symbols, values)
@@ -188,37 +184,6 @@ def is_name(text: str) -> bool:
     return text.isidentifier() and text.isascii() and not taken
 
 
-def _check(tree: ast.expr) -> None:
-    """Raise `ExpressionError` for what is not arithmetic in names and numbers."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                if not math.isfinite(_number(number)):
-                    raise ExpressionError("holds a number that is too large")
-            case ast.Call(func=ast.Name(id=name), args=[_], keywords=[]) if name in FUNCTIONS:
-                pass
-            case ast.Call(func=ast.Name(id=name)):
-                taken = (
-                    "takes one argument"
-                    if name in FUNCTIONS
-                    else f"is no function: {', '.join(FUNCTIONS)} are"
-                )
-                raise ExpressionError(f"calls {name}(..)", f"{name} {taken}")
-            case ast.BinOp(op=ast.BitXor()):
-                raise ExpressionError("holds ^", "write ** for a power")
-            case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow()):
-                pass
-            case ast.UnaryOp(op=ast.USub() | ast.UAdd()) | ast.Name() | ast.operator() | ast.unaryop():
-                pass
-            case ast.expr_context():
-                pass
-            case _:
-                raise ExpressionError(
-                    "holds what is not arithmetic",
-                    f"+ - * / ** and brackets are taken, numbers, names and {', '.join(FUNCTIONS)}",
-                )
-
-
 def _number(value: float) -> float:
     try:
         return float(value)
@@ -227,26 +192,39 @@ def _number(value: float) -> float:
 
 
 def _read(tree: ast.expr) -> tuple[Step, ...]:
-    """The steps of a tree that has been checked; it is walked from its leaves."""
-    table = _Table()
-    places: dict[ast.AST, int] = {}
+    """The steps of a tree, which is walked from its leaves.
+
+    Raises:
+        ExpressionError: It is not arithmetic in names and numbers.
+    """
+    table, places = _Table(), dict[ast.AST, int]()
     for node in reversed(list(ast.walk(tree))):
         match node:
-            case ast.Constant(value=int() | float() as number):
+            case ast.operator() | ast.unaryop() | ast.expr_context():
+                continue
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
                 step = Step("number", _number(number))
+                if not math.isfinite(float(step.value)):
+                    raise ExpressionError("holds a number that is too large")
             case ast.Name(id=name):
                 step = Step("number", CONSTANTS[name]) if name in CONSTANTS else Step("name", name)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 places[node] = places[operand]
                 continue
-            case ast.UnaryOp(operand=operand):
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
                 step = Step("negative", operands=(places[operand],))
-            case ast.Call(func=ast.Name(id=name), args=[argument]):
+            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
                 step = Step(name, operands=(places[argument],))
-            case ast.BinOp(left=left, op=op, right=right):
+            case ast.Call(func=ast.Name(id=name)):
+                wrong = "takes one argument" if name in FUNCTIONS else f"is none of {', '.join(FUNCTIONS)}"
+                raise ExpressionError(f"calls {name}(..)", f"{name} {wrong}")
+            case ast.BinOp(op=ast.BitXor()):
+                raise ExpressionError("holds ^", "write ** for a power")
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _SIGNS:
                 step = Step(_SIGNS[type(op)], operands=(places[left], places[right]))
             case _:
-                continue
+                hint = f"+ - * / ** and brackets are taken, numbers, names and {', '.join(FUNCTIONS)}"
+                raise ExpressionError("holds what is not arithmetic", hint)
         places[node] = table.add(step)
     return table.expression(places[tree], "").steps
 

@@ -1,14 +1,9 @@
-"""Steps of expressions, worked through once: each has its value and its slopes in what it works on.
-
-The chain rule makes of these the slopes in all parameters, where they are asked for.
-"""
+"""Steps of expressions, worked through once, each with its value and its slopes in all parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -42,38 +37,11 @@ class Step(NamedTuple):
     operands: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
-class Evaluated:
+class Evaluated(NamedTuple):
     """K expressions in m parameters at one point; not a number where one is not defined there."""
 
-    _steps: tuple[Step, ...]
-    _places: tuple[int, ...]
-    _found: tuple[_Local | None, ...]
-    _known: Mapping[str, int]
-
-    @cached_property
-    def values(self) -> Array:
-        """Return the values (K,) of the steps."""
-        ends = [self._found[place] for place in self._places]
-        return np.array([math.nan if end is None else end.value for end in ends])
-
-    @cached_property
-    def gradients(self) -> Array:
-        """Return the gradients (K, m) of the steps."""
-        unit, slopes = np.eye(len(self._known)), list[Array | None]()
-        # Overflow is seen in the result.
-        with np.errstate(all="ignore"):
-            for step, local in zip(self._steps, self._found, strict=True):
-                slopes.append(unit[self._known[str(step.value)]] if step.operation == "name" else None)
-                if local is not None and step.operands:
-                    below = zip(local.slopes, (slopes[i] for i in step.operands), strict=True)
-                    parts = [partial * own for partial, own in below if own is not None]
-                    slopes[-1] = sum(parts[1:], parts[0]) / local.over if parts else None
-        rows = []
-        for place in self._places:
-            own = np.zeros(len(unit)) if (found := slopes[place]) is None else found
-            rows.append(np.full(len(unit), np.nan) if self._found[place] is None else own)
-        return np.array(rows).reshape(len(rows), len(unit))
+    values: Array  # (K,)
+    gradients: Array  # (K, m)
 
 
 def worked_through(
@@ -81,58 +49,56 @@ def worked_through(
 ) -> Evaluated:
     """What the expressions that end at `places` are worth where `symbols` have `values` (m,).
 
-    Raises:
-        KeyError: a name is not among the symbols.
+    Raises `KeyError`: a name is not among the symbols.
     """
-    known = {symbol: i for i, symbol in enumerate(symbols)}
-    found: list[_Local | None] = []
-    for step in steps:
-        found.append(_local(step, [found[i] for i in step.operands], known, values))
-    return Evaluated(steps, places, tuple(found), known)
+    known, unit = {symbol: i for i, symbol in enumerate(symbols)}, np.eye(len(symbols))
+    found: list[_Result] = []
+    with np.errstate(all="ignore"):  # overflow is seen in the result
+        for step in steps:
+            if step.operation == "number":
+                found.append(_Result(float(step.value)))
+            elif step.operation == "name":
+                at = known[str(step.value)]
+                found.append(_Result(float(values[at]), unit[at]))
+            else:
+                found.append(_result(step.operation, *(found[i] for i in step.operands)))
+    ends = [found[place] for place in places]
+    rows = [np.full(len(unit), np.nan if math.isnan(end.value) else 0.0) for end in ends]
+    gradients = [row if end.slope is None else end.slope for row, end in zip(rows, ends, strict=True)]
+    return Evaluated(np.array([end.value for end in ends]), np.array(gradients).reshape(len(ends), len(unit)))
 
 
-class _Local(NamedTuple):
-    """A value and its slopes in what it was made of, in units of one over `over`.
-
-    Attributes:
-        varies: whether any parameter moves it.
-    """
+class _Result(NamedTuple):
+    """A value, not a number where it is not defined, and its slope (m,), which is None for a constant."""
 
     value: float
-    slopes: tuple[float, ...]
-    varies: bool
-    over: float = 1.0
+    slope: Array | None = None
 
 
-def _local(
-    step: Step, operands: Sequence[_Local | None], known: Mapping[str, int], values: Array
-) -> _Local | None:
-    """Return the value and slopes of a step, or None if it or one of its operands is not defined."""
-    operation = step.operation
-    if operation == "number":
-        return _Local(float(step.value), (), False)
-    if operation == "name":
-        return _Local(float(values[known[str(step.value)]]), (), True)
-    if any(operand is None for operand in operands):
-        return None
-    first, *others = [operand for operand in operands if operand is not None]
+def _result(operation: str, *operands: _Result) -> _Result:
+    """Return the value of a step and, by the chain rule, its slope."""
+    first, *others = operands
     try:
+        if any(math.isnan(operand.value) for operand in operands):
+            raise ValueError
+        over = 1.0
         if others:
-            value, *slopes = _combined(operation, first, others[0])
+            value, *partial = _combined(operation, first, others[0])
+            over = others[0].value if operation == "/" else 1.0
         elif operation == "negative":
-            value, *slopes = -first.value, -1.0
+            value, *partial = -first.value, -1.0
         else:
-            function, slope = FUNCTIONS[operation]
+            function, derivative = FUNCTIONS[operation]
             # A constant has no slope, also where the function has none: sqrt(0).
-            value, *slopes = function(first.value), slope(first.value) if first.varies else 0.0
+            value, *partial = function(first.value), 0.0 if first.slope is None else derivative(first.value)
     except (ArithmeticError, ValueError):
-        return None
-    moved = zip(slopes, (first, *others), strict=True)
-    varies = any(slope != 0.0 and operand.varies for slope, operand in moved)
-    return _Local(value, tuple(slopes), varies, others[0].value if operation == "/" else 1.0)
+        return _Result(math.nan)
+    moved = zip(partial, operands, strict=True)
+    parts = [share * one.slope for share, one in moved if one.slope is not None and share != 0.0]
+    return _Result(value, sum(parts[1:], parts[0]) / over if parts else None)
 
 
-def _combined(sign: str, first: _Local, second: _Local) -> tuple[float, float, float]:
+def _combined(sign: str, first: _Result, second: _Result) -> tuple[float, float, float]:
     """Return the value of a sum, difference, product, ratio or power, and its slopes in both operands.
 
     The slopes of a ratio are still to be divided by the second operand.
@@ -147,5 +113,5 @@ def _combined(sign: str, first: _Local, second: _Local) -> tuple[float, float, f
     if sign == "/":
         return a / b, 1.0, -(a / b)
     power = math.pow(a, b)
-    in_base = b * math.pow(a, b - 1.0) if first.varies and b else 0.0
-    return power, in_base, power * math.log(a) if second.varies else 0.0
+    in_base = b * math.pow(a, b - 1.0) if first.slope is not None and b else 0.0
+    return power, in_base, power * math.log(a) if second.slope is not None else 0.0

@@ -7,48 +7,37 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.bound import draw_bound
-from inputdesign_cli.figures.campaign import draw_campaign, draw_estimates, draw_trade, draw_true_ratio
-from inputdesign_cli.figures.data import draw_fit, draw_residuals
-from inputdesign_cli.figures.deviations import draw_deviations
-from inputdesign_cli.figures.ellipses import draw_ellipses
-from inputdesign_cli.figures.exploration import draw_orders
-from inputdesign_cli.figures.fan import draw_fan
-from inputdesign_cli.figures.moments import draw_error, draw_moments
+from inputdesign_cli.figures import estimates, frequency, records, spectrum, studies
 from inputdesign_cli.figures.nyquist import draw_nyquist
-from inputdesign_cli.figures.response import draw_response
-from inputdesign_cli.figures.signal import draw_signal
-from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
 from inputdesign_cli.figures.style import FILE_TYPES, FileType, painted, rendered
-from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands, draw_loss
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results
 
 # Each draws its curves on an empty page; the text is the unit of time.
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
-    of.BoundCurves: draw_bound,
-    of.CampaignCurves: draw_campaign,
-    of.CloudCurves: draw_cloud,
-    of.DeviationCurves: draw_deviations,
-    of.DirectionCurves: draw_directions,
-    of.EllipseCurves: draw_ellipses,
-    of.EstimateCurves: draw_estimates,
-    of.ErrorBandCurves: draw_error_bands,
-    of.ErrorCurves: draw_error,
-    of.FanCurves: draw_fan,
-    of.FitCurves: draw_fit,
-    of.LossCurves: draw_loss,
-    of.MomentsCurves: draw_moments,
+    of.BoundCurves: frequency.draw_bound,
+    of.CampaignCurves: studies.draw_campaign,
+    of.CloudCurves: estimates.draw_cloud,
+    of.DeviationCurves: frequency.draw_deviations,
+    of.DirectionCurves: spectrum.draw_directions,
+    of.EllipseCurves: estimates.draw_ellipses,
+    of.EstimateCurves: estimates.draw_estimates,
+    of.ErrorBandCurves: frequency.draw_error_bands,
+    of.ErrorCurves: estimates.draw_error,
+    of.FanCurves: frequency.draw_fan,
+    of.FitCurves: records.draw_fit,
+    of.LossCurves: studies.draw_loss,
+    of.MomentsCurves: estimates.draw_moments,
     of.NyquistCurves: draw_nyquist,
-    of.OptimalityCurves: draw_optimality,
-    of.OrderCurves: draw_orders,
-    of.RatioCurves: draw_true_ratio,
-    of.ResidualCurves: draw_residuals,
-    of.ResponseCurves: draw_response,
-    of.SignalCurves: draw_signal,
-    of.SpectrumCurves: draw_spectrum,
-    of.TradeCurves: draw_trade,
+    of.OptimalityCurves: spectrum.draw_optimality,
+    of.OrderCurves: estimates.draw_orders,
+    of.RatioCurves: studies.draw_true_ratio,
+    of.ResidualCurves: records.draw_residuals,
+    of.ResponseCurves: frequency.draw_response,
+    of.SignalCurves: records.draw_signal,
+    of.SpectrumCurves: spectrum.draw_spectrum,
+    of.TradeCurves: studies.draw_trade,
 }
 
 

@@ -244,10 +244,24 @@ def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
     return BLACK if luminance > 0.179 else "#FFFFFF"
 
 
-def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> None:
-    """Rings around points of a curve."""
-    (rings,) = axes.plot(x, y, "o", markersize=6, clip_on=False, zorder=5, label=label)
-    rings.set(markerfacecolor="white", markeredgecolor=color, markeredgewidth=1.5)
+def marked(axes: Axes, x: Array, y: Array, *, color: str = BLUE, label: str = "") -> None:
+    """Rings around points of a curve, if there are any."""
+    if x.size:
+        (rings,) = axes.plot(x, y, "o", markersize=6, clip_on=False, zorder=5, label=label)
+        rings.set(markerfacecolor="white", markeredgecolor=color, markeredgewidth=1.5)
+
+
+def band(
+    axes: Axes, x: Array, low: Array, high: Array | float, color: str, alpha: float | None, **more: Any
+) -> None:
+    """A shade between two curves."""
+    axes.fill_between(x, low, high, color=color, alpha=alpha, linewidth=0, **more)
+
+
+def plot_limit(axes: Axes, top: float) -> Line2D:
+    """Draw the limit of a ratio at one, and a shade beyond it up to the top; return the line."""
+    axes.axhspan(1.0, top, color=ORANGE, alpha=0.07, linewidth=0)
+    return axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit")
 
 
 def limiting_label(count: int) -> str:
@@ -264,7 +278,7 @@ def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
     low, high = axes.get_ylim()
     top = max(high, 1.15 * float(np.nanmax(admitted, initial=0.0)))
     bottom = min(low, 0.87 * float(np.nanmin(admitted, initial=np.inf)))
-    axes.fill_between(w, admitted, top, color=ORANGE, alpha=0.07, linewidth=0)
+    band(axes, w, admitted, top, ORANGE, 0.07)
     axes.plot(w, admitted, color=ORANGE, linestyle=DASHED, label="r_adm, admitted")
     axes.set_ylim(bottom, top)
 
@@ -291,17 +305,6 @@ def positive(values: Array) -> Array:
     return np.where(values > 0, values, np.nan)
 
 
-def page_of_pairs(page: Figure, pairs: int, columns: int) -> list[Axes]:
-    """Return axes for a number of pairs of parameters, row by row."""
-    columns = min(columns, pairs)
-    grid = list(page.subplots(-(-pairs // columns), columns, squeeze=False).flat)
-    for axes in grid[pairs:]:
-        axes.set_axis_off()
-    for axes in grid[:pairs]:
-        axes.locator_params(nbins=4)
-    return grid[:pairs]
-
-
 def labelled(*panels: Axes) -> list[Artist]:
     """What has a label, in the order in which it was drawn; of equal labels the first."""
     found: dict[str, Artist] = {}
@@ -316,16 +319,13 @@ def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
     page = axes.get_figure(root=True)
     assert page is not None
     handles = labelled(axes) if handles is None else handles
+    form = _form(handles, page)
+    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.3, **form)
+
+
+def _form(handles: Sequence[Artist], page: Figure) -> dict[str, Any]:
     labels = [str(handle.get_label()) for handle in handles]
-    axes.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=_columns(labels, page.get_figwidth()),
-        borderaxespad=0.3,
-        handlelength=2.0,
-        columnspacing=1.2,
-    )
+    return {"ncols": _columns(labels, page.get_figwidth()), "handlelength": 2.0, "columnspacing": 1.2}
 
 
 def _columns(labels: Sequence[str], inches: float) -> int:
@@ -345,24 +345,17 @@ def _width(label: str) -> float:
 
 
 def title_above(page: Figure, title: str) -> None:
-    """A title of the page, in as many lines as it takes."""
-    page.suptitle(_wrapped(page, title), x=0.01, ha="left")
+    """A title of the page, in as many lines as it takes; none if it is empty."""
+    if title:
+        page.suptitle(_wrapped(page, title), x=0.01, ha="left")
 
 
 def _wrapped(page: Figure, title: str) -> str:
     return textwrap.fill(title, max(int(page.get_figwidth() * _TITLE_PER_INCH), 1))
 
 
-def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str | None = None) -> None:
+def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str = "") -> None:
     """One legend for all panels of a page, above them: all that has a label, or `handles`."""
     handles = labelled(*page.axes) if handles is None else handles
-    labels = [str(handle.get_label()) for handle in handles]
-    page.legend(
-        handles=handles,
-        loc="outside upper left",
-        ncols=_columns(labels, page.get_figwidth()),
-        title=title and _wrapped(page, title),
-        alignment="left",
-        handlelength=2.0,
-        columnspacing=1.2,
-    )
+    title, form = _wrapped(page, title), _form(handles, page)
+    page.legend(handles=handles, loc="outside upper left", title=title, alignment="left", **form)

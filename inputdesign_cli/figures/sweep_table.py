@@ -99,6 +99,23 @@ class SweepTable:
             return None
 
 
+@dataclass(frozen=True)
+class Trade:
+    """The worst ratio to the requirement, or the criterion, over lengths (in `unit`) and amplitudes.
+
+    Args:
+        amplitudes: their texts, one where only the length was varied.
+        values: (amplitudes, lengths), NaN without a result.
+        criterion: whether the values are a criterion, and not ratios that are to be one at most.
+    """
+
+    lengths: Array
+    unit: str
+    amplitudes: tuple[str, ...]
+    values: Array
+    criterion: bool
+
+
 def read_sweep(root: Path) -> SweepTable:
     """Read the table of a sweep.
 

@@ -67,10 +67,7 @@ def withdrawn_record(kind: FindingKind, file: str, number: int) -> list[Finding]
 
 @finding(NOTE, "record-without-excitation", "Record r as well.")
 def without_excitation(kind: FindingKind, given: str, plan: str) -> list[Finding]:
-    """A record has no column of the reference. In closed loop the plan is the reference, column r.
-
-    Without it no comparison with the plan is possible, and the energy is taken from the plan.
-    """
+    """A record has no column of the reference. Without it no comparison with the plan is possible."""
     return [kind.found(f"{given} cannot be compared with {plan}", where=given, plan=plan)]
 
 
@@ -122,11 +119,7 @@ def no_estimate_yet(kind: FindingKind, why: str) -> list[Finding]:
     return [kind.found(why, why=why)]
 
 
-@finding(
-    DOUBT,
-    "estimate-not-used",
-    "Apply the next part. If it happens again, check the records and the model structure.",
-)
+@finding(DOUBT, "estimate-not-used", "Apply the next part. If it recurs, check the records and the model.")
 def estimate_not_used(kind: FindingKind, share: float | None, why: str) -> list[Finding]:
     """The next plan does not use the estimate itself. The accuracy cannot be evaluated there.
 
@@ -150,17 +143,11 @@ def campaign_doubted(kind: FindingKind) -> list[Finding]:
     return [kind.found("see the other notes. The campaign would end undecided now")]
 
 
-@finding(
-    REFUTED,
-    "campaign-refuted",
-    "Try `idesign explore` for another structure, or `idesign next DIR --regardless`.",
-)
+@finding(REFUTED, "campaign-refuted", "Try `idesign explore`, or `idesign next DIR --regardless`.")
 def campaign_refuted(
     kind: FindingKind, directory: Path, samples: int, end: int, records: Sequence[str], *, every: bool
 ) -> list[Finding]:
-    """The campaign ends because the data refute the model. Tests of the residuals refute its structure.
-
-    More samples of the same experiment would not help.
+    """The campaign ends because the data refute the model. More samples would not help.
 
     Args:
         samples: applied, of at most `end`.
@@ -201,9 +188,3 @@ def planned_otherwise(
         *EARLIER_PARTS_COST.when(beyond, cost, where=file, cost=part_cost),
         *PART_NOT_ROBUST.when(fragile, file, where=file),
     ]
-
-
-@finding(NOTE, "earlier-pictures", "Give `idesign next DIR` without `--no-figures`: it draws them anew.")
-def earlier_pictures(kind: FindingKind, names: Sequence[str]) -> list[Finding]:
-    """Pictures show the campaign before its last decision. `idesign next --no-figures` keeps them."""
-    return kind.when(names, ", ".join(names), files=list(names))

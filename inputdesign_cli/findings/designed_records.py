@@ -82,9 +82,7 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
 
 @finding(NOTE, "record-less-accurate", "Take more samples, or more candidates (`signal.candidates`).")
 def less_accurate(kind: FindingKind, reached: float, designed: float) -> list[Finding]:
-    """The record is less accurate than the design. The accuracy of the design holds for its spectrum.
-
-    The finite length or limits on single samples reduce it.
+    """The record is less accurate than the design. Finite length or limits on samples reduce accuracy.
 
     Args:
         reached, designed: multiples of the admissible error.

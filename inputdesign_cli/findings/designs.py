@@ -26,11 +26,7 @@ _FREE = 1e-3
 _SUPPORT = 1e-3
 
 
-@finding(
-    NOTE,
-    "no-excitation-needed",
-    "Estimate the model from a record of normal operation, or ask for more accuracy.",
-)
+@finding(NOTE, "no-excitation-needed", "Use a record of normal operation, or ask for more accuracy.")
 def nothing_needed(kind: FindingKind, experiment: Experiment, *, at_every_plant: bool) -> Finding:
     """No excitation is needed. Noise in normal operation or prior knowledge meets the required accuracy."""
     sources = ["the noise in normal operation"] if experiment.loop is not None else []
@@ -40,13 +36,9 @@ def nothing_needed(kind: FindingKind, experiment: Experiment, *, at_every_plant:
     return kind.found(fact, sources=sources)
 
 
-@finding(
-    DOUBT, "input-without-power", "Take criterion D, A or E, which require information on every parameter."
-)
+@finding(DOUBT, "input-without-power", "Take criterion D, A or E, which need information on every parameter.")
 def inputs_without_power(kind: FindingKind, excited: Sequence[float]) -> list[Finding]:
-    """The design does not excite an input. Criterion T adds up the information of all parameters.
-
-    It may be largest without power in an input.
+    """The design does not excite an input. Criterion T may be largest without power in an input.
 
     Args:
         excited: the power of each input.
@@ -55,16 +47,9 @@ def inputs_without_power(kind: FindingKind, excited: Sequence[float]) -> list[Fi
     return [kind.found(f"{name}, whose effects stay unknown", where=name) for name in idle]
 
 
-@finding(
-    DOUBT,
-    "experiment-short",
-    "Compare with the accuracy of the samples of the record, and run `idesign simulate`.",
-)
+@finding(DOUBT, "experiment-short", "Compare with the accuracy of the record, and run `idesign simulate`.")
 def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]:
-    """The experiment ends before the slowest mode settles. Spectra describe long records.
-
-    A short record may be more or less accurate.
-    """
+    """The experiment ends before the slowest mode settles. Spectra describe long records."""
     damping, samples = np.abs(experiment.singularities.imag), experiment.samples
     slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
     if experiment.model.continuous or samples == 1 or slowest * samples >= _SETTLED:
@@ -93,8 +78,6 @@ def almost_free(
 ) -> list[Finding]:
     """Power at low frequencies costs almost nothing. Integral action suppresses slow excitation.
 
-    The power of the optimal excitation is then ill defined.
-
     Args:
         lines: (n,) frequencies of the sinusoids, with their power (n,) and the price of power there (n,).
         dearest: the largest price over frequency.
@@ -109,11 +92,7 @@ def almost_free(
 
 @finding(NOTE, "met-within-table", "Give the table more rows.")
 def met_within_table(kind: FindingKind, error: float) -> Finding:
-    """Interpolation of the table decides whether the requirement is met.
-
-    A table gives a spectrum by its rows and straight lines between them. The verdict is within the error of
-    this interpolation.
-    """
+    """Interpolation of the table decides whether the requirement is met. Straight lines join its rows."""
     return kind.found(f"it is met to within {error:.1g}", where="spectrum.given", error=error)
 
 

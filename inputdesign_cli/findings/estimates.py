@@ -32,23 +32,15 @@ def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
     "unsettled",
 )
 def _not_settled(kind: FindingKind, estimate: Estimate) -> list[Finding]:
-    """The search for the estimate did not converge. It still moved at its last step.
-
-    The estimate may be far from the minimum.
-    """
+    """The search for the estimate did not converge. It may have stopped far from the minimum."""
     search = estimate.search
     fact = f"{search.steps} steps from the best of {search.starts} starts"
     return kind.when(not search.converged, fact, steps=search.steps, starts=search.starts)
 
 
-@finding(
-    UNDECIDED, "stopped-at-an-end", "Rewrite it so that it is defined for every possible plant.", "unsettled"
-)
+@finding(UNDECIDED, "stopped-at-an-end", "Define it for every possible plant.", "unsettled")
 def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
-    """The search stopped at the boundary of an expression. Beyond it, the expression is not defined.
-
-    The likeliest parameters may lie there, and the standard deviation is unreliable.
-    """
+    """The search stopped at the boundary of an expression. The likeliest parameters may lie beyond it."""
     found = []
     deviations = np.sqrt(np.diag(estimate.covariance))
     for k in np.flatnonzero(~model.dead_times).tolist():
@@ -67,10 +59,7 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
     "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
 )
 def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
-    """The initial state of a record was estimated too. The record may not begin at rest about zero.
-
-    Output levels and initial state cost some accuracy.
-    """
+    """The initial state of a record was estimated too. It and output levels cost some accuracy."""
     if not estimate.start.free:
         return []
     if not estimate.start.rest_refuted:
@@ -86,10 +75,7 @@ def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
 
 @finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")
 def on_the_circle(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
-    """A noise polynomial has a root on the unit circle. The covariance is unreliable.
-
-    A design would assume noise that vanishes or never decays.
-    """
+    """A noise polynomial has a root on the unit circle. The covariance is unreliable."""
     samples = len(estimate.errors)
     letters = " and ".join(
         letter
@@ -124,24 +110,15 @@ def near_zero(kind: FindingKind, model: Model, estimate: Estimate) -> list[Findi
     return found
 
 
-@finding(
-    NOTE,
-    "input-taken-as-band-limited",
-    "If the input is held between the samples, write `plant.sample: zoh`.",
-)
+@finding(NOTE, "input-taken-as-band-limited", "If the input is held in between, write `plant.sample: zoh`.")
 def band_limited(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
     """The input was taken as band-limited. The plant is in continuous time, and tests refute the model."""
     return kind.when(model.continuous and estimate.tests.failed, where="plant.sample")
 
 
-@finding(
-    UNDECIDED, "no-accuracy-here", "Correct the spec, or take data that give another estimate.", "unasked"
-)
+@finding(UNDECIDED, "no-accuracy-here", "Correct the spec, or take data with another estimate.", "unasked")
 def unasked(kind: FindingKind, why: str) -> list[Finding]:
-    """The requirement cannot be evaluated at the estimate. The loop may be unstable there, for instance.
-
-    There is no error bound r_u, and no verdict.
-    """
+    """The requirement cannot be evaluated at the estimate. There is no error bound r_u, and no verdict."""
     return kind.when(why, f"there is no r_u: {why}")
 
 

@@ -36,10 +36,7 @@ def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
 
 @finding(DOUBT, "input-only-answers", "Move the reference of the loop, or add dither to the input.")
 def undriven(kind: FindingKind, parts: Parts) -> list[Finding]:
-    """An input follows from the outputs alone. It is an exact function of outputs and its own past.
-
-    This is a loop without excitation. The inverse of the controller explains these data as well as the plant.
-    """
+    """An input follows from the outputs alone. The inverse of the controller explains the data as well."""
     names = [signal_name("u", j, parts[0][0].shape[1]) for j in only_answers(parts)]
     return [kind.found(f"{name}, and the plant is not identifiable", where=name) for name in names]
 
@@ -60,16 +57,9 @@ def _inverses(kind: FindingKind, found: Found, moving: Parts) -> list[Finding]:
     return [kind.found(f"{y} responds to {u} in the same sample, as -1/C does", where=y) for y, u in pairs]
 
 
-@finding(
-    DOUBT,
-    "excitation-too-simple",
-    "Apply inputs that move more and independently; `idesign signal` makes some.",
-)
+@finding(DOUBT, "excitation-too-simple", "Apply inputs that move more and independently (`idesign signal`).")
 def _too_simple(kind: FindingKind, found: Found, moving: Parts) -> list[Finding]:
-    """The inputs determine fewer parameters than the model has. Other models explain the record as well.
-
-    Their order of persistent excitation is too low for the model.
-    """
+    """The inputs determine fewer parameters than the model has. Other models explain as much."""
     needed = max(candidate.orders.unknowns for candidate in found.taken)
     order = order_of_excitation(moving)
     if order < needed:
@@ -85,10 +75,7 @@ def _too_simple(kind: FindingKind, found: Found, moving: Parts) -> list[Finding]
 
 @finding(DOUBT, "parameter-undetermined", "Move that input more, or leave it out with `--columns`.")
 def _open(kind: FindingKind, found: Found) -> list[Finding]:
-    """The record does not determine a parameter. Its standard deviation is many times its value.
-
-    Or a time constant is much longer than the record.
-    """
+    """The record does not determine a parameter. Its deviation is many times its value."""
     named = open_parameters(found, _OPEN)
     return kind.when(named, ", ".join(named), where="".join(named[:1]).split(" = ")[0])
 

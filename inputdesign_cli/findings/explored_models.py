@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
-from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.explore import Found, Parts, by_chance, unhelpful, unstable_pole
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.rivals import most_apart
@@ -53,10 +51,7 @@ def doubtful_model(
     "Use another record (`idesign explore OTHER --validate model.yaml`), or let the inputs step more.",
 )
 def _unjudged(kind: FindingKind, found: Found) -> list[Finding]:
-    """No data remain to validate the model. An input moves in only one stretch of the record.
-
-    The estimate needs this stretch.
-    """
+    """No data remain to validate the model. An input moves in only one stretch of the record."""
     return kind.when(found.split == "none")
 
 
@@ -77,14 +72,9 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
     return doubtful
 
 
-@finding(
-    DOUBT, "inputs-unrelated", "Move the inputs by steps of your own, at times that nothing else follows."
-)
+@finding(DOUBT, "inputs-unrelated", "Move the inputs by steps of your own, which nothing else follows.")
 def _unrelated(kind: FindingKind, found: Found) -> list[Finding]:
-    """The inputs do not help to predict an output. Its prediction errors do not depend on them.
-
-    Signals that wander, drift or share a cycle agree for long without any link.
-    """
+    """The inputs do not help to predict an output. Signals that wander or drift agree without any link."""
     idle = set(driven_by_nothing(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
     worse = {i for i, fit in enumerate(found.estimate.simulation.fit) if fit is not None and fit <= 0.0}
     idle |= {i for i in worse if not found.wanders[i]}
@@ -92,11 +82,7 @@ def _unrelated(kind: FindingKind, found: Found) -> list[Finding]:
     return [kind.found(f"{name} follows from its own past alone", where=name) for name in names]
 
 
-@finding(
-    DOUBT,
-    "structure-unexplained",
-    "Record about one operating point, or record what else acts on the output.",
-)
+@finding(DOUBT, "structure-unexplained", "Record about one operating point, or what else acts on the output.")
 def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
     """No tested structure explains an output. The simulation explains less than half of it.
 
@@ -123,10 +109,7 @@ def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
 def _like_integrators(
     kind: FindingKind, found: Found, step: float, unit: str, *, integrates: bool
 ) -> list[Finding]:
-    """The plant may be an integrator. G rises towards the lowest frequencies of the record.
-
-    The record determines only the slope, not static gain and time constant.
-    """
+    """The plant may be an integrator. The record determines the slope, but not the static gain."""
     slow = [] if found.steady else [kind.found("a mode loses less than a hundredth in the whole record")]
     if integrates:
         return slow
@@ -136,9 +119,10 @@ def _like_integrators(
     w = np.concatenate([[_STATIC * lowest], np.geomspace(lowest, max(1.0, lowest), _FREQUENCIES)])
     with np.errstate(all="ignore"):
         change, G = model.plant_gradient(w), model.plant_at(w)
+        variance = np.einsum("nkij,kl,nlij->nij", change.conj(), found.estimate.covariance, change).real
     rising = []
     for i, j in ((i, j) for i in range(model.outputs) for j in found.moving):
-        size, deviations = np.abs(G[:, i, j]), _deviations(found, change[:, :, i, j].T)
+        size, deviations = np.abs(G[:, i, j]), np.sqrt(np.maximum(variance[:, i, j], 0.0))
         # |G| is clear where it rises, and its end is not.
         clear = (size > _CLEAR * deviations) & (_RISING * size < size[0])
         if not (np.all(np.isfinite(size + deviations)) and size[0] < _OPEN * deviations[0] and np.any(clear)):
@@ -152,21 +136,9 @@ def _like_integrators(
     return rising or slow
 
 
-def _deviations(found: Found, change: ComplexArray) -> Array:
-    """Return deviations (n,) of values whose real and imaginary parts have gradients `change` (k, n)."""
-    if not np.all(np.isfinite(change)):
-        return np.full(change.shape[1], np.nan)
-    parts = np.hstack([change.real, change.imag])
-    scaled = scipy.linalg.solve_triangular(found.estimate.factor, parts, lower=True)
-    return np.linalg.norm(np.vstack(np.hsplit(scaled, 2)), axis=0)
-
-
 @finding(DOUBT, "rival-explains-log", "Move the inputs independently of each other, and at more frequencies.")
 def _rivalled(kind: FindingKind, found: Found) -> list[Finding]:
-    """Another set of parameters explains the log as well. The likelihood has another minimum.
-
-    It is about as deep, and has a different G.
-    """
+    """Another set of parameters explains the log as well. It has another minimum of the likelihood."""
     w = np.linspace(1e-6, np.pi, 100)
     G, estimate = found.model.plant_at(w), found.estimate
     peaks = np.maximum(np.abs(G).max(axis=0), 1e-300)
@@ -185,10 +157,7 @@ def _rivalled(kind: FindingKind, found: Found) -> list[Finding]:
 
 @finding(DOUBT, "plant-unstable", "Identify the plant with its loop: `idesign identify DATA --spec SPEC`.")
 def _unstable(kind: FindingKind, parts: Parts, step: float, unit: str) -> list[Finding]:
-    """The plant is unstable. The samples place a pole outside the unit circle.
-
-    Without a spec, only stable models are searched.
-    """
+    """The plant is unstable. It has a pole outside the unit circle, and only stable models are searched."""
     outputs, found = parts[0][1].shape[1], []
     clock = f"sample_time: {step:.6g}{'' if unit == 's' else f', time_unit: {unit}'}"
     for i in range(outputs):

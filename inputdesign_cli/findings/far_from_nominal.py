@@ -38,27 +38,18 @@ FAR = doubt(
 
 
 @dataclass(frozen=True)
-class _Apart:
-    """Where an entry of G is farthest from that of the spec, as a share of the larger of the two."""
-
-    share: float
-    frequency: float
-    entry: str
-    opposite: bool
-
-
-@dataclass(frozen=True)
 class Distance:
     """The distance of an estimate from the plant of the spec.
 
     Attributes:
         listed: the parameters that are farthest, with their values and deviations.
-        worst: where G differs most; None if no error of G has an r_u.
+        share, place: how much G differs at most, of the larger one, and where; zero if no error of G has r_u.
     """
 
     nominal: Nominal
     listed: tuple[str, ...]
-    worst: _Apart | None
+    share: float
+    place: str
 
 
 def from_nominal(
@@ -87,10 +78,8 @@ def from_nominal(
     scale = np.sqrt(np.diag(covariance))[of_plant]
     correlation = covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
     statistic = float((away / scale) @ np.linalg.lstsq(correlation, away / scale, rcond=None)[0])
-    places = [
-        place for error in errors for place in _apart(units, nominal, estimated, error, information, asked)
-    ]
-    worst = max(places, key=lambda one: one.share, default=None)
+    apart = [one for error in errors for one in _apart(units, nominal, estimated, error, information, asked)]
+    share, place, _ = max(apart, default=(0.0, "", False))
     deviations = np.abs(away) / scale
     listed = tuple(
         f"{estimate.names[of_plant[k]]} is {estimate.theta[of_plant[k]]:.4g}, not "
@@ -103,29 +92,24 @@ def from_nominal(
         statistic=statistic,
         degrees_of_freedom=of_plant.size,
         probability=float(scipy.special.chdtrc(of_plant.size, statistic)),
-        worst_difference=None if worst is None else worst.share,
-        opposite_sign=None if worst is None else any(one.opposite for one in places),
+        worst_difference=share if apart else None,
+        opposite_sign=any(opposite for *_, opposite in apart) if apart else None,
     )
-    return Distance(found, listed, worst)
+    return Distance(found, listed, share, place)
 
 
-def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
+def far_from_nominal(distance: Distance) -> list[Finding]:
     """Return a finding where the two are different plants, or parameters lie far apart."""
-    found, worst = distance.nominal, distance.worst
-    another = worst is not None and worst.share > _ANOTHER
+    found, another = distance.nominal, distance.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
         return []
-    listed = "".join(f", {one}" for one in distance.listed)
-    kind = FAR
-    fact = f"the parameters of G are {found.deviations:.3g} standard deviations away"
-    if worst is not None and another:
-        sign = "of the opposite sign at low frequency, and " if found.opposite_sign else ""
+    kind, fact = FAR, f"the parameters of G are {found.deviations:.3g} standard deviations away"
+    if another:
+        sign = ", and has the opposite sign at low frequency" if found.opposite_sign else ""
         kind = ANOTHER
-        fact = (
-            f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
-            f"{worst.frequency:.4g} {units.per_time}"
-        )
-    fact += f" (chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom{listed})"
+        fact = f"{distance.place} differs by {100 * distance.share:.0f} % of the larger one{sign}"
+    statistic = f"chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom"
+    fact = f"{fact} ({'; '.join((statistic, *distance.listed))})"
     return [kind.found(fact, where="plant", deviations=found.deviations, probability=found.probability)]
 
 
@@ -147,8 +131,8 @@ def of_first_part(distance: Distance) -> list[Finding]:
 
 def _apart(
     units: Units, nominal: Model, estimated: Model, error: OnModelError, information: Array, asked: bool
-) -> list[_Apart]:
-    """Return where the entries of G of a model error differ by more than r_u and r_adm."""
+) -> list[tuple[float, str, bool]]:
+    """Return by which share, and where, entries of G differ beyond r_u and r_adm, and whether in sign."""
     w = error.grid
     with np.errstate(divide="ignore", invalid="ignore"):  # the nominal plant may have a pole on the grid
         before, now = nominal.plant_at(w), estimated.plant_at(w)
@@ -163,5 +147,6 @@ def _apart(
         share = np.where(apart > beyond, apart / size, 0.0)
         at = int(np.argmax(share))
         opposite = bool(share[0] > 1.0 and (old[0].conj() * new[0]).real < 0.0)
-        found.append(_Apart(float(share[at]), float(w[at]) / units.frequency, units.entry(i, j), opposite))
+        place = f"G{units.entry(i, j)} at {units.named(float(w[at]))}"
+        found.append((float(share[at]), place, opposite))
     return found

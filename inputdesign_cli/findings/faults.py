@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,28 +67,27 @@ def faults(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
     return found
 
 
-def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[float]) -> Iterator[Finding]:
-    """Yield a finding for each output whose faults give its model other dynamics than the plant has.
+def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[float]) -> list[Finding]:
+    """Return the faults that give the model of an output other dynamics than the plant has.
 
     Args:
         fitted: (p,), per cent of each output that the simulation explains.
     """
-    for output, runs in _still(estimate, data).items():
-        share, name = sum(one.length for one in runs) / len(data.y), _named(units, output)
-        fact = f"{name} at {100.0 * share:.2g} % of the samples, so that gain and dynamics are biased"
-        yield from FROZEN.when(share >= _BIASING, fact, where=name, share=share)
-    for one in spikes(estimate.errors):
-        name, fit = _named(units, one.output), fitted[one.output]
-        fact = f"they hold {100.0 * one.share:.3g} % of the squares of {name}, and its fit is {fit:.1f} %"
-        yield from SPIKES.when(fit < _HALF, fact, where=name, share=one.share)
+    fits = {_named(units, output): fit for output, fit in enumerate(fitted)}
+    still = {
+        _named(units, output): sum(one.length for one in runs) / len(data.y)
+        for output, runs in _still(estimate, data).items()
+    }
+    return [
+        one
+        for one in faults(units, estimate, data)
+        if (fits[one.where] < _HALF if one.code == SPIKES.code else still[one.where] >= _BIASING)
+    ]
 
 
 @finding(REFUTED, "columns-misaligned", "Shift the column, or correct the controller of the spec.")
 def loop_faults(kind: FindingKind, controller: TransferMatrix | None, data: Samples) -> list[Finding]:
-    """A column was logged at another time. The controller of the spec computes u from r and y.
-
-    The data follow this law much better with one column shifted by some samples.
-    """
+    """A column was logged at another time. With it shifted, the data follow u = r - C y much better."""
     if controller is None or data.r is None:
         return []
     found = {}
@@ -121,14 +120,9 @@ def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
     return dict(sorted(found.items()))
 
 
-@finding(
-    REFUTED, "level-shift", "Leave the shift out with `--without`, or record what changed as a further input."
-)
+@finding(REFUTED, "level-shift", "Leave it out with `--without`, or record what changed as a further input.")
 def shifted_levels(kind: FindingKind, estimate: Estimate, data: Samples, time_unit: str) -> list[Finding]:
-    """An output shifts without an input. It rises or falls at one time and stays there.
-
-    A load or the gain may have changed. The model attributes the shift to the inputs.
-    """
+    """An output shifts without an input. A load or the gain may have changed."""
     if not estimate.tests.shifted or data.recorded is None:
         return []
     every = np.arange(len(data.y))

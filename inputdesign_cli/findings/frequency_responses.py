@@ -34,11 +34,7 @@ BIASED = doubt(
 
 @finding(NOTE, "response-without-model", "Compare it with the model in `frequency_response.png`.")
 def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
-    """The frequency response was measured without a model. A right one is in 95 % discs about it.
-
-    `frequency_response.csv` holds G from the data. A correct model lies outside of the discs at about 5 % of
-    the frequencies.
-    """
+    """The frequency response was measured without a model. A right model is outside of 5 % of the discs."""
     entries = "" if of.entries == 1 else f", counted over {of.entries} entries of G"
     outside, by = of.model_outside or 0.0, ", by the reference" if of.excitation == "r" else ""
     fact = f"the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies{entries}{by}"
@@ -52,10 +48,7 @@ def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
     "Check whether the data come from a loop, the plant is linear, and all inputs are recorded.",
 )
 def contradicted(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
-    """The data contradict G of the model. At many frequencies G lies far outside the 95 % discs.
-
-    It is off by more than a fifth of |G|.
-    """
+    """The data contradict G of the model. At many frequencies it lies far outside the 95 % discs."""
     far, here = of.model_far_outside or 0.0, "frequency_response.csv"
     fact = f"it is outside of the 95 % discs, by a fifth of |G|, at {100 * far:.0f} % of the frequencies"
     return kind.when(not of.caveat and far >= _MOST_FAR, fact, where=here, model_far_outside=far)
@@ -65,9 +58,7 @@ def contradicted(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
 def unexcited_lines(
     kind: FindingKind, units: Units, frequencies: Array, excited: NDArray[np.bool_]
 ) -> list[Finding]:
-    """The inputs do not excite some lines of the spec. Their power there is only rounding or noise.
-
-    The response is not measured there.
+    """The inputs do not excite some lines of the spec. The response is not measured there.
 
     Args:
         frequencies: (L,), in rad/sample.
@@ -106,13 +97,9 @@ def periods_between_gaps(kind: FindingKind, pieces: int, taken: int, period: int
     return kind.found(fact, pieces=pieces, periods=taken, period=period)
 
 
-@finding(
-    DOUBT, "start-shifts-response", "Raise `accuracy.frequency_response.transient`, or take a longer period."
-)
+@finding(DOUBT, "start-shifts-response", "Raise `accuracy.frequency_response.transient`, or the period.")
 def start_shifts(kind: FindingKind, shift: float) -> list[Finding]:
-    """The start of the record biases the response. The plant begins at rest.
-
-    Its transient is still present in the periods that count.
+    """The start of the record biases the response. Periods that count still contain the transient.
 
     Args:
         shift: in standard deviations.
@@ -123,9 +110,7 @@ def start_shifts(kind: FindingKind, shift: float) -> list[Finding]:
 
 @finding(DOUBT, "noise-leaks", "Allow a little more power, or take a few more periods.")
 def noise_leaks(kind: FindingKind, ratio: float) -> list[Finding]:
-    """Leakage of noise exceeds the required accuracy. Noise of neighbouring frequencies leaks into lines.
-
-    The record is finite, and the limits forbid the power that would compensate for it.
+    """Leakage of noise exceeds the required accuracy. The limits forbid the power that compensates it.
 
     Args:
         ratio: of the deviation of a record to the admissible one.

@@ -83,11 +83,7 @@ def mattering(found: Sequence[Neglected]) -> list[Neglected]:
     return [found[i] for i in that_matter([one.directed for one in found], [one.moves for one in found])]
 
 
-@finding(
-    DOUBT,
-    "neglected-parameter",
-    "Estimate the parameter too, or excite the frequencies where G would change.",
-)
+@finding(DOUBT, "neglected-parameter", "Estimate it too, or excite the frequencies where G would change.")
 def objections(kind: FindingKind, units: Units, found: Sequence[Neglected], *, met: bool) -> list[Finding]:
     """A neglected parameter may change G too much. No test refutes the model, but the parameter is likely.
 

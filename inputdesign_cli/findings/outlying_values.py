@@ -206,12 +206,7 @@ def _absurd(x: Array) -> int | None:
     scaled = x[there] / max(float(np.abs(x[there]).max()), np.finfo(float).tiny)
     middle = float(np.median(scaled))
     off = np.abs(scaled - middle)
-    sizes = np.sort(off[off > 0.0])
-    jumps = np.flatnonzero(sizes[1:] > _ABSURD * sizes[:-1])
-    if not jumps.size:
-        return None
-    least = sizes[jumps[-1] + 1]
-    far = there[off >= least]
-    # Beside a level, or as often as the other level of a signal, it is no fault.
-    seldom = far.size <= _OFTEN * there.size and least > _ABSURD * max(abs(middle), spread_of(scaled))
-    return int(far[0]) if seldom else None
+    usual = max(float(np.median(off[off > 0.0])), abs(middle)) if np.any(off > 0.0) else np.inf
+    far = there[off > _ABSURD * usual]
+    # As often as the other level of a signal, it is no fault.
+    return int(far[0]) if 0 < far.size <= _OFTEN * there.size else None

@@ -150,8 +150,6 @@ def spiked_periods(
 ) -> list[Finding]:
     """A few samples dominate the differences between periods. No verdict is possible.
 
-    They hold most of the squared deviations from the median of the periods.
-
     Args:
         places: where the samples of each of them stand, in words.
         samples: of the record.
@@ -169,18 +167,11 @@ def spiked_periods(
     return spiked
 
 
-@finding(
-    UNDECIDED,
-    "drifting-periods",
-    "Add `--detrend linear`, or subtract the slow trend from the column first.",
-    "drift",
-)
+@finding(UNDECIDED, "drifting-periods", "Subtract the trend first, as by `--detrend linear`.", "drift")
 def drifting_periods(
     kind: FindingKind, units: Units, drift: PeriodDrift, moved: Array, w: Array, *, lined: bool
 ) -> list[Finding]:
-    """Outputs drift from period to period. The means of the periods follow a polynomial in time.
-
-    Drift leaks into every line and changes the response or its scatter.
+    """Outputs drift from period to period. Drift leaks into every line and changes the response.
 
     Args:
         moved: (L,), the change over what is admitted, at frequencies w in the unit of the user.
@@ -212,9 +203,7 @@ def drifting_periods(
 def within_chance(
     kind: FindingKind, units: Units, ratio: float, limits: tuple[float, float], frequency: float, enough: str
 ) -> Finding:
-    """The scatter of the periods leaves the verdict open. The true deviation lies between two limits.
-
-    The admissible error is between them (95 % for all lines together).
+    """The scatter of the periods leaves the verdict open. The admissible error is within 95 % limits.
 
     Args:
         ratio: the largest one of a deviation to the admissible one; `limits`: of the true one.

@@ -86,9 +86,7 @@ def other_minima(
     unstated: Sequence[OnModelError],
     information: Array,
 ) -> list[Finding]:
-    """Other parameters explain the data nearly as well. The likelihood has another minimum.
-
-    It is nearly as deep, and its G differs by more than the error bound or the admissible error.
+    """Other parameters explain the data nearly as well. Another minimum of the likelihood has another G.
 
     Args:
         errors: what is asked of the model error.
@@ -112,10 +110,7 @@ def other_minima(
 
 @finding(NOTE, "minimum-ruled-out", "Check whether `uncertainty` is right.")
 def ruled_out(kind: FindingKind, estimate: Estimate, found: Sequence[Rival]) -> list[Finding]:
-    """The uncertainty excludes another minimum. Its parameters explain the data nearly as well.
-
-    They lie far outside the region of `uncertainty` for the plant.
-    """
+    """The uncertainty excludes another minimum. Its parameters explain the data nearly as well."""
     if not found:
         return []
     first = min(found, key=lambda one: one.excess)
@@ -123,16 +118,11 @@ def ruled_out(kind: FindingKind, estimate: Estimate, found: Sequence[Rival]) -> 
     return [kind.found(fact, where="uncertainty", excess=first.excess, minima=len(found))]
 
 
-@finding(
-    DOUBT, "other-minimum-foreseen", "Excite more frequencies, or fix a known dead time with `plant.known`."
-)
+@finding(DOUBT, "other-minimum-foreseen", "Excite more frequencies, or fix the dead time with `plant.known`.")
 def foreseen_rivals(
     kind: FindingKind, units: Units, estimate: Estimate, found: Sequence[Apart], remedy: str
 ) -> list[Finding]:
-    """Other parameters would explain a record of the design nearly as well. Its likelihood has other minima.
-
-    The record was simulated. Estimates may end at another G, and `assess` would then be undecided.
-    """
+    """Other parameters would explain a record of the design nearly as well. Estimates may end there."""
     if not found:
         return []
     nearest = min(found, key=lambda one: one.rival.excess)

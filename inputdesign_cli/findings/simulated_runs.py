@@ -47,10 +47,7 @@ def runs_miss_confidence(designed: Coverage | None, tried: TriedInput) -> list[F
 
 @finding(NOTE, "other-length", "Nothing. The runs are compared with predictions for the simulated length.")
 def other_length(kind: FindingKind, counted: int, simulated: int) -> list[Finding]:
-    """The simulated records and the design differ in length. The design counts the samples of a spectrum.
-
-    Records have whole periods, or are longer because of limits.
-    """
+    """The simulated records and the design differ in length. Records may consist of whole periods."""
     fact = (
         f"the design counts {counted} sample{'s' * (counted != 1)}, the records have {simulated}. Runs and "
         f"ellipses.png are for {simulated}, bound.csv for {counted}"
@@ -59,14 +56,9 @@ def other_length(kind: FindingKind, counted: int, simulated: int) -> list[Findin
     return kind.when(differ, fact, where="simulation", counted=counted, simulated=simulated)
 
 
-@finding(
-    DOUBT, "initial-estimate-off", "Design again at a better estimate, or for several plants (`uncertainty`)."
-)
+@finding(DOUBT, "initial-estimate-off", "Design at a better estimate, or for several plants (`uncertainty`).")
 def initial_estimate_off(kind: FindingKind, units: Units, inputs: Mapping[str, TriedInput]) -> list[Finding]:
-    """The true system is not the design model. Fewer runs stay within r_adm than at the design model.
-
-    Only the first input with fewer runs is named.
-    """
+    """The true system is not the design model. Fewer runs stay within r_adm than at the design model."""
     for name, entry in inputs.items():
         modelled = None if entry.on_design_model is None else entry.on_design_model.within_r_adm
         found, theory, violations = entry.within_r_adm, entry.theory_on_truth, entry.violations
@@ -84,10 +76,7 @@ def initial_estimate_off(kind: FindingKind, units: Units, inputs: Mapping[str, T
 
 @finding(NOTE, "runs-see-one-minimum", "Excite more frequencies, or fix known parameters (`plant.known`).")
 def one_minimum(kind: FindingKind, searched: Searched | None) -> list[Finding]:
-    """The runs examine one minimum only. Runs of `simulate` start at the nominal parameters.
-
-    The likelihood has other minima, where the search of `identify` may end.
-    """
+    """The runs examine one minimum only. The search of `identify` may end at another one."""
     if searched is None:
         return []
     runs, elsewhere, rivals = searched.runs, searched.elsewhere, searched.rivals
@@ -100,10 +89,7 @@ def one_minimum(kind: FindingKind, searched: Searched | None) -> list[Finding]:
 
 @finding(DOUBT, "unstable-runs", "Take more samples or more power, or ask for a slower loop.")
 def unstable_runs(kind: FindingKind, unstable: Mapping[str, int], runs: int) -> list[Finding]:
-    """Controllers of some simulated runs destabilise the loop. Means exclude runs with an unstable true loop.
-
-    Each run designs a controller from its estimate. The loss of an unstable loop is infinite.
-    """
+    """Controllers of some simulated runs destabilise the loop. Means exclude these runs."""
     return [
         kind.found(f"{count} of {runs} with the input {name}", where=name, unstable=count, runs=runs)
         for name, count in unstable.items()

@@ -48,10 +48,7 @@ def _about_levels(kind: FindingKind, point: Sequence[float]) -> list[Finding]:
     "Write `signal.offset` with these levels and assess again, or add them to `signal.csv`.",
 )
 def _about_zero(kind: FindingKind, unknown: Mapping[int, float], offsets: Sequence[float]) -> list[Finding]:
-    """The data vary about a level, the record about zero. The inputs have a mean far from zero.
-
-    The spec has no `signal.offset` for the top-up.
-    """
+    """The data vary about a level, the record about zero. The spec has no `signal.offset`."""
     at = " and ".join(f"u{j + 1} = {level:g}" for j, level in unknown.items())
     offset = f"{offsets[0]:g}" if len(offsets) == 1 else f"[{', '.join(f'{x:g}' for x in offsets)}]"
     remedy = f"Write signal.offset: {offset} and assess again, or add that to signal.csv."

@@ -93,14 +93,9 @@ def no_record_in_time(kind: FindingKind, candidates: int) -> Finding:
     return kind.found(f"{what_ended()} came before one was found", where="signal", candidates=candidates)
 
 
-@finding(
-    DOUBT, "accuracy-on-grid", "Use `solver.method: exchange`, which keeps the accuracy at every frequency."
-)
+@finding(DOUBT, "accuracy-on-grid", "Use `solver.method: exchange`, which keeps it at every frequency.")
 def on_grid(kind: FindingKind, lines: int, ratio: float) -> Finding:
-    """The accuracy holds only on a grid of frequencies. `solver.method: lmi` is the program of the papers.
-
-    Between the grid points the accuracy may be missed.
-    """
+    """The accuracy holds only on a grid of frequencies. Between them it may be missed."""
     fact = f"on the grid of {lines} frequencies; over the whole band r_u / r_adm is at most {ratio:.6g}"
     return kind.found(fact, where="solver.method", grid=lines, worst_ratio=ratio)
 
@@ -112,16 +107,9 @@ def fewer_plants(kind: FindingKind, tried: int, asked: int) -> list[Finding]:
     return kind.when(tried < asked, fact, where="uncertainty.fresh", tried=tried, asked=asked)
 
 
-@finding(
-    DOUBT,
-    "draws-unstable",
-    "Restrict `uncertainty` to plants that can be in operation, or check the controller.",
-)
+@finding(DOUBT, "draws-unstable", "Restrict `uncertainty` to possible plants, or check the controller.")
 def unstable_draws(kind: FindingKind, rejected: int, drawn: int) -> list[Finding]:
-    """Most draws are unstable plants. They could not be in operation, and are drawn again.
-
-    Every statement concerns stable plants only.
-    """
+    """Most draws are unstable plants. They are drawn again; statements concern stable plants only."""
     fact = f"{rejected} of {drawn}"
     return kind.when(2 * rejected > drawn, fact, where="uncertainty", rejected=rejected, drawn=drawn)
 

@@ -33,16 +33,9 @@ NOISE_PREVAILS = note(
 )
 
 
-@finding(
-    REFUTED,
-    "input-answers-output",
-    "Correct late or swapped columns, or state a loop as `experiment.controller`.",
-)
+@finding(REFUTED, "input-answers-output", "Correct the columns, or state a loop as `experiment.controller`.")
 def answering(kind: FindingKind, units: Units, estimate: Estimate) -> list[Finding]:
-    """An input responds to the outputs. Prediction errors help to predict an input.
-
-    In open loop no input responds to the noise.
-    """
+    """An input responds to the outputs. In open loop no input responds to the noise."""
     found = []
     for test in estimate.tests.answering:
         if test.statistic > _MOSTLY * estimate.errors.size:
@@ -53,9 +46,7 @@ def answering(kind: FindingKind, units: Units, estimate: Estimate) -> list[Findi
     return found
 
 
-@finding(
-    REFUTED, "input-logged-late", "Find out when the plant really gets its input, and log both together."
-)
+@finding(REFUTED, "input-logged-late", "Find when the plant really gets its input, and log both together.")
 def _late(kind: FindingKind, inputs: int, outputs: int, test: ScoreTest) -> Finding:
     """An output moves before the input. The input was logged late, or the columns use different clocks."""
     name, output = signal_name("u", test.source, inputs), signal_name("y", test.output, outputs)
@@ -81,8 +72,6 @@ def idle(
     kind: FindingKind, units: Units, nominal: Model, estimated: Model, estimate: Estimate
 ) -> list[Finding]:
     """An input explains nothing. Its G cannot be distinguished from zero.
-
-    The plant of the spec would respond clearly.
 
     Args:
         nominal, estimated: of one structure.

@@ -1,7 +1,6 @@
 """From samples to models: prediction-error estimates with their covariance, and tests of the residuals."""
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
-from inputdesign_cli.identification.control_law import Shift as Shift, shifted as shifted
 from inputdesign_cli.identification.directed import (
     Directed as Directed,
     Moves as Moves,
@@ -17,9 +16,9 @@ from inputdesign_cli.identification.estimators import (
 )
 from inputdesign_cli.identification.faults import (
     Frozen as Frozen,
-    Spikes as Spikes,
     frozen as frozen,
     resolution_of as resolution_of,
+    shifted as shifted,
     spikes as spikes,
 )
 from inputdesign_cli.identification.frequency_response import (
@@ -32,11 +31,11 @@ from inputdesign_cli.identification.level_shifts import (
     LevelShift as LevelShift,
     chance_of_shifts as chance_of_shifts,
 )
-from inputdesign_cli.identification.residual_tests import (
+from inputdesign_cli.identification.search import Rival as Rival
+from inputdesign_cli.identification.tests import (
     ResidualTest as ResidualTest,
     cross_correlations as cross_correlations,
     whiteness as whiteness,
 )
-from inputdesign_cli.identification.search import Rival as Rival
 from inputdesign_cli.identification.variations import RISING as RISING
 from inputdesign_cli.identification.white import Noise as Noise, noises_of_residuals as noises_of_residuals

@@ -43,20 +43,17 @@ class ScoreTest:
     """One chi-squared test.
 
     Attributes:
-        name: of the test.
-        fault: what is wrong if it fails.
         probability: of a statistic as large, with `freedom` degrees of freedom, if the model is right; see
             `White.probability`.
-        lag: of past inputs or residuals, where they explain most; of trends None.
         output: of which residuals are explained most; `source`, by which input or other residual.
     """
 
-    name: str
-    fault: Fault
+    name: str  # of the test
+    fault: Fault  # what is wrong if it fails
     statistic: float
     freedom: int
     probability: float
-    lag: int | None
+    lag: int | None  # of past inputs or residuals, where they explain most; of trends None
     output: int = 0
     source: int = 0
 
@@ -96,12 +93,11 @@ class Score(NamedTuple):
 
     Attributes:
         statistic: chi-squared where the model is right, along orthonormal `directions` ((N + M) p, freedom).
-        sizes: (m,), of each regressor alone, in standard deviations up to a common factor.
     """
 
     statistic: float
     directions: Array
-    sizes: Array
+    sizes: Array  # (m,), of each regressor alone, in standard deviations up to a common factor
 
 
 def score(white: White, columns: Array, means: Array) -> Score:

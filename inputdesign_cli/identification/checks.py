@@ -71,43 +71,33 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
             )
 
 
-def check_noisy(variances: Array, y: Array) -> None:
-    """Residuals of these `variances` (p,) are more than the rounding of y (samples, p).
+def check_noisy(covariance: Array, y: Array) -> None:
+    """Check residuals of this `covariance` (p, p): of y (n, p) they are more than rounding, and independent.
 
     Raises:
         SpecError: `noise-free-data`.
     """
     for index, power in enumerate(np.mean(y**2, axis=0)):
-        if variances[index] > _EXACT * power:
-            continue
-        name = signal_name("y", index, y.shape[1])
-        which = "the output" if y.shape[1] == 1 else name
-        raise bad_spec(
-            "noise-free-data",
-            f"the model explains {which} to the last digit: there is no noise to estimate a variance from",
-            hint=f"is {name} computed from u? Real data have noise",
-            key=name,
-        )
-
-
-def check_apart(covariance: Array) -> None:
-    """Check that no output's residuals follow from the others: `covariance` (p, p) can be inverted.
-
-    Raises:
-        SpecError: `noise-free-data`.
-    """
+        if covariance[index, index] <= _EXACT * power:
+            name = signal_name("y", index, y.shape[1])
+            which = "the output" if y.shape[1] == 1 else name
+            raise bad_spec(
+                "noise-free-data",
+                f"the model explains {which} to the last digit: there is no noise to estimate its variance",
+                hint=f"is {name} computed from u? Real data have noise",
+                key=name,
+            )
     rms = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(rms, rms))
-    if values[0] > _COMBINED:
-        return
-    share = np.abs(vectors[:, 0])
-    names = " and ".join(f"y{i + 1}" for i in np.flatnonzero(share > 0.05 * share.max()))
-    raise bad_spec(
-        "noise-free-data",
-        f"the residuals of {names} determine each other: these outputs carry the same noise",
-        hint="is one of the outputs computed from the others? Leave it out",
-        key="y",
-    )
+    if values[0] <= _COMBINED:
+        share = np.abs(vectors[:, 0])
+        names = " and ".join(f"y{i + 1}" for i in np.flatnonzero(share > 0.05 * share.max()))
+        raise bad_spec(
+            "noise-free-data",
+            f"the residuals of {names} determine each other: these outputs carry the same noise",
+            hint="is one of the outputs computed from the others? Leave it out",
+            key="y",
+        )
 
 
 def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array) -> Array:

@@ -138,11 +138,6 @@ class ColouredKind(Kind):
             found.append(one._replace(model=larger, kind=ColouredKind(larger, one.kind)))
         return tuple(found)
 
-    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
-        """Return what inputs and the start cause in the plant, by errors before they were filtered."""
-        shaped = self.model.at(theta).shaped
-        return self.plant.caused(theta[: self._first], u, y, shaped(errors), shaped(begun))
-
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs of the plant can be simulated."""
         return self.plant.simulates(theta[: self._first])

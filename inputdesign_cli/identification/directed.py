@@ -45,11 +45,8 @@ class Alternative:
 
     Attributes:
         name: of the parameter; `phrase`, what it is, for a sentence.
-        fault: what is wrong if it is missing.
-        column: (N, p), minus the derivative of the prediction errors with respect to it.
         slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
             each state that a plant may be in.
-        lag: whether it is a pole or a dead time of the plant.
         echo: (lags, p, p), how `column` responds to past errors; None if it does not.
         estimated: returns the larger model from the same data, and the statistic of its likelihood ratio;
             None if no larger model is estimated.
@@ -57,10 +54,10 @@ class Alternative:
 
     name: str
     phrase: str
-    fault: Fault
-    column: NDArray[np.float64]
+    fault: Fault  # what is wrong if it is missing
+    column: NDArray[np.float64]  # (N, p), minus the derivative of the prediction errors with respect to it
     slopes: Callable[[Model, ArrayLike], ComplexArray]
-    lag: bool = False
+    lag: bool = False  # whether it is a pole or a dead time of the plant
     echo: NDArray[np.float64] | None = None
     estimated: Callable[[], tuple[Model, float]] | None = None
 
@@ -70,19 +67,16 @@ class Directed:
     """One parameter more than the model has.
 
     Attributes:
-        test: whether these data ask for it.
         alternatives: the parameters that act alike on these data where they are small, the likeliest first.
         size: the first of them, to first order; `deviation`, its standard deviation.
-        following: (k,), how the parameters of the model change with it, to first order.
-        larger: the estimate of the larger model, where it was looked for.
     """
 
-    test: ScoreTest
+    test: ScoreTest  # whether these data ask for it
     alternatives: tuple[Alternative, ...]
     size: float
     deviation: float
-    following: Array
-    larger: Model | None = None
+    following: Array  # (k,), how the parameters of the model change with it, to first order
+    larger: Model | None = None  # the estimate of the larger model, where it was looked for
 
     @property
     def of_structure(self) -> bool:
@@ -205,17 +199,11 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
 
 @dataclass(frozen=True)
 class Moves:
-    """What a parameter more does to G at n frequencies, in units of the admissible error.
+    """What a parameter more does to G at n frequencies, in units of the admissible error."""
 
-    Attributes:
-        estimated: (n,), how far G moves if the parameter is estimated along.
-        deviation: (n,), the standard deviation of that.
-        known: (n,), the largest standard deviation of G of the model itself.
-    """
-
-    estimated: Array
-    deviation: Array
-    known: Array
+    estimated: Array  # (n,), how far G moves if the parameter is estimated along
+    deviation: Array  # (n,), the standard deviation of that
+    known: Array  # (n,), the largest standard deviation of G of the model itself
 
     @property
     def largest(self) -> float:

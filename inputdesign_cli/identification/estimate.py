@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data
+from inputdesign_cli.identification.checks import check_noisy, factor_of_data
 from inputdesign_cli.identification.directed import alternative
-from inputdesign_cli.identification.records import Point, Records, inverses, shares, split
+from inputdesign_cli.identification.records import Point, Records, inverses, shares
 from inputdesign_cli.identification.search import Rival, Search
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.variations import variations
@@ -35,17 +35,11 @@ class Ended(NamedTuple):
 
 
 class Begun(NamedTuple):
-    """How the records begin.
+    """How the records begin."""
 
-    Attributes:
-        free: whether unknown starts and levels were estimated along with theta.
-        rest_refuted: whether the records say that they do not begin at rest about zero.
-        first: (records, p), the first residuals if each record began at rest about zero.
-    """
-
-    free: bool
-    rest_refuted: bool
-    first: Array
+    free: bool  # whether unknown starts and levels were estimated along with theta
+    rest_refuted: bool  # whether the records say that they do not begin at rest about zero
+    first: Array  # (records, p), the first residuals if each record began at rest about zero
 
 
 class Simulation(NamedTuple):
@@ -61,15 +55,10 @@ class Simulation(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """How an earlier estimate, which is combined with the data, goes with them.
+    """How an earlier estimate, which is combined with the data, goes with them."""
 
-    Attributes:
-        differing: the probability that two estimates of one system differ as much.
-        alike: the probability that one from other data agrees as closely.
-    """
-
-    differing: float
-    alike: float
+    differing: float  # the probability that two estimates of one system differ as much
+    alike: float  # the probability that one from other data agrees as closely
 
 
 @dataclass(frozen=True)
@@ -79,22 +68,18 @@ class Estimate:
     Attributes:
         names, theta: (k,).
         factor: L (k, k), lower triangular; L L^T is the `information`, its inverse the `covariance` of theta.
-        noise: (p, p) covariance of e; of white noise on the samples where the model knows no other.
-        errors: (samples, p) prediction errors at theta.
-        lengths: the samples of each of the records, which follow each other.
-        prior: None without an earlier estimate.
     """
 
     names: tuple[str, ...]
     theta: Array
     factor: Array
-    noise: Array
-    errors: Array
-    lengths: tuple[int, ...]
+    noise: Array  # (p, p) covariance of e; of white noise on the samples where the model knows no other
+    errors: Array  # (samples, p) prediction errors at theta
+    lengths: tuple[int, ...]  # the samples of each of the records, which follow each other
     search: Ended
     start: Begun
     simulation: Simulation
-    prior: Agreement | None
+    prior: Agreement | None  # None without an earlier estimate
     tests: Tests
 
     def with_rivals(self, rivals: tuple[Rival, ...]) -> Estimate:
@@ -118,15 +103,13 @@ class BatchEstimate:
     """Prediction-error estimates of many records.
 
     Attributes:
-        theta: (runs, k).
-        noise: (runs, p, p) covariance of e, unbiased to first order.
         information: (runs, k, k) sum over the samples of psi noise^-1 psi^T; its inverse is the covariance of
             theta.
         converged, steps: (runs,) of the search.
     """
 
-    theta: Array
-    noise: NDArray[np.float64]
+    theta: Array  # (runs, k)
+    noise: NDArray[np.float64]  # (runs, p, p) covariance of e, unbiased to first order
     information: NDArray[np.float64]
     converged: NDArray[np.bool_]
     steps: NDArray[np.int64]
@@ -146,8 +129,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
     """
     records, point, kind, theta = found.records, found.point, found.records.kind, found.point.theta
     noise = noise_of(records, point)
-    check_noisy(np.diag(noise), records.y)
-    check_apart(noise)
+    check_noisy(noise, records.y)
     factor, earlier = factor_at(records, point, noise), records.earlier
     simulation = _simulation(records, point, y)
     known = None if kind.continuous or None in simulation.fit else simulation.outputs
@@ -174,9 +156,13 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
 def _simulation(records: Records, point: Point, y: Array) -> Simulation:
     """Return the simulation of the inputs, and the part that unknown starts explain."""
     kind, lengths = records.kind, records.lengths
-    parts = zip(records.parts, split(point.errors, point.near.begun, lengths), strict=True)
-    caused = [kind.caused(point.theta, *signals, *errors) for signals, errors in parts]
-    outputs = np.concatenate(caused) + y - records.y
+    model, every = kind.model.at(point.theta), records.from_rest(point.theta)[0] - point.near.begun
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        noise = [
+            model.simulate(0.0 * u, e, 1.0)[1]
+            for (u, _), e in zip(records.parts, np.split(every, np.cumsum(lengths)[:-1]), strict=True)
+        ]
+    outputs = y - np.concatenate(noise)
     varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, np.cumsum(lengths)[:-1])])
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
         left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)

@@ -1,16 +1,19 @@
-"""Faults of measurement: spikes, and sensors that stand still.
+"""Faults of measurement: spikes, sensors that stand still, signals that are logged at another time.
 
 An innovation of standard deviation s falls into a cell of width d with a probability of at most d f / s.
 Here f is the largest density of usual noise. If that is small, a row of equal samples is beyond chance. If
 rounding hides the noise, the model decides: it moves by more than a cell and its own errors while the sensor
 does not.
+
+An input that is logged a sample late biases estimates in closed loop. No residual shows it: the model takes
+the shift for a delay. The controller shows it if the reference was logged too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +22,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.levels import level
+from inputdesign_cli.plant import TransferMatrix
 
 # The median of the absolute value of a normal variable, in standard deviations.
 _NORMAL = 0.6745
@@ -37,10 +41,12 @@ _ROUNDING = 6.0 / 12.0
 _MOVES = 0.1
 # The errors of a simulation rarely span this number of their robust standard deviations.
 _SPAN = 8.0
+# Lags of signals that are tried, one of which is right if its error of the law of control is below these
+# shares of the error as logged, and of the input itself.
+_LAGS, _BETTER, _GOOD = (-2, -1, 1, 2), 0.1, 0.3
 
 
-@dataclass(frozen=True)
-class Spikes:
+class Spikes(NamedTuple):
     """Samples whose errors in one output hold the `share` of the sum of squares there."""
 
     output: int
@@ -48,13 +54,26 @@ class Spikes:
     share: float
 
 
-@dataclass(frozen=True)
-class Frozen:
+class Frozen(NamedTuple):
     """Output `output` stands still for `length` samples from `first` on."""
 
     output: int
     first: int
     length: int
+
+
+class Shift(NamedTuple):
+    """Signals `letter` of input `channel` obey the controller `lag` samples later (earlier, if negative).
+
+    `left` is the rms error of the control law as logged, `then` the one after the shift. Both are relative to
+    the rms of the input.
+    """
+
+    letter: str
+    channel: int
+    lag: int
+    left: float
+    then: float
 
 
 def spikes(errors: Array) -> list[Spikes]:
@@ -86,7 +105,7 @@ def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spike
     errors = levelled - np.median(levelled, axis=1, keepdims=True)
     at = periods.parts(np.arange(float(len(y)))[:, None], repeats).ravel().astype(np.int64)
     found = spikes(errors.reshape(-1, y.shape[1]))
-    return [replace(one, samples=tuple(sorted(at[list(one.samples)].tolist()))) for one in found]
+    return [one._replace(samples=tuple(sorted(at[list(one.samples)].tolist()))) for one in found]
 
 
 def frozen(
@@ -115,9 +134,11 @@ def frozen(
         stays = _likely(errors[:, [output]], d)
         size = _spread(apart[:, output])
         for start, end in pairwise(ends.tolist()):
-            for first, length in _runs(held[start:end, output]):
+            edges = np.flatnonzero(np.diff(held[start + 1 : end, output], prepend=False, append=False))
+            for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+                length = last - first + 1
                 run = slice(start + first, start + first + length)
-                if not np.any(np.ptp(u[run][:-1], axis=0) > moves):
+                if length < _SHORTEST or not np.any(np.ptp(u[run][:-1], axis=0) > moves):
                     continue
                 by_chance = len(u) * stays ** (length - 1)
                 if by_chance < level("frozen") or np.ptp(simulated[run, output]) > d + _SPAN * size:
@@ -149,8 +170,41 @@ def _spread(x: NDArray[np.float64]) -> float:
     return float(np.median(np.abs(x - np.median(x)))) / _NORMAL
 
 
-def _runs(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First samples and lengths of runs of equal samples that say something."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], held[1:], [False]]).astype(int)))
-    found = zip(edges[::2].tolist(), (edges[1::2] - edges[::2] + 1).tolist(), strict=True)
-    return [(first, length) for first, length in found if length >= _SHORTEST]
+def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: Sequence[int]) -> list[Shift]:
+    """By input, the shift of u (n, m), y (n, p) or r (n, m) by which they obey u = r - C y, if one is better.
+
+    Args:
+        lengths: of the stretches without gaps; levels are taken away from each.
+    """
+    ends = np.cumsum(lengths)[:-1]
+    parts = list(zip(*(np.split(x, ends) for x in (u, y, r)), strict=True))
+    found = []
+    for i in range(u.shape[1]):
+        left = _left(controller, i, parts, "", 0)
+        tried = [(letter, lag) for letter in "uyr" for lag in _LAGS]
+        each = [Shift(one[0], i, one[1], left, _left(controller, i, parts, *one)) for one in tried]
+        best = min(each, key=lambda one: one.then)
+        if best.then < min(_BETTER * left, _GOOD):
+            found.append(best)
+    return found
+
+
+def _left(
+    controller: TransferMatrix, i: int, parts: Sequence[tuple[Array, ...]], letter: str, lag: int
+) -> float:
+    """Return the rms of q u - q r + P y of an input over that of q u, the signals of a letter moved."""
+    most = max(map(abs, _LAGS))
+    P, q = controller.numerator[i], controller.denominator[i]
+    memory = max(P.shape[1], len(q)) - 1
+    squares = np.zeros(2)
+    for part in parts:
+        kept = len(part[0]) - 2 * most
+        if kept < memory + _FEWEST:
+            continue
+        u, y, r = (x[most + lag * (name == letter) :][:kept].T for name, x in zip("uyr", part, strict=True))
+        driven, asked, *fed = (
+            np.convolve(x, p)[memory:kept] for x, p in ((u[i], q), (r[i], q), *zip(y, P, strict=True))
+        )
+        law = driven - asked + sum(fed)
+        squares += [np.sum((x - x.mean()) ** 2) for x in (law, driven)]
+    return float(np.sqrt(squares[0] / squares[1])) if squares[1] > 0.0 else 0.0

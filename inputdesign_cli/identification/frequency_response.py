@@ -54,20 +54,16 @@ class FrequencyResponse:
     """An estimate of G at n frequencies.
 
     Attributes:
-        frequency: (n,), rad/sample.
-        G: (n, p, r).
         radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
         noise: (n, p): the spectrum of the unexplained part of y; for white noise it is the variance.
-        coherence: (n, p): the share of the spectrum of y that the inputs explain.
-        method: how it was estimated.
     """
 
-    frequency: Array
-    G: ComplexArray
+    frequency: Array  # (n,), rad/sample
+    G: ComplexArray  # (n, p, r)
     radius: NDArray[np.float64]
     noise: NDArray[np.float64]
-    coherence: NDArray[np.float64]
-    method: Method
+    coherence: NDArray[np.float64]  # (n, p): the share of the spectrum of y that the inputs explain
+    method: Method  # how it was estimated
 
 
 def frequency_response(

@@ -7,8 +7,7 @@ that of [levenberg-1944].
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +52,7 @@ class Problem(Protocol):
         """Return the same problem with some of its runs only."""
 
 
-@dataclass(frozen=True)
-class Minimum:
+class Minimum(NamedTuple):
     """Where the search ended: theta (runs, k), cost (runs,), the Hessian of `Problem.at` there."""
 
     theta: Array
@@ -65,8 +63,7 @@ class Minimum:
 
     def and_of(self, other: Minimum, runs: NDArray[np.bool_] | slice = slice(None)) -> Minimum:
         """Return these runs, then some `runs` of another."""
-        fields = zip(astuple(self), astuple(other), strict=True)
-        return Minimum(*(np.concatenate([mine, its[runs]]) for mine, its in fields))
+        return Minimum(*(np.concatenate([mine, its[runs]]) for mine, its in zip(self, other, strict=True)))
 
 
 def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: float = 0.0) -> Minimum:

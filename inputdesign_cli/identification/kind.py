@@ -41,16 +41,14 @@ class Extension(NamedTuple):
     Attributes:
         model: the larger model, whose new parameter is zero. If the model has other parameters than its
             coefficients, this is the model of the coefficients.
-        kind: of the larger model; in place of `model`, it may be behind a hold.
         name: of the new parameter; `what` it is.
-        nested: whether that structure has no further freedom than the one parameter.
     """
 
     model: Listed
-    kind: Kind
+    kind: Kind  # of the larger model; in place of `model`, it may be behind a hold
     name: str
     what: str
-    nested: bool = True
+    nested: bool = True  # whether that structure has no further freedom than the one parameter
 
 
 @dataclass(frozen=True)
@@ -175,11 +173,6 @@ class Kind(ABC):
             early, late = (np.abs(part) for part in np.array_split(found, 2, axis=1))
             fades = np.max(late, axis=(1, 2, 3), initial=0.0) < np.max(early, axis=(1, 2, 3))
         return np.where(fades[:, None, None, None], found, 0.0)
-
-    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
-        """Return the response (N, p) to inputs, and to errors that the start explains: `begun`."""
-        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-            return np.asarray(sum(self.model.at(theta).simulate(u, begun, 1.0)))
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs are stable, so that they can be simulated."""

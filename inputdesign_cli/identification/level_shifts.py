@@ -8,7 +8,7 @@ event. The estimate takes the shift for another gain and slower dynamics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -41,26 +41,20 @@ class LevelShift:
     """The likeliest shift of an output.
 
     Attributes:
-        output: from zero.
-        sample: likely the first of it, counted through all records.
-        lag: the time constant by which it is smooth, in samples; zero of a step.
         begins, ends: between these samples it likely begins and has settled, the last left out.
-        rises: whether the output is larger after it.
         test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-        score: the statistic of the score, which is smaller; it is the largest of `looks` statistics.
-        alone: whether it explains more than a line through its record, or single samples next to it.
     """
 
-    output: int
-    sample: int
-    lag: float
+    output: int  # from zero
+    sample: int  # likely the first of it, counted through all records
+    lag: float  # the time constant by which it is smooth, in samples; zero of a step
     begins: int
     ends: int
-    rises: bool
+    rises: bool  # whether the output is larger after it
     test: ScoreTest
-    score: float
+    score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
     looks: int
-    alone: bool
+    alone: bool  # whether it explains more than a line through its record, or single samples next to it
 
     @property
     def refutes(self) -> bool:
@@ -88,11 +82,8 @@ def level_shifts(
 
 def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
     """Return the probability that all these shifts are chance, by the likelihood ratio and by the score."""
-    looks = shifts[0].looks
-    return (
-        _by_chance([shift.test.statistic for shift in shifts], looks),
-        _by_chance([shift.score for shift in shifts], looks),
-    )
+    ratios, looks = [shift.test.statistic for shift in shifts], shifts[0].looks
+    return _by_chance(ratios, looks), _by_chance([shift.score for shift in shifts], looks)
 
 
 def _by_chance(statistics: Sequence[float], looks: int) -> float:
@@ -104,8 +95,9 @@ def _by_chance(statistics: Sequence[float], looks: int) -> float:
 def level_shift(records: Records, point: Point, white: White) -> LevelShift | None:
     """Return the likeliest shift; None in records that are too short for any."""
     found: list[tuple[float, int, int, float, bool, bool]] = []
-    lags = _lags(max(records.lengths))
-    stretches, outputs = list(_stretches(records)), records.y.shape[1]
+    # Zero, then ever longer ones.
+    lags = [0.0, *(x for k in range(12) if (x := _SHORTEST * _GROWTH**k) <= _SHARE * records.longest)]
+    stretches, outputs = _stretches(records), records.y.shape[1]
     through = _responses(records, point.theta, lags, white)
     for (begin, length), output in product(stretches, range(outputs)):
         inner = slice(_FEWEST, length - _FEWEST)
@@ -132,19 +124,10 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     return LevelShift(output, sample, lag, begins, ends, rising, test, score, looks, alone)
 
 
-def _stretches(records: Records) -> Iterator[tuple[int, int]]:
+def _stretches(records: Records) -> list[tuple[int, int]]:
     """Return where each record begins, and its samples; too short ones are passed over."""
-    begin = 0
-    for length in records.lengths:
-        if length > 2 * _FEWEST:
-            yield begin, length
-        begin += length
-
-
-def _lags(samples: int) -> list[float]:
-    """Return the lags to try: zero, then ever longer ones."""
-    every = (_SHORTEST * _GROWTH**k for k in range(12))
-    return [0.0, *(lag for lag in every if lag <= _SHARE * samples)]
+    begins = np.cumsum([0, *records.lengths])[:-1].tolist()
+    return [one for one in zip(begins, records.lengths, strict=True) if one[1] > 2 * _FEWEST]
 
 
 def _smooth(samples: int, lag: float) -> Array:
@@ -154,15 +137,15 @@ def _smooth(samples: int, lag: float) -> Array:
 
 def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> NDArray[np.float64]:
     """(p, n, m): steps behind lags, and a single sample, in errors of each output in the longest record."""
-    at = int(np.argmax(records.lengths))
-    own = slice(begin := sum(records.lengths[:at]), begin + records.lengths[at])
-    length = records.lengths[at]
+    at, length = int(np.argmax(records.lengths)), records.longest
+    begin = sum(records.lengths[:at])
     every = np.zeros((records.samples, len(lags) + 1))
-    every[own] = np.column_stack([*(_smooth(length, lag) for lag in lags), np.eye(1, length)[0]])
+    signals = [*(_smooth(length, lag) for lag in lags), np.eye(1, length)[0]]
+    every[begin : begin + length] = np.column_stack(signals)
     through = records.whitened(theta, every)
     if white.whitening is not None:
         through = white.whitening.through(through.transpose(2, 1, 0)).transpose(2, 1, 0)
-    return through[:, own]
+    return through[:, begin : begin + length]
 
 
 def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:

@@ -36,16 +36,13 @@ class SilentLines:
     """The power of p outputs at `lines` lines without excitation.
 
     Attributes:
-        over_noise: (p,) mean of the power there over that of the noise; about one for noise alone.
-        probability: (p,) that noise alone has as much, by an F test over all lines.
-        rms: (p,) of the part beyond the noise.
         beyond: (lines, p) mean squares of the transforms that are beyond the noise, over neighbouring lines.
     """
 
     lines: int
-    over_noise: Array
-    probability: Array
-    rms: Array
+    over_noise: Array  # (p,) mean of the power there over that of the noise; about one for noise alone
+    probability: Array  # (p,) that noise alone has as much, by an F test over all lines
+    rms: Array  # (p,) of the part beyond the noise
     beyond: NDArray[np.float64]
 
 
@@ -116,17 +113,11 @@ def response_error(
 
 @dataclass(frozen=True)
 class Cubes:
-    """The cube that explains most of the power of each of p outputs at silent lines.
+    """The cube that explains most of the power of each of p outputs at silent lines."""
 
-    Attributes:
-        error: (L, p, r): its change of G at the excited lines.
-        probability: (p,): that noise alone looks as much like one of the cubes.
-        source: (p,): the input (from zero) that is cubed, or -1: the output.
-    """
-
-    error: NDArray[np.float64]
-    probability: Array
-    source: NDArray[np.int_]
+    error: NDArray[np.float64]  # (L, p, r): its change of G at the excited lines
+    probability: Array  # (p,): that noise alone looks as much like one of the cubes
+    source: NDArray[np.int_]  # (p,): the input (from zero) that is cubed, or -1: the output
 
 
 def cubes(

@@ -25,17 +25,11 @@ _MOST_DEGREE, _CERTAIN = 3, 1e-4
 
 @dataclass(frozen=True)
 class Periods:
-    """How a record repeats: equal blocks of whole periods, of which the first few are transient.
+    """How a record repeats: equal blocks of whole periods, of which the first few are transient."""
 
-    Attributes:
-        period: samples.
-        blocks: as many as inputs.
-        skip: periods at the start of each block that do not count.
-    """
-
-    period: int
-    blocks: int = 1
-    skip: int = 0
+    period: int  # samples
+    blocks: int = 1  # as many as inputs
+    skip: int = 0  # periods at the start of each block that do not count
 
     def each(self, samples: int) -> int:
         """Return the number of whole periods per block in a record of `samples` samples."""
@@ -76,17 +70,14 @@ class PeriodicResponse:
 
     Attributes:
         deviation: (L, p, r): standard deviations of the entries, |error|^2 being their variance.
-        noise: (L, p): the spectrum of the noise; for white noise it is the variance.
-        explained: (L, p): mean squares of the part that the inputs explain, per line.
-        freedom: degrees of freedom of each variance, counted as complex numbers.
     """
 
     harmonics: NDArray[np.int_]
     G: ComplexArray
     deviation: NDArray[np.float64]
-    noise: NDArray[np.float64]
-    explained: NDArray[np.float64]
-    freedom: int
+    noise: NDArray[np.float64]  # (L, p): the spectrum of the noise; for white noise it is the variance
+    explained: NDArray[np.float64]  # (L, p): mean squares of the part that the inputs explain, per line
+    freedom: int  # degrees of freedom of each variance, counted as complex numbers
 
 
 def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
@@ -156,14 +147,10 @@ class PeriodDrift:
     A ramp is the same in every period, but for its level, so that their scatter does not show it. It adds to
     all lines, excited or not, as a nonlinearity does. The means of the periods show it: without drift they
     vary by noise alone once the plant has settled.
-
-    Attributes:
-        curve: (N, p), about zero where an output does not drift.
-        degree: (p,), zero where it does not.
     """
 
-    curve: Array
-    degree: NDArray[np.int_]
+    curve: Array  # (N, p), about zero where an output does not drift
+    degree: NDArray[np.int_]  # (p,), zero where it does not
 
 
 def period_drift(

@@ -150,15 +150,13 @@ class FromRest:
     """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`.
 
     Attributes:
-        rows: one an output.
         u, y: (runs, r, N), (runs, p, N).
-        skipped: how many errors at the begin of each do not count.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...]  # one an output
     u: NDArray[np.float64]
     y: NDArray[np.float64]
-    skipped: int = 0
+    skipped: int = 0  # how many errors at the begin of each do not count
 
     @classmethod
     def of(cls, model: PolynomialModel, u: Array, y: Array, skipped: int = 0) -> FromRest:

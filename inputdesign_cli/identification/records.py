@@ -41,23 +41,19 @@ class Linearised:
 
     Attributes:
         all_errors: (N + M, p), what unknown starts explain taken off; `samples`, N.
-        all_psi: (k, N + M, p) = -d errors / d theta, the starts following.
-        begun: (N, p), what levels and states at the start explain.
-        directions: ((N + M) p, m) orthonormal, the errors in white units that unknown starts can explain.
         slope, curvature: (k,), half the gradient of `determinant`, and (k, k), about half its Hessian.
-        unknowns: how many unknowns are levels and states, of which nothing is known.
         determinant: what integrating over the starts adds to -2 log likelihood; `of_noise`, the part that
             belongs to noise before the records.
     """
 
     all_errors: Array
-    all_psi: NDArray[np.float64]
+    all_psi: NDArray[np.float64]  # (k, N + M, p) = -d errors / d theta, the starts following
     samples: int
-    begun: Array
-    directions: Array
+    begun: Array  # (N, p), what levels and states at the start explain
+    directions: Array  # ((N + M) p, m) orthonormal, the errors in white units that unknown starts can explain
     slope: Array
     curvature: Array
-    unknowns: int = 0
+    unknowns: int = 0  # how many unknowns are levels and states, of which nothing is known
     determinant: float = 0.0
     of_noise: float = 0.0
 
@@ -89,22 +85,16 @@ class Records:
     """Records of one structure, one after the other.
 
     Attributes:
-        kind: the structure.
-        parts: u (n, r), y (n, p) of each record.
         free: whether each begins in an unknown state about an unknown level, instead of at rest at zero.
-        late: samples in which unknown inputs before each act, if it is free.
-        weights: W (p, p) of the errors; None to weigh by their own covariance.
-        earlier: what is known besides.
-        ramp: whether outputs of free records may drift along a line besides, of an unknown slope.
     """
 
-    kind: Kind
-    parts: tuple[Part, ...]
+    kind: Kind  # the structure
+    parts: tuple[Part, ...]  # u (n, r), y (n, p) of each record
     free: bool = False
-    late: int = 0
-    weights: Array | None = None
-    earlier: Earlier | None = None
-    ramp: bool = False
+    late: int = 0  # samples in which unknown inputs before each act, if it is free
+    weights: Array | None = None  # W (p, p) of the errors; None to weigh by their own covariance
+    earlier: Earlier | None = None  # what is known besides
+    ramp: bool = False  # whether outputs of free records may drift along a line besides, of an unknown slope
 
     def begun_freely(self, late: int) -> Records:
         """Return the records, each begun in an unknown state after `late` samples of unknown inputs."""

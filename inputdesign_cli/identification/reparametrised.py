@@ -104,22 +104,18 @@ class ReparametrisedKind(Kind):
 
         def is_stable(point: Array) -> bool:
             own = self._at(point)
-            return bool(
-                np.all(np.isfinite(own)) and np.array_equal(self.coefficients.stabilised(own, samples), own)
+            return bool(np.all(np.isfinite(own))) and np.array_equal(
+                self.coefficients.stabilised(own, samples), own
             )
 
         if is_stable(theta):
             return theta.copy()
         point = self.model.theta.copy()
-        for index in range(theta.size):
-            home, share = point[index], 1.0
-            for _ in range(_HALVINGS):
+        for index, home in enumerate(point.tolist()):
+            for share in (*0.5 ** np.arange(_HALVINGS), 0.0):
                 point[index] = home + share * (theta[index] - home)
-                if is_stable(point):
+                if share == 0.0 or is_stable(point):
                     break
-                share *= 0.5
-            else:
-                point[index] = home
         return point
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
@@ -158,10 +154,6 @@ class ReparametrisedKind(Kind):
         """Return the extensions of the coefficients."""
         found = self.coefficients.extensions(self._at(theta), feedback=feedback)
         return tuple(extension._replace(nested=False) for extension in found)
-
-    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
-        """Return what inputs and the start cause at the coefficients."""
-        return self.coefficients.caused(self._at(theta), u, y, errors, begun)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs can be simulated at the coefficients."""

@@ -66,10 +66,7 @@ class Search:
     """Where the search from the best of `starts` points ended.
 
     Attributes:
-        first: (parts, p), the first residuals if each record began at rest about zero, noise as well.
-        rivals: other minima that explain the records nearly as well, far from the best.
         beside: those beyond sampling instants near it, with what they have more in -2 log likelihood.
-        rest_refuted: whether the records say that they do not begin at rest about zero.
     """
 
     records: Records
@@ -77,10 +74,10 @@ class Search:
     converged: bool
     steps: int
     starts: int
-    first: Array
-    rivals: tuple[Rival, ...]
+    first: Array  # (parts, p), the first residuals if each record began at rest about zero, noise as well
+    rivals: tuple[Rival, ...]  # other minima that explain the records nearly as well, far from the best
     beside: tuple[tuple[Point, float], ...]
-    rest_refuted: bool = False
+    rest_refuted: bool = False  # whether the records say that they do not begin at rest about zero
 
 
 def search(records: Records, points: Array, *, starts: int, quick: int | None = None) -> Search:

@@ -36,19 +36,12 @@ _ALIKE = 1e-6
 
 
 class Start(NamedTuple):
-    """Effect of the past on the N prediction errors of one output; each row belongs to one unknown.
+    """Effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
 
-    Attributes:
-        free: (m, N), by the level and states, of which nothing is known.
-        disturbance: (m, N), `free` before the inverse of the noise model.
-        noise: (n, N), by independent unknowns of the variance of e.
-        zeros: -2 log of a density of the zeros of the noise model, see `density`; a scalar.
-    """
-
-    free: NDArray[np.float64]
-    disturbance: NDArray[np.float64]
-    noise: NDArray[np.float64]
-    zeros: NDArray[np.float64]
+    free: NDArray[np.float64]  # (m, N), by the level and states, of which nothing is known
+    disturbance: NDArray[np.float64]  # (m, N), `free` before the inverse of the noise model
+    noise: NDArray[np.float64]  # (n, N), by independent unknowns of the variance of e
+    zeros: NDArray[np.float64]  # -2 log of a density of the zeros of the noise model, see `density`; a scalar
 
     @classmethod
     def white(cls, free: NDArray[np.float64]) -> Start:
@@ -127,13 +120,11 @@ class Elimination(NamedTuple):
 
     Attributes:
         coefficients: output by output of its unknowns in each record, (records, m + n), free ones first.
-        root: R (p, p), R^T R being the weights of the errors up to a factor.
-        directions: ((N + M) p, K) orthonormal, the errors in units of R that the starts can explain.
     """
 
     coefficients: list[Array]
-    root: Array
-    directions: Array
+    root: Array  # R (p, p), R^T R being the weights of the errors up to a factor
+    directions: Array  # ((N + M) p, K) orthonormal, the errors in units of R that the starts can explain
 
 
 class _Basis(NamedTuple):

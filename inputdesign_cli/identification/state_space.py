@@ -41,33 +41,20 @@ class StateSpaceKind(Kind):
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
         model = self.model.at(theta)
-        (A, early, late), m, n = model.held, model.matrices, model.order
+        (_, early, late), m, n, p = model.held, model.matrices, model.order, y.shape[1]
         u0, u1, direct = (shifted(u, lag, (len(u),)) for lag in (model.lag, model.lag + 1, model.direct_lag))
-        at_once = direct @ m.D.T
-        slopes = model.slopes
-        closed = A - m.K @ m.C
-        onward = np.zeros((n * (1 + len(slopes)),) * 2)
-        driven = np.zeros((len(y), len(onward)))
-        read = np.zeros((y.shape[1] * (1 + len(slopes)), len(onward)))
-        found = np.zeros((len(y), len(read)))
-        p = y.shape[1]
-        onward[:n, :n], read[:p, :n], found[:, :p] = closed, m.C, at_once
-        driven[:, :n] = u0 @ early.T + u1 @ late.T + (y - at_once) @ m.K.T
+        at_once, slopes, closed = direct @ m.D.T, model.slopes, self._closed(model)
+        onward = np.kron(np.eye(1 + len(slopes)), closed)
+        read = np.kron(np.eye(1 + len(slopes)), m.C)
+        driven, found = [u0 @ early.T + u1 @ late.T + (y - at_once) @ m.K.T], [at_once]
         for k, d in enumerate(slopes, start=1):
-            own, out = slice(k * n, (k + 1) * n), slice(k * p, (k + 1) * p)
-            onward[own, own], onward[own, :n] = closed, d.A - m.K @ d.C - d.K @ m.C
-            read[out, own], read[out, :n] = m.C, d.C
-            found[:, out] = direct @ d.D.T
-            driven[:, own] = u0 @ d.early.T + u1 @ d.late.T - direct @ d.D.T @ m.K.T
-            driven[:, own] += (y - at_once) @ d.K.T
-        x, step, reading = np.zeros(len(onward)), onward.T, read.T
-        states = np.empty_like(driven)
-        for t in range(len(driven)):
-            states[t] = x
-            x = x @ step + driven[t]
-        found = found + states @ reading
-        psi = found[:, p:].reshape(len(found), len(slopes), p)
-        return y - found[:, :p], np.moveaxis(psi, 1, 0)
+            onward[k * n : (k + 1) * n, :n] = d.A - m.K @ d.C - d.K @ m.C
+            read[k * p : (k + 1) * p, :n] = d.C
+            found.append(direct @ d.D.T)
+            driven.append(u0 @ d.early.T + u1 @ d.late.T - found[k] @ m.K.T + (y - at_once) @ d.K.T)
+        states = _recursion(onward, np.concatenate(driven, axis=1))
+        every = (np.concatenate(found, axis=1) + states @ read.T).reshape(len(y), -1, p)
+        return y - every[:, 0], np.moveaxis(every[:, 1:], 1, 0)
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """What the past adds: levels of the outputs, and the states at the start.
@@ -140,15 +127,10 @@ class StateSpaceKind(Kind):
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """Return signals (N, m) through the inverse of each output's own noise model, (p, N, m)."""
         model = self.model.at(theta)
-        m = model.matrices
-        closed = model.held[0] - m.K @ m.C
-        found = np.empty((model.outputs, *signals.shape))
-        for i in range(model.outputs):
-            x = np.zeros((signals.shape[1], model.order))
-            for t, sample in enumerate(signals):
-                found[i, t] = sample - x @ m.C[i]
-                x = x @ closed.T + np.outer(sample, m.K[:, i])
-        return found
+        C, K, closed = model.matrices.C, model.matrices.K, self._closed(model)
+        driven = signals[:, :, None]
+        each = (_recursion(closed, driven * K[:, i]) @ C[i] for i in range(model.outputs))
+        return np.array([signals - own for own in each])
 
     def stabilised(self, theta: Array, samples: int) -> Array:
         """Return theta if its predictor is stable or integrates, otherwise infinite values."""
@@ -165,3 +147,17 @@ class StateSpaceKind(Kind):
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return whether the plant is stable or integrates."""
         return (bool(np.all(np.abs(self.model.at(theta).poles) < 1.0 + _MARGIN)),) * self.outputs
+
+    @staticmethod
+    def _closed(model: StateSpaceModel) -> Array:
+        """Return A - K C, which moves the states of the predictor."""
+        return np.asarray(model.held[0] - model.matrices.K @ model.matrices.C)
+
+
+def _recursion(onward: Array, driven: Array) -> Array:
+    """Return states x (N, .., n) with x(t + 1) = onward x(t) + driven(t), from rest."""
+    states, x, step = np.empty_like(driven), np.zeros_like(driven[0]), onward.T
+    for t, own in enumerate(driven):
+        states[t] = x
+        x = x @ step + own
+    return states

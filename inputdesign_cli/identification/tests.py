@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 import scipy
@@ -13,8 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, future_tests, robust_white, score_tests
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
 from inputdesign_cli.identification.level_shifts import LevelShift, chance_of_shifts, level_shifts
-from inputdesign_cli.identification.records import Point, Records
-from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
+from inputdesign_cli.identification.records import Point, Records, shifted
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
 
@@ -22,6 +22,89 @@ from inputdesign_cli.levels import level
 _FEWEST_TESTED = 20
 # Directions of which one experiment has less than this share of the information are the others' alone.
 _OF_ONE_SIDE = 1e-6
+# Two-sided 99 % of the normal distribution: the band of a single correlation.
+_BAND = 2.5758293035489004
+
+
+class ResidualTest(NamedTuple):
+    """A chi-squared test of residuals over several lags, all channels at once ([ljung-1999], Section 16.6).
+
+    Attributes:
+        correlation: (n, p, columns), normalised; entry (i, j) of lag tau is that of residual i and of
+            residual or input j, tau samples earlier.
+        statistic, freedom: chi-squared with this many degrees of freedom if the model is right.
+    """
+
+    lags: Array  # (n,)
+    correlation: NDArray[np.float64]
+    limit: float  # a single correlation of white noise stays within +- limit with probability 0.99
+    statistic: float
+    freedom: int
+    probability: float  # of a statistic at least as large if the model is right; small values refute it
+
+    @classmethod
+    def of(cls, at: NDArray, correlation: NDArray, samples: int, statistic: float, freedom: int) -> Self:
+        """Return the test of a statistic from `samples` samples at lags `at`."""
+        probability, limit = float(scipy.special.chdtrc(freedom, statistic)), _BAND / np.sqrt(samples)
+        return cls(at.astype(float), correlation, limit, float(statistic), freedom, probability)
+
+
+def whiteness(
+    errors: Array, *, lags: int = 25, fitted: int = 0, lengths: Sequence[int] | None = None
+) -> ResidualTest:
+    """Return correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
+
+    The portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978].
+
+    Args:
+        fitted: number of estimated parameters of the noise model, which make residuals look whiter.
+        lengths: of the records that follow each other; None for one.
+    """
+    n, p = errors.shape
+    at = np.arange(1, _most_lags(n, p * p, lags, fitted) + 1)
+    products = np.array([errors.T @ shifted(errors, int(tau), lengths or (n,)) for tau in at])
+    power = errors.T @ errors
+    whitener = np.linalg.inv(np.linalg.cholesky(power))
+    squares = np.sum((whitener @ products @ whitener.T) ** 2, axis=(1, 2))
+    rms = np.sqrt(np.diag(power))
+    statistic = n * (n + 2) * np.sum(squares / (n - at))
+    return ResidualTest.of(at, products / np.outer(rms, rms), n, statistic, p * p * at.size - fitted)
+
+
+def cross_correlations(
+    errors: Array,
+    u: Array,
+    *,
+    lags: int = 25,
+    fitted: int = 0,
+    feedback: bool = False,
+    lengths: Sequence[int] | None = None,
+) -> ResidualTest:
+    """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
+
+    Args:
+        errors, u: (samples, p), (samples, r).
+        lags: how far back the inputs are looked at.
+        fitted: number of estimated parameters of the plant, which take as many directions away.
+        feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
+        lengths: see `whiteness`.
+    """
+    (n, p), r = errors.shape, u.shape[1]
+    at = np.arange(_most_lags(n, r, lags, fitted)) + int(feedback)
+    past = np.stack([shifted(u, int(tau), lengths or (n,)) for tau in at], axis=1)
+    left, singular, _ = np.linalg.svd(past.reshape(n, -1), full_matrices=False)
+    left = left[:, singular > 1e-9 * singular[0]]
+    covariance = errors.T @ errors / n
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+    statistic = np.sum((left.T @ errors @ whitener.T) ** 2)
+    rms = np.sqrt(np.outer(np.diag(covariance), np.mean(u**2, axis=0)))
+    correlation = np.einsum("np,nlr->lpr", errors, past) / (n * rms)
+    return ResidualTest.of(at, correlation, n, statistic, max(p * left.shape[1] - fitted, 1))
+
+
+def _most_lags(samples: int, pairs: int, lags: int, fitted: int) -> int:
+    """As many lags as asked for, fewer in a short record, enough for some freedom to be left."""
+    return max(min(lags, samples // (4 * pairs)), fitted // pairs + 1)
 
 
 @dataclass(frozen=True)
@@ -31,24 +114,22 @@ class Tests:
     Attributes:
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
-        scores: of the structure, and `directed` of one additional parameter.
         shift: where an output most likely shifts, whatever the inputs do; None in too short records.
         shifts: all that refute the structure; `beside_shifts`, `scores` once they are taken off.
         coloured: whether the noise has more structure than its model; all tests except of past residuals are
             then made with whitened residuals.
-        future: in open loop, whether the future of each input explains errors.
         alike: of several experiments, the probability that each differs as much from the others.
     """
 
     whiteness: ResidualTest
     independence: ResidualTest
-    scores: tuple[ScoreTest, ...]
+    scores: tuple[ScoreTest, ...]  # of the structure, and `directed` of one additional parameter
     directed: tuple[Directed, ...]
     shift: LevelShift | None
     shifts: tuple[LevelShift, ...]
     beside_shifts: tuple[ScoreTest, ...]
     coloured: bool
-    future: tuple[ScoreTest, ...]
+    future: tuple[ScoreTest, ...]  # in open loop, whether the future of each input explains errors
     alike: tuple[float, ...]
 
     @property
@@ -79,14 +160,11 @@ class Tests:
             return self.shifts
         # Likelihood ratios are compared with one, scores with the other.
         by_ratio, by_score = chance_of_shifts(self.shifts)
-        of_structure = {one.test for one in self.directed if one.of_structure}
+        compared = [(by_ratio if one.of_structure else by_score, one.test) for one in self.directed]
         # Where the noise is refuted, that says nothing of shifts: they are tested with white residuals.
         beside = [test for test in self.beside_shifts if not (self.coloured and test.fault == "noise")]
-        compared = [(by_ratio, test) for test in beside]
-        compared += [
-            (by_ratio if test in of_structure else by_score, test) for test in directed if test in others
-        ]
-        return self.shifts if all(own < test.probability for own, test in compared) else ()
+        alone = all(own < test.probability for own, test in compared if test in others)
+        return self.shifts if alone and all(by_ratio < test.probability for test in beside) else ()
 
     @property
     def failed_besides(self) -> tuple[ScoreTest, ...]:
@@ -118,7 +196,12 @@ def tests_of(
         feedback: whether u(t) depends on y(t).
     """
     kind = records.kind
-    left, kept = _not_explained(records)
+    # Samples that unknown inputs before each record explain whatever they are, if enough are left.
+    left, kept = np.concatenate([np.arange(n) >= records.late for n in records.lengths]), records.lengths
+    if np.count_nonzero(left) < _FEWEST_TESTED:
+        left[:] = True
+    elif records.late:
+        kept = tuple(n - records.late for n in records.lengths if n > records.late)
     errors, u = point.errors[left], records.u[left]
     white = White.of(records, point)
     shift, shifts, less = level_shifts(records, point, white)
@@ -142,17 +225,6 @@ def tests_of(
         () if feedback else future_tests(records, point.theta, robust or white),
         of_one_system(point, noise, experiments),
     )
-
-
-def _not_explained(records: Records) -> tuple[NDArray[np.bool_], tuple[int, ...]]:
-    """(N,): the samples that unknown inputs before each record do not explain whatever they are, and lengths.
-
-    All of them, where too few are left to be tested.
-    """
-    left = np.concatenate([np.arange(n) >= records.late for n in records.lengths])
-    if np.count_nonzero(left) < _FEWEST_TESTED:
-        return np.ones_like(left), records.lengths
-    return left, tuple(n - records.late for n in records.lengths if n > records.late)
 
 
 def of_one_system(point: Point, noise: Array, experiments: Sequence[int]) -> tuple[float, ...]:

@@ -165,10 +165,6 @@ class TransferKind(Kind):
             found.append(Extension(shown, TransferKind(larger, self.between), name, what))
         return tuple(found)
 
-    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
-        """Return the outputs less the prediction errors, since the noise is white."""
-        return y - errors
-
     def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
         return model.held(i, j, self.between.sample_time)
 

@@ -13,8 +13,9 @@ the dead time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -35,21 +36,26 @@ RISING = "rising"
 
 
 class _Tried(NamedTuple):
-    """A signal f (N,) that is made of an input scaled to size one.
-
-    Attributes:
-        gains: df/du, one for each state of the plant.
-        moves: what a change of the output from sample to sample adds to f in each state; zero if f does not
-            depend on it. It acts `early` samples early.
-    """
+    """A signal f (N,) that is made of an input scaled to size one."""
 
     name: str
     phrase: str
     fault: Fault
     f: Array
-    gains: tuple[float, ...]
-    moves: tuple[float, ...] = (0.0,)
-    early: int = 0
+    gains: tuple[float, ...]  # df/du, one for each state of the plant
+    moves: tuple[float, ...] = (0.0,)  # what a change of the output from sample to sample adds in each state
+    early: int = 0  # by how many samples that acts early
+
+    def slopes(self, channel: int, size: float, model: Model, w: ArrayLike) -> NDArray[np.complex128]:
+        """Return the derivative of G by x, (states, n, p, r), of an input of this size."""
+        G = model.plant_at(w)
+        own, moving = np.zeros_like(G), np.zeros_like(G)
+        own[..., channel] = G[..., channel]
+        turned = np.exp(1j * np.asarray(w, dtype=float))
+        change = size * (1.0 - 1.0 / turned) * turned**self.early
+        moving[..., channel] = change[:, None] * G[..., channel] ** 2
+        moves = np.resize(self.moves, len(self.gains))
+        return np.asarray(np.multiply.outer(np.array(self.gains), own) + np.multiply.outer(moves, moving))
 
 
 def variations(records: Records, theta: Array, simulated: Array | None) -> tuple[Alternative, ...]:
@@ -70,50 +76,13 @@ def variations(records: Records, theta: Array, simulated: Array | None) -> tuple
         if simulated is not None and u.shape[1] == simulated.shape[1] == 1:
             tried += _one_way(x, simulated[:, 0], records.kind.lateness(theta) + 1, lengths)
         for one in tried:
-            column = _caused(records, theta, channel, size * one.f)
-            found.append(Alternative(one.name, one.phrase, one.fault, column, _slopes(channel, size, one)))
+            # What the signal beside the input adds to the outputs, as minus prediction errors.
+            only = np.outer(size * one.f, np.arange(u.shape[1]) == channel)
+            parts = tuple(split(only, np.zeros_like(records.y), lengths))
+            column = -replace(records, parts=parts).from_rest(theta)[0]
+            slopes = partial(one.slopes, channel, size)
+            found.append(Alternative(one.name, one.phrase, one.fault, column, slopes))
     return tuple(found)
-
-
-def _caused(records: Records, theta: Array, channel: int, signal: Array) -> NDArray[np.float64]:
-    """Return what a signal (N,) beside an input adds to the outputs, as minus prediction errors (N, p)."""
-    only, none = np.zeros_like(records.u), np.zeros_like(records.y)
-    only[:, channel] = signal
-    return -replace(records, parts=tuple(split(only, none, records.lengths))).from_rest(theta)[0]
-
-
-def _slopes(channel: int, size: float, tried: _Tried) -> Callable[[Model, ArrayLike], NDArray[np.complex128]]:
-    """Return the derivative of G by x, (states, n, p, r), as a function of model and frequency."""
-
-    def slopes(model: Model, w: ArrayLike) -> NDArray[np.complex128]:
-        G = model.plant_at(w)
-        own, moving = np.zeros_like(G), np.zeros_like(G)
-        own[..., channel] = G[..., channel]
-        turned = np.exp(1j * np.asarray(w, dtype=float))
-        change = size * (1.0 - 1.0 / turned) * turned**tried.early
-        moving[..., channel] = change[:, None] * G[..., channel] ** 2
-        moves = np.resize(tried.moves, len(tried.gains))
-        return np.asarray(np.multiply.outer(np.array(tried.gains), own) + np.multiply.outer(moves, moving))
-
-    return slopes
-
-
-def _one_way(x: Array, simulated: Array, early: int, lengths: Sequence[int]) -> Iterator[_Tried]:
-    """Yield a plant of inputs x (N,) that is slower where its output (N,) rises than where it falls."""
-    changes = np.concatenate(
-        [
-            np.append(np.diff(own, prepend=own[:1]), np.zeros(early))[early:]
-            for own in np.split(simulated, np.cumsum(lengths)[:-1])
-        ]
-    )
-    scale = float(np.std(changes))
-    if not (np.all(np.isfinite(changes)) and scale > 0.0):
-        return
-    bent, slope = _bent(np.abs(changes) / scale, x, lengths)
-    if np.linalg.norm(bent) > _STRAIGHT * np.sqrt(len(x)):
-        phrase = "a plant that is slower where y rises than where it falls, or the other way round"
-        states = (-slope, -slope), (-1.0 / scale, 1.0 / scale)
-        yield _Tried("direction of y", phrase, "nonlinear", bent, *states, early)
 
 
 def _changes(name: str, x: Array) -> Iterator[_Tried]:
@@ -128,17 +97,37 @@ def _changes(name: str, x: Array) -> Iterator[_Tried]:
 
 def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
     """Yield signals that stand for a gain that depends on samples x (N,), of mean zero and size one."""
-    level, amplitude = (f"a gain of {name} that depends on its {what}" for what in ("level", "amplitude"))
-    moves = np.concatenate([_last_moves(own) for own in np.split(x, np.cumsum(lengths)[:-1])])
+    moves = []
+    for own in np.split(x, np.cumsum(lengths)[:-1]):
+        # The direction in which x last moved; before it first does, the other one.
+        signs = np.sign(np.diff(own, prepend=own[:1]))
+        first = np.flatnonzero(signs)[:1]
+        signs[0] = -signs[first[0]] if first.size else 0.0
+        moves.append(signs[np.maximum.accumulate(np.where(signs != 0.0, np.arange(own.size), 0))])
     for of, phrase, f, gains in (
-        (f"{name}^2", level, x**2, (-2.0, 2.0)),  # one deviation below and above the middle
-        (f"{name}^3", amplitude, x**3, (0.0,)),
+        # One deviation below and above the middle.
+        (f"{name}^2", f"a gain of {name} that depends on its level", x**2, (-2.0, 2.0)),
+        (f"{name}^3", f"a gain of {name} that depends on its amplitude", x**3, (0.0,)),
         (f"sign of {name}", f"a dead zone or friction at {name}", np.sign(x), (0.0,)),
-        (f"last move of {name}", f"play or hysteresis at {name}", moves, (0.0,)),
+        (f"last move of {name}", f"play or hysteresis at {name}", np.concatenate(moves), (0.0,)),
     ):
         bent, slope = _bent(f, x, lengths)
         if np.linalg.norm(bent) > _STRAIGHT * np.linalg.norm(f):
             yield _Tried(of, phrase, "nonlinear", bent, tuple(gain - slope for gain in gains))
+
+
+def _one_way(x: Array, simulated: Array, early: int, lengths: Sequence[int]) -> Iterator[_Tried]:
+    """Yield a plant of inputs x (N,) that is slower where its output (N,) rises than where it falls."""
+    each = (np.diff(own, prepend=own[:1]) for own in np.split(simulated, np.cumsum(lengths)[:-1]))
+    changes = np.concatenate([np.append(own, np.zeros(early))[early:] for own in each])
+    scale = float(np.std(changes))
+    if not (np.all(np.isfinite(changes)) and scale > 0.0):
+        return
+    bent, slope = _bent(np.abs(changes) / scale, x, lengths)
+    if np.linalg.norm(bent) > _STRAIGHT * np.sqrt(len(x)):
+        phrase = "a plant that is slower where y rises than where it falls, or the other way round"
+        states = (-slope, -slope), (-1.0 / scale, 1.0 / scale)
+        yield _Tried("direction of y", phrase, "nonlinear", bent, *states, early)
 
 
 def _bent(f: Array, x: Array, lengths: Sequence[int]) -> tuple[Array, float]:
@@ -151,11 +140,3 @@ def _bent(f: Array, x: Array, lengths: Sequence[int]) -> tuple[Array, float]:
         bent.append(own - line @ coefficients)
         slopes.append(coefficients[1])
     return np.concatenate(bent), float(np.average(slopes, weights=lengths))
-
-
-def _last_moves(x: Array) -> Array:
-    """Return the direction in which x last moved, (N,); before it first does, the other one."""
-    moves = np.sign(np.diff(x, prepend=x[:1]))
-    first = np.flatnonzero(moves)[:1]
-    moves[0] = -moves[first[0]] if first.size else 0.0
-    return np.asarray(moves[np.maximum.accumulate(np.where(moves != 0.0, np.arange(x.size), 0))])

@@ -116,24 +116,19 @@ class White:
     """An estimate in units of the covariance of its residuals, outputs interleaved.
 
     Attributes:
-        root: R (p, p), which makes residuals white.
         lengths: of the records, N samples; errors of noise before them, M of every output, follow.
-        residuals: ((N + M) p,).
-        variance: of the noise, in these units: residuals lack what unknown starts explain.
-        starts: ((N + M) p, m), orthonormal, what m unknown starts explain.
         explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
-        echoes: (k, lags, p, p), see `Kind.echoes`, in the units of residuals.
         whitening: filters of residuals that are not white; their coefficients come after the k parameters.
     """
 
-    root: Array
+    root: Array  # R (p, p), which makes residuals white
     lengths: tuple[int, ...]
-    residuals: Array
-    variance: float
-    starts: Array
+    residuals: Array  # ((N + M) p,)
+    variance: float  # of the noise, in these units: residuals lack what unknown starts explain
+    starts: Array  # ((N + M) p, m), orthonormal, what m unknown starts explain
     explained: Array
     basis: Array
-    echoes: NDArray[np.float64]
+    echoes: NDArray[np.float64]  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
     whitening: Whitening | None = None
 
     @classmethod

@@ -6,7 +6,7 @@ which order they are computed: the same numbers on one process, on several and o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -38,20 +38,28 @@ def run_batches(
     seed: Seed,
     executor: Executor | None = None,
 ) -> list[Answer]:
-    """The answers of `function(count, rng)` for batches of `size` runs (the last one shorter), in order.
+    """Return the answers of `function(count, rng)` for batches of `size` runs (the last shorter), in order.
 
     Args:
         function: draws all that is random from `rng`; it can be pickled, with what all batches share.
-        runs: how many in all; `size` of them are one batch.
         seed: of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 
     Raises:
         IdesignError: `worker-lost`; otherwise what `function` and the executor raise.
     """
+    root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
+    batches = (
+        _Batch(
+            index,
+            function,
+            min(size, runs - start),
+            np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index)),
+        )
+        for index, start in enumerate(range(0, runs, size))
+    )
     answers: dict[int, Answer] = {}
     told = 0
-    batches = _batches(function, runs=runs, size=size, seed=seed)
     for done in (executor or InProcess()).run(_compute, batches):
         if isinstance(done.error, WorkerLostError):
             message = f"a batch of {done.job.runs} simulated runs has no result: {done.error}"
@@ -64,15 +72,6 @@ def run_batches(
         told += done.job.runs
         tell(Counted("simulated runs", told, runs))
     return [answers[index] for index in range(len(answers))]
-
-
-def _batches(
-    function: Callable[[int, np.random.Generator], Answer], *, runs: int, size: int, seed: Seed
-) -> Iterator[_Batch[Answer]]:
-    root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
-    for index, start in enumerate(range(0, runs, size)):
-        stream = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index))
-        yield _Batch(index, function, min(size, runs - start), stream)
 
 
 def _compute(batch: _Batch[Answer]) -> Answer:

@@ -81,14 +81,10 @@ class Redrawn:
     @cached_property
     def powers(self) -> Array:
         """Return the power of each channel (r,)."""
-        inputs = self.generator.spectrum.inputs
-
-        def of(channel: int) -> float:
-            unit = np.diag(np.arange(inputs) == channel).astype(float)
-            density = partial(constant_density, unit)
-            return float(self.x @ self.basis.integrals(density, np.zeros(0, dtype=complex)))
-
-        return np.array([of(channel) for channel in range(inputs)])
+        units = np.eye(self.generator.spectrum.inputs)
+        densities = [partial(constant_density, np.diag(unit)) for unit in units]
+        nowhere = np.zeros(0, dtype=complex)
+        return np.array([float(self.x @ self.basis.integrals(one, nowhere)) for one in densities])
 
     def information(self, experiment: Experiment) -> Array:
         """Of the spectrum."""

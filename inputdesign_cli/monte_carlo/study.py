@@ -94,7 +94,7 @@ def _run(
     system = true.model
     e = _noise(true, runs, rng)
     r = excitation.draw(runs, true.samples, rng)
-    (u_r, u), (y_r, y) = _responses(true, r, e, step)
+    (u_r, u), (y_r, y) = responses(true, r, e, step)
     found = fit_batch(model, u, y, step, start=model.theta)
     again = partial(identify, model, step=step, start=model.theta, feedback=true.loop is not None, rest=True)
     found = _again_where_lost(again, u, y, found)
@@ -102,8 +102,11 @@ def _run(
     if true.prior is not None and system.names == model.names:
         theta = _with_prior(found, true.prior, system.theta, rng)
     caused: dict[PowerKind, Array] = {"input": u_r, "output": y_r, "excitation": r}
-    power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
-    total: dict[PowerKind, list[float]] = {"input": _mean_squares(u), "output": _mean_squares(y)}
+    everything: dict[PowerKind, Array] = {"input": u, "output": y}
+    power, total = (
+        {kind: np.mean(signal**2, axis=(0, 1)).tolist() for kind, signal in signals.items()}
+        for signals in (caused, everything)
+    )
     return Trials(true, model, theta, found.converged, power, total, first=np.array(r[0]))
 
 
@@ -114,7 +117,7 @@ def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> Array:
     return np.asarray(white @ np.linalg.cholesky(system.covariance).T)
 
 
-def _responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple[Array, Array], ...]:
+def responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple[Array, Array], ...]:
     """Inputs (runs, samples, r) and outputs (runs, samples, p) from rest: of r alone, and of r and e."""
     if true.loop is None:
         y_r, y_e = true.model.simulate(r, e, step)
@@ -155,11 +158,6 @@ def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.rando
     return np.linalg.solve(found.information + prior, (own + earlier)[:, :, None])[:, :, 0]
 
 
-def _mean_squares(x: Array) -> list[float]:
-    """Channel by channel over all runs (runs, samples, channels)."""
-    return [float(value) for value in np.mean(x**2, axis=(0, 1))]
-
-
 def searched_run(
     nominal: Experiment, record: Array, step: float, rng: np.random.Generator, earlier: Earlier | None
 ) -> tuple[Estimate, bool]:
@@ -178,7 +176,7 @@ def searched_run(
         SpecError: see `identify`.
     """
     true, model = replace(nominal, samples=len(record)), nominal.model
-    (_, u), (_, y) = _responses(true, record[None], _noise(true, 1, rng), step)
+    (_, u), (_, y) = responses(true, record[None], _noise(true, 1, rng), step)
     found = identify(
         model, u[0], y[0], step, start=model.theta, feedback=true.loop is not None, rest=True, earlier=earlier
     )

@@ -95,17 +95,18 @@ class Trials:
 
     def bound(self, predicted: PredictedError, information: Array) -> Array:
         """r_u (n,) on the true system at the frequencies and entries of the prediction."""
+
+        def at(w: Array, entry: Entry | None) -> Array:
+            true, limit = self.true, Absolute(1.0)  # of r_adm, which is not stated
+            error = ModelError(
+                experiment=true, band=true.band, entry=entry, admissible=limit, alpha=predicted.alpha
+            )
+            return error.error_bound(information, w)
+
         if predicted.entries is None:
-            return self._bound(predicted.w, predicted.alpha, None, information)
+            return at(predicted.w, None)
         r_u = np.empty(predicted.w.size)
         for i, j in np.unique(predicted.entries, axis=0).tolist():
             own = np.all(predicted.entries == (i, j), axis=1)
-            r_u[own] = self._bound(predicted.w[own], predicted.alpha, (i, j), information)
+            r_u[own] = at(predicted.w[own], (i, j))
         return r_u
-
-    def _bound(self, w: Array, alpha: float, entry: Entry | None, information: Array) -> Array:
-        unstated = Absolute(1.0)
-        error = ModelError(
-            experiment=self.true, band=self.true.band, entry=entry, admissible=unstated, alpha=alpha
-        )
-        return error.error_bound(information, w)

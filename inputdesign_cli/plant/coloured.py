@@ -29,7 +29,7 @@ from inputdesign_cli.plant.model import (
     row_parameters,
     tables_at,
 )
-from inputdesign_cli.plant.polynomial import evaluate, join_roots, roots_in_z, unit_circle
+from inputdesign_cli.plant.polynomial import all_roots, evaluate, unit_circle
 
 _T = TypeVar("_T")
 _ONE = (np.ones(1),)
@@ -105,7 +105,7 @@ class Coloured(Around, Parametrised):
     def estimated_roots(self) -> ComplexArray:
         """Return the roots in z of C and of the parts of D that are estimated."""
         free = [d for d, held in zip(self.D, self.held, strict=True) if not held]
-        return join_roots(roots_in_z(p) for p in (*self.C, *free))
+        return all_roots([*self.C, *free])
 
     @property
     def integrates(self) -> bool:

@@ -79,10 +79,9 @@ def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
     return np.asarray(np.roots(c[first : last + 1]), dtype=complex)
 
 
-def join_roots(parts: Iterable[ComplexArray]) -> ComplexArray:
-    """All roots of several polynomials in one array."""
-    listed = [np.asarray(p, dtype=complex) for p in parts]
-    return np.concatenate(listed) if listed else np.zeros(0, dtype=complex)
+def all_roots(polynomials: Iterable[ArrayLike]) -> ComplexArray:
+    """All roots in z of several polynomials in one array."""
+    return np.concatenate([np.zeros(0, dtype=complex), *map(roots_in_z, polynomials)])
 
 
 # A coefficient this small beside the largest one is rounding of the transforms below.

@@ -30,10 +30,10 @@ from inputdesign_cli.plant.model import (
     tables_at,
 )
 from inputdesign_cli.plant.polynomial import (
+    all_roots,
     at,
     evaluate,
     frequencies_last,
-    join_roots,
     roots_in_z,
     stack,
     unit_circle,
@@ -157,12 +157,12 @@ class PolynomialModel(Parametrised):
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles in z of G, H and their gradients."""
-        return np.concatenate([join_roots(roots_in_z(a) for a in self.A), self.predictor_poles])
+        return np.concatenate([all_roots(self.A), self.predictor_poles])
 
     @cached_property
     def predictor_poles(self) -> ComplexArray:
         """See `SampledPlant`."""
-        return join_roots(roots_in_z(p) for p in [*self.C, *self.D, *(f for row in self.F for f in row)])
+        return all_roots([*self.C, *self.D, *(f for row in self.F for f in row)])
 
     @cached_property
     def singularities(self) -> ComplexArray:
@@ -177,7 +177,7 @@ class PolynomialModel(Parametrised):
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Poles and zeros of one entry of G, as points of the frequency plane."""
         polynomials = (self.row(self.A, output), self.F[output][input], self.B[output][input])
-        return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
+        return logarithmic_distance(all_roots(polynomials))
 
     @property
     def stable_outputs(self) -> tuple[bool, ...]:
@@ -206,7 +206,7 @@ class PolynomialModel(Parametrised):
         q = unit_circle(w)
         G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
-            A, B, F = self._entry(q, i, j)
+            A, B, F = evaluate(self._entries[i][j], q)
             G[:, i, j] = B / (A * F)
         return G
 
@@ -234,12 +234,14 @@ class PolynomialModel(Parametrised):
             if parameter.letter in "abf" and (output, input) in parameter.places:
                 gradient = above if parameter.letter == "b" else below
                 gradient[:, index] = q**parameter.power
-        A, B, F = self._entry(q, output, input)
+        A, B, F = evaluate(self._entries[output][input], q)
         return Fraction(B, A * F, above, below)
 
-    def _entry(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
-        """Return A_i, B_ij and F_ij (3, n)."""
-        return evaluate(stack([[self.row(self.A, i), self.B[i][j], self.F[i][j]]])[0], q)
+    @cached_property
+    def _entries(self) -> list[list[Array]]:
+        """Return A_i, B_ij and F_ij of each entry, as (3, l)."""
+        rows = zip(self.per_output(self.A), self.B, self.F, strict=True)
+        return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
     def _shifts(self, q: ComplexArray) -> list[ComplexArray]:
         """The powers of q up to the highest of a parameter."""
@@ -255,7 +257,7 @@ class PolynomialModel(Parametrised):
         factors: dict[tuple[str, int, int], ComplexArray] = {}
         shifts = self._shifts(q)
         for i, j in self.active:
-            A, B, F = self._entry(q, i, j)
+            A, B, F = evaluate(self._entries[i][j], q)
             AF = A * F
             factors["b", i, j] = 1.0 / AF
             factors |= {(x, i, j): -B / (own * AF) for x, own in (("a", A), ("f", F)) if x in self.letters}

@@ -19,15 +19,7 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import (
-    at,
-    delay_of,
-    evaluate,
-    join_roots,
-    roots_in_z,
-    stack,
-    unit_circle,
-)
+from inputdesign_cli.plant.polynomial import all_roots, at, delay_of, evaluate, roots_in_z, stack, unit_circle
 
 Coefficients = Sequence[float] | Array
 
@@ -75,7 +67,7 @@ class Rational(ScalarTransfer):
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles in z, factor by factor."""
-        return join_roots(roots_in_z(factor) for factor in self.denominator)
+        return all_roots(self.denominator)
 
     @cached_property
     def zeros(self) -> ComplexArray:
@@ -230,7 +222,7 @@ class TransferMatrix:
     @property
     def poles(self) -> ComplexArray:
         """Poles in z."""
-        return join_roots(roots_in_z(factor) for row in self.factors for factor in row)
+        return all_roots(factor for row in self.factors for factor in row)
 
     @property
     def memory(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -40,7 +41,12 @@ _DAYS = (
 )
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 _ISO = "ISO8601"
-_FORMS = (_ISO, *_CLOCKS, *(f"{day} {clock}".strip() for day in _DAYS for clock in ("", *_CLOCKS)))
+# Forms of one order of day, month and year, or of times of day: seconds and their parts may be left out.
+_FORMS = {
+    _ISO: (_ISO,),
+    "": _CLOCKS,
+    **{day: (*(f"{day} {clock}" for clock in _CLOCKS), day) for day in _DAYS},
+}
 _DATE = (
     r"\d{4}-\d\d-\d\d|\d{4}[./]\d\d?[./]\d\d?|\d\d?\.\d\d?\.(\d{4}|\d\d)|\d\d?/\d\d?/(\d{4}|\d\d)|"
     r"\d\d?-\d\d?-\d{4}|\d\d?[- ][A-Za-z]{3}[- ]\d{4}"
@@ -48,7 +54,6 @@ _DATE = (
 _CLOCK = r"\d\d?:\d\d(:\d\d([.,]\d{1,9})?)?(\s?[AaPp][Mm])?"
 _MOMENT = re.compile(rf"({_CLOCK}|({_DATE})([T ]{_CLOCK})?)\s*(Z|[+-]\d\d:?\d\d)?")
 _ZONE = re.compile(r"\d\s*(Z|[+-]\d\d:?\d\d)$")
-_MINUTES, _SECONDS, _FRACTION = map(re.compile, (r"(\d:\d\d)$", r"(:\d\d:\d\d)(?![.\d])", r":\d\d\.\d+"))
 _COMMA_SECONDS = re.compile(r"(:\d\d),(\d+)$")
 # What dates and times of any language and order have in them.
 _LIKE = re.compile(
@@ -153,24 +158,28 @@ def moments_column(cells: Sequence[str], form: str | None = None) -> Column | No
     there = [i for i, cell in enumerate(cells) if cell]
     if not there:
         return None
-    texts = _even([cells[i] for i in there])
-    first = texts[0] if _MOMENT.fullmatch(texts[0]) else ""
-    forms = [form] if form else [one for one in _FORMS if first and not np.isnat(_read([first], one)[0])]
-    every = {one: _read(texts, one) for one in forms}
+    texts = np.array([_COMMA_SECONDS.sub(r"\1.\2", cells[i]) for i in there], dtype=object)
+    known = _FORMS if form is None and _MOMENT.fullmatch(texts[0]) else {}
+    orders = (
+        {form: (form,)}
+        if form
+        else {order: forms for order, forms in known.items() if not np.isnat(_read(texts[:1], forms)[0])}
+    )
+    every = {order: _read(texts, forms) for order, forms in orders.items()}
     whole = {one: found for one, found in every.items() if not np.isnat(found).any()}
     if whole:
-        (one, moments), *others = whole.items()
+        (order, moments), *others = whole.items()
         if any(not np.array_equal(moments - moments[0], found - found[0]) for _, found in others):
             return _unread(cells, there[0], "may have the day or the month first")
         numbers = np.full(len(cells), np.nan)
         numbers[there] = (moments - moments[0]) / np.timedelta64(1, "s")
-        of_day = one != _ISO and not re.search("%[djDFxcyYGUWu]", one)
+        of_day = order != _ISO and not re.search("%[djDFxcyYGUWu]", order)
         since = moments[0].astype("datetime64[D]") if of_day else np.datetime64(0, "s")
         began = float((moments[0] - since) / np.timedelta64(1, "s"))
         return Column(numbers, dated=True, began=began, of_day=of_day)
     alike = {text for text in texts if _LIKE.fullmatch(text)}
     many = len(alike) >= _DIFFERENT and sum(text in alike for text in texts) > _MOSTLY * len(texts)
-    if not many and (form is not None or not forms):
+    if not many and (form is not None or not orders):
         return None
     at = int(np.argmax(np.all([np.isnat(found) for found in every.values()], axis=0))) if every else 0
     wrong = "is no date or time as those above are" if at else "is no date or time that can be read"
@@ -181,29 +190,19 @@ def _unread(cells: Sequence[str], row: int, wrong: str) -> Column:
     return Column(np.full(len(cells), np.nan), (row, cells[row]), wrong, SAY_TIME, undated=True)
 
 
-def _even(texts: Sequence[str]) -> list[str]:
-    """Return texts with seconds, and with parts of a second after a point, in all of them if any has some."""
-    plain = [_COMMA_SECONDS.sub(r"\1.\2", text) for text in texts]
-    if re.match(r"\d{4}-", plain[0]):  # ISO 8601 may leave them out
-        return plain
-    if any(map(_SECONDS.search, plain)):
-        plain = [text if _SECONDS.search(text) else _MINUTES.sub(r"\1:00", text) for text in plain]
-    if any(map(_FRACTION.search, plain)):
-        plain = [text if _FRACTION.search(text) else _SECONDS.sub(r"\1.0", text) for text in plain]
-    return plain
-
-
-def _read(texts: Sequence[str], form: str) -> NDArray[np.datetime64]:
-    """Return moments (n,), in UTC if all have a zone, not a time where a text is none."""
+def _read(texts: NDArray[np.object_], forms: Sequence[str]) -> NDArray[np.datetime64]:
+    """Return moments (n,), in UTC if all have a zone, by the first form that fits; NaT where none does."""
     import pandas
 
-    zoned = np.array([form == _ISO and _ZONE.search(text[10:]) is not None for text in texts])
-    try:
-        found = pandas.to_datetime(pandas.Series(texts, dtype=object), format=form, utc=True, errors="coerce")
-        moments = np.asarray(found.dt.tz_localize(None).to_numpy())
-    except (ValueError, TypeError, OverflowError):
-        return np.full(len(texts), np.datetime64("NaT"))
-    return np.where(zoned == zoned[0], moments, np.datetime64("NaT"))
+    zoned = np.array([_ZONE.search(text[10:]) is not None for text in texts])
+    found = np.full(len(texts), np.datetime64("NaT", "ns"))
+    for form in forms:
+        left = np.isnat(found)
+        if left.any():
+            with contextlib.suppress(ValueError, TypeError, OverflowError):
+                read = pandas.to_datetime(pandas.Series(texts[left]), format=form, utc=True, errors="coerce")
+                found[left] = read.dt.tz_localize(None).to_numpy()
+    return np.where(zoned == zoned[0], found, np.datetime64("NaT"))
 
 
 def with_days(sheet: Sheet) -> Sheet:

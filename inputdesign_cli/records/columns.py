@@ -185,7 +185,8 @@ def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
             if matched and not any(other.startswith(letter) for other in named):
                 every.setdefault(f"{letter}{matched[2] or 1}", []).append(name)
         for role, names in every.items():
-            exact = [name for name in names if name in (role, letter)] or names
+            plain = (role,) if f"{letter}2" in every else (role, letter)
+            exact = [name for name in names if name in plain] or names
             if len(exact) > 1:
                 message = f"{sheet.path.name} has several columns that may be {role}: {', '.join(exact)}"
                 hint = f"say which one counts: --columns {role}={exact[0]}"
@@ -195,7 +196,7 @@ def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
 
 
 def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None) -> dict[str, str]:
-    """Return role -> column: of the channels of a plant, or of what a log calls u, y1, r, time, ..
+    """Return role -> column: of the channels of a plant, or of the columns that a log calls u, y1, r, ..
 
     Args:
         named: the columns that the user names, by role.

@@ -277,7 +277,7 @@ def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signal
     """The signals with times in the unit of the spec.
 
     Raises:
-        DataError: `data-wrong-unit`; `data-not-uniform`, the sample time is another one.
+        DataError: `data-wrong-unit`; `data-not-uniform`, the sample time differs.
     """
     sheet, stated, scale = signals.sheet, preparation.sample_time, 1.0
     if signals.unit and (signals.name or preparation.time_unit):

@@ -96,7 +96,7 @@ def _cut(
         (lines[~whole & ~signals.without], "since a number is missing"),
     ):
         found += ROWS_LEFT_OUT.when(rows.size, f"{listed(rows)}, {why}", rows=len(rows))
-    facts = [f"{len(longer)} with its own initial state each" if len(longer) > 1 else "one is used"]
+    facts = [f"{len(longer)} with initial states of their own" if len(longer) > 1 else "one is used"]
     facts += [f"gaps before {listed(gaps)}"] if gaps.size else []
     facts += [f"{listed(lines[short])} left out as too short"] if short.size else []
     found += RECORD_CUT.when(

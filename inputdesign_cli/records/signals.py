@@ -154,8 +154,10 @@ def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -
         kept &= (scaled >= begin) & (scaled <= end)
     if not np.any(kept):
         message = f"nothing is left of the {len(time)} rows of {sheet.path.name}"
-        hint = f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}"
-        raise _nothing_left(sheet, message, f"{hint}: mind --skip and --range")
+        hint = f"--skip {preparation.skip} leaves them all out"
+        if preparation.skip < len(time):
+            hint = f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}: mind --range"
+        raise _nothing_left(sheet, message, hint)
     return np.flatnonzero(kept)
 
 

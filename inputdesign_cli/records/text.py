@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import re
 from collections import Counter
@@ -26,12 +25,8 @@ from inputdesign_cli.records.sheet import Sheet, Source
 
 Rows = list[tuple[int, list[str]]]
 _COMMENTS = ("#", "%", "//")
-_MARKS = (
-    *((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16")),
-    *((codecs.BOM_UTF16_BE, "utf-16"), (codecs.BOM_UTF8, "utf-8-sig")),
-)
 # Asked of charset-normalizer where a text is neither UTF-8 nor, by its bytes, Windows-1252.
-_OTHERS = ["utf_16_le", "utf_16_be", "cp932", "gb18030", "big5", "euc_kr", "euc_jp", "cp1251"]
+_OTHERS = ["utf_16", "utf_32", "utf_16_le", "utf_16_be", "cp932", "gb18030", "big5", "euc_kr", "cp1251"]
 # How archives, workbooks and arrays begin.
 _BINARY = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x93NUMPY")
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1b\ufffd]")
@@ -55,9 +50,8 @@ def decoded(source: Source, raw: bytes) -> str:
     Raises:
         DataError: `data-unreadable`; it is no text.
     """
-    marked = next((encoding for mark, encoding in _MARKS if raw.startswith(mark)), None)
     zeros = b"\x00" in raw[:4096].rstrip(b"\x00\x1a")
-    for encoding in [marked] if marked else [] if zeros else ["utf-8", "cp1252"]:
+    for encoding in () if zeros else ("utf-8-sig", "cp1252"):
         try:
             text = raw.decode(encoding).rstrip("\x00\x1a")
             break
@@ -67,8 +61,8 @@ def decoded(source: Source, raw: bytes) -> str:
         from charset_normalizer import from_bytes
 
         foreign = zeros or len(raw) - len(raw.translate(None, _HIGH)) > _FEW
-        found = from_bytes(raw[: 2**20], cp_isolation=_OTHERS).best() if foreign and not marked else None
-        text = raw.decode(found.encoding if found else marked or "utf-8", errors="replace")
+        found = from_bytes(raw[: 2**20], cp_isolation=_OTHERS).best() if foreign else None
+        text = raw.decode(found.encoding if found else "utf-8", errors="replace")
     first = _CONTROL.search(text)
     if first is None:
         return text

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.figures.fan import MOST_NAMED
+from inputdesign_cli.figures.frequency import MOST_NAMED
 from inputdesign_cli.figures.plots import painter
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import rendered

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.figures.sweep_figures import bound_of, sweep_figures
+from inputdesign_cli.figures.sweep import bound_of, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.objectives import OBJECTIVES, objective

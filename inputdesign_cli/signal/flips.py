@@ -172,7 +172,9 @@ class _Soft:
             return np.inf
         squares = np.concatenate(found)
         top = float(squares.max())
-        return top * (1.0 + float(np.log(np.sum(np.exp(self.sharpness * (squares / top - 1.0))))) / self.sharpness)
+        return top * (
+            1.0 + float(np.log(np.sum(np.exp(self.sharpness * (squares / top - 1.0))))) / self.sharpness
+        )
 
 
 Change = tuple[int, int, Array]
@@ -241,7 +243,9 @@ class FlipSearch:
 
     def _at(self, values: Array) -> _Point:
         psis = [held.of(values) for held in self._held]
-        informations = [held.known + held.products(psi, psi) for held, psi in zip(self._held, psis, strict=True)]
+        informations = [
+            held.known + held.products(psi, psi) for held, psi in zip(self._held, psis, strict=True)
+        ]
         return _Point(values, psis, informations, self._worst(informations))
 
     def _worst(self, informations: Sequence[Array]) -> float:
@@ -261,7 +265,9 @@ class FlipSearch:
                 turn = np.zeros_like(M)
                 turn[i, j] = turn[j, i] = step
                 up, down = _squares(there, M + turn), _squares(there, M - turn)
-                slope[i, j] = slope[j, i] = float(share @ (down - up)) / (2.0 * step * total * (1 if i == j else 2))
+                slope[i, j] = slope[j, i] = float(share @ (down - up)) / (
+                    2.0 * step * total * (1 if i == j else 2)
+                )
             found.append(slope)
         return found
 
@@ -283,7 +289,9 @@ class FlipSearch:
             sharpness = _SOFT + (_SHARP - _SOFT) * step / _CLIMBS
             places = [h.goal.everywhere(M) for h, M in zip(self._held, point.informations, strict=True)]
             gradient = self._gradient(point, self._weights(point, places, sharpness))
-            wanted = self._letters[np.argmax(gradient[:, None] * self._letters, axis=1), range(gradient.shape[1])]
+            wanted = self._letters[
+                np.argmax(gradient[:, None] * self._letters, axis=1), range(gradient.shape[1])
+            ]
             gain = (wanted - point.values) * gradient
             most = max(1, int(_SHARE * (1.0 - step / _CLIMBS) * gain.size))
             order = np.argsort(-gain, axis=None)[:most]
@@ -323,7 +331,9 @@ class FlipSearch:
         found: list[tuple[float, int, int, Array]] = []
         for channel in range(point.values.shape[1]):
             column, levels = point.values[:, channel], self._letters[:, channel]
-            options = [-2.0 * column] if len(levels) == 2 and levels.sum() == 0.0 else [v - column for v in levels]
+            options = (
+                [-2.0 * column] if len(levels) == 2 and levels.sum() == 0.0 else [v - column for v in levels]
+            )
             for steps in options:
                 along = 2.0 * steps * gradient[:, channel]
                 for run in _RUNS:

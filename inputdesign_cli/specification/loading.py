@@ -20,7 +20,7 @@ from inputdesign_cli.specification.models.wording import show
 from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.schema import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
-from inputdesign_cli.specification.yaml.overrides import compose
+from inputdesign_cli.specification.yaml.overrides import KEY, apply_includes, apply_overrides
 from inputdesign_cli.specification.yaml.places import Path, Places, Source
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
@@ -138,14 +138,15 @@ def read_tree(
 ) -> Tree:
     """Return the plain data of a spec with included files and overrides, not yet checked.
 
-    A file that lies outside `confine` is a diagnostic of the tree.
-
-    Raises:
-        SpecError: The text is no mapping in YAML, or a file cannot be included.
+    A file that lies outside `confine` is a diagnostic of the tree. Raises `SpecError`: The text is no mapping
+    in YAML, or a file cannot be included.
     """
     tree = read(text, file)
     check_mapping(tree)
-    compose(tree, folder, overrides, known=Spec.model_fields.keys(), confine=confine)
+    first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
+    apply_overrides(tree, first)
+    apply_includes(tree, folder, known=Spec.model_fields.keys(), confine=confine)
+    apply_overrides(tree, [override for override in overrides if override not in first])
     if confine is not None:
         keep_inside(tree, folder, confine)
     return tree
@@ -155,13 +156,13 @@ def check_mapping(tree: Tree) -> None:
     """Raise `SpecError` (`empty-file`, `not-a-mapping`) unless the data of a spec are a mapping."""
     if isinstance(tree.data, dict):
         return
-    empty, files = tree.data is None, [Location(file, 1, 1) for file, _ in tree.places.sources]
-    raise SpecError.because(
-        "empty-file" if empty else "not-a-mapping",
-        "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
-        "`idesign init` writes a spec to start from",
-        location=tree.places.location(tree.places.mark(())) or next(iter(files), None),
-    )
+    code, message = "not-a-mapping", 'a spec is a mapping of keys ("plant: ..", "noise: ..")'
+    if tree.data is None:
+        code, message = "empty-file", "the spec is empty"
+    files = [Location(file, 1, 1) for file, _ in tree.places.sources]
+    location = tree.places.location(tree.places.mark(())) or next(iter(files), None)
+    hint = "`idesign init` writes a spec to start from"
+    raise SpecError.because(code, message, hint, location=location)
 
 
 def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:

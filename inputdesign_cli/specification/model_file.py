@@ -13,7 +13,6 @@ from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import format_key
-from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import read
 
 # Sample times differ by this share at most, from rounding in a text.
@@ -23,9 +22,8 @@ _SAME = 1e-6
 def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
     """Return the block `estimate` of a file that the spec names at `key`; errors show nothing else of it.
 
-    Raises:
-        SpecError: `bad-model-file`; `wrong-estimate`, its data have another sample time than the spec;
-            the file cannot be read.
+    Raises `SpecError`: `bad-model-file`; `wrong-estimate`, its data have another sample time than the spec;
+    the file cannot be read.
     """
     try:
         text = read_text(spec.resolve_path(name))
@@ -47,7 +45,14 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         message = f"{name} is no model that identify wrote: it has no sound block estimate{said}"
         hint = "name a model.yaml with estimate: {parameters: {..}, covariance: [[..]]}, positive definite"
         raise spec.complain("bad-model-file", message, hint=hint, key=key) from error
-    _check_clock(spec, name, data, key)
+    step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
+    other = unit != spec.time_unit
+    # Older files have no sample time.
+    if isinstance(step, int | float) and (other or not isclose(step, spec.sample_time, rel_tol=_SAME)):
+        here = f"sample_time is {spec.sample_time:g} {spec.time_unit} here"
+        message = f"{name} is an estimate from samples {step:g} {unit} apart, and {here}"
+        hint = f"write sample_time: {step!r} and time_unit: {unit}, or take them by include: {name}"
+        raise spec.complain("wrong-estimate", message, hint=hint, key=key)
     return estimated
 
 
@@ -58,16 +63,3 @@ def is_prior(parameters: Mapping[str, float], covariance: Sequence[Sequence[floa
     except ValidationError:
         return False
     return True
-
-
-def _check_clock(spec: Spec, name: str, data: Mapping[str, Plain], key: str) -> None:
-    """Raise `SpecError` (`wrong-estimate`) if the file has another sample time than the spec."""
-    step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
-    if not isinstance(step, int | float):  # older files have none
-        return
-    if unit == spec.time_unit and isclose(step, spec.sample_time, rel_tol=_SAME):
-        return
-    here = f"sample_time is {spec.sample_time:g} {spec.time_unit} here"
-    message = f"{name} is an estimate from samples {step:g} {unit} apart, and {here}"
-    hint = f"write sample_time: {step!r} and time_unit: {unit}, or take them by include: {name}"
-    raise spec.complain("wrong-estimate", message, hint=hint, key=key)

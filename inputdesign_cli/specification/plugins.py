@@ -48,8 +48,7 @@ def added(group: str) -> dict[str, type[Section]]:
 def install() -> None:
     """Add the keys of all installed packages to the models of a spec.
 
-    Raises:
-        SpecError: `bad-plug-in`; a key exists already.
+    Raises `SpecError`: `bad-plug-in`; a key exists already.
     """
     sections = {group: added(group) for group in GROUPS}
     if not any(sections.values()):

@@ -75,10 +75,9 @@ def from_control(
     if len(known):
         plant["known"] = list(known)
     time = system.dt if discrete else sample_time
-    data = {"plant": plant, "noise": {"variance": 1.0} if noise is None else noise, **blocks}
-    return Spec.from_dict(
-        data if time is None else {"sample_time": time, **data}, design="accuracy" in blocks
-    )
+    clock = {} if time is None else {"sample_time": time}
+    data = {**clock, "plant": plant, "noise": {"variance": 1.0} if noise is None else noise, **blocks}
+    return Spec.from_dict(data, design="accuracy" in blocks)
 
 
 def _listed(value: object) -> bool:
@@ -133,8 +132,7 @@ def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete
 def _in_delays(top: list[float], bottom: list[float]) -> Entry:
     """In q^-1, ascending, and monic; poles at 0 are delays and no coefficients to be estimated.
 
-    Raises:
-        SpecError: `improper-transfer`.
+    Raises `SpecError`: `improper-transfer`.
     """
     above, below = (np.trim_zeros(np.array(part, dtype=float), "f") for part in (top, bottom))
     if above.size > below.size:

@@ -48,12 +48,11 @@ class SpecTemplate:
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
         """Return the plain data of one variant, without the `sweep` block; only the overrides are checked.
 
-        Raises:
-            SpecError: An override that cannot be applied.
+        Raises `SpecError`: An override that cannot be applied.
         """
         tree = Tree(copy.deepcopy(self.data), Places())
         apply_overrides(tree, [*overrides, "sweep=null"])
-        return _sound(tree).data
+        return tree.sound().data
 
     def digest(self, data: dict[str, Plain]) -> str:
         """Return the SHA-256 of a variant and of the contents of every file that it names."""
@@ -68,8 +67,7 @@ class SpecTemplate:
     def sweep(self) -> Sweep | None:
         """Return the checked `sweep` block; None if the spec has none.
 
-        Raises:
-            SpecError: With the place of every error in the block.
+        Raises `SpecError`: With the place of every error in the block.
         """
         if "sweep" not in self.data:
             return None
@@ -79,13 +77,6 @@ class SpecTemplate:
             found, places = translate(error, self.data["sweep"], Sweep), read(self.text, self.file).places
             absolute = [replace(one, path=("sweep", *one.path)) for one in found]
             raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
-
-
-def _sound(tree: Tree) -> Tree:
-    """The tree itself; its diagnostics are raised as a `SpecError`."""
-    if tree.diagnostics:
-        raise SpecError(tree.diagnostics)
-    return tree
 
 
 def read_template(
@@ -103,15 +94,14 @@ def read_template(
     """
     text, file = read_text(path) if text is None else text, os.fspath(path)
     folder = FilePath(path).parent
-    tree = _sound(read_tree(text, file, overrides, folder, confine))
+    tree = read_tree(text, file, overrides, folder, confine).sound()
     return SpecTemplate(text, file, folder, tuple(overrides), tree.data, tuple(tree.included), confine)
 
 
 def same_content(one: str, other: str) -> bool:
     """Whether two texts of a spec agree, apart from comments, layout and order of keys.
 
-    Raises:
-        SpecError: One of them is not YAML.
+    Raises `SpecError`: One of them is not YAML.
     """
     first, second = (read(text, "spec.yaml").data for text in (one, other))
     return fingerprint(first) == fingerprint(second)

@@ -58,7 +58,9 @@ class HeldLines(LinesBasis):
         """Return the ratio over the frequencies of values, see `LinesBasis.price`."""
         folded = [replace(one, density=self.folded(one.density)) for one in (price, value)]
         turned = np.mod(grid * self.hold, 2.0 * np.pi)
-        over = np.unique(np.concatenate([[0.0, np.pi], np.where(turned > np.pi, 2.0 * np.pi - turned, turned)]))
+        over = np.unique(
+            np.concatenate([[0.0, np.pi], np.where(turned > np.pi, 2.0 * np.pi - turned, turned)])
+        )
         return super().price(folded[0], folded[1], over)
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:

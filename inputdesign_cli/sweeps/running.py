@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, OutputError
@@ -46,37 +46,6 @@ class Listing(NamedTuple):
     status: str
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How far a sweep is: points passed (done before or now), computed now, and failed among those."""
-
-    total: int
-    passed: int
-    computed: int
-    failed: int
-
-
-@dataclass(frozen=True)
-class SweepSummary:
-    """What a sweep has come to: how many points have which status, and the first failure, if any.
-
-    `damaged` says why points of an earlier call were computed again.
-    """
-
-    directory: Path
-    total: int
-    computed: int
-    statuses: dict[str, int]
-    first_failure: IdesignError | None
-    files: list[Path] = field(default_factory=list)
-    damaged: list[str] = field(default_factory=list)
-
-    @property
-    def failures(self) -> int:
-        """How many points have no result though they were tried."""
-        return sum(n for status, n in self.statuses.items() if status in FAILURES)
-
-
 def list_points(plan: Plan, directory: Path) -> Iterator[Listing]:
     """Yield the points of a sweep and whether they are done; nothing is computed or written."""
     layout, names = Layout(directory), [axis.key for axis in plan.grid.axes]
@@ -101,7 +70,10 @@ class SweepRun:
         figures: draw the figures of every point too, not only of the sweep.
         figure_format: of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
-        watch: is called after every point.
+        watch: is called with this object after every point.
+        statuses: how many points have which status, once it has run; `files` that were written then.
+        passed: points that were done before or are now; `computed` and `failed` are those of this call.
+        damaged: why points of an earlier call were computed again.
     """
 
     plan: Plan
@@ -112,7 +84,9 @@ class SweepRun:
     figures: bool = False
     figure_format: str = "png"
     overwrite: bool = False
-    watch: Callable[[Progress], None] | None = None
+    watch: Callable[[SweepRun], None] | None = None
+    statuses: dict[str, int] = field(default_factory=dict, init=False)
+    files: list[Path] = field(default_factory=list, init=False)
     # By the key of a point that was looked at: its row, None while it is computed.
     rows: dict[str, Row | None] = field(default_factory=dict, init=False)
     passed: int = field(default=0, init=False)
@@ -121,8 +95,18 @@ class SweepRun:
     damaged: list[str] = field(default_factory=list, init=False)
     first_failure: IdesignError | None = field(default=None, init=False)
 
-    def run(self) -> SweepSummary:
-        """Compute what is not done yet, and write the table.
+    @property
+    def total(self) -> int:
+        """The number of points."""
+        return len(self.plan.grid)
+
+    @property
+    def failures(self) -> int:
+        """How many points have no result though they were tried."""
+        return sum(n for status, n in self.statuses.items() if status in FAILURES)
+
+    def run(self) -> Self:
+        """Compute what is not done yet, write the table, and return the sweep.
 
         Raises:
             OutputError: the directory cannot be used.
@@ -140,17 +124,16 @@ class SweepRun:
             try:
                 self._compute()
             finally:
-                statuses = self._write_table()
-                replace_text(directory / SUMMARY, json_text(plan.summary(made_from, statuses)))
+                self._write_table()
+                replace_text(directory / SUMMARY, json_text(plan.summary(made_from, self.statuses)))
             if self.fail_fast and self.first_failure:
                 raise self.first_failure
-            from inputdesign_cli.figures.sweep_figures import draw_sweep
+            from inputdesign_cli.figures.sweep import draw_sweep
             from inputdesign_cli.figures.sweep_table import read_sweep
 
-            files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
-            files += draw_sweep(read_sweep(directory), directory, self.figure_format)
-            found = (self.computed, statuses, self.first_failure, files, self.damaged)
-            return SweepSummary(directory, len(plan.grid), *found)
+            self.files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
+            self.files += draw_sweep(read_sweep(directory), directory, self.figure_format)
+            return self
 
     def _compute(self) -> None:
         """Compute what is not done yet."""
@@ -169,12 +152,12 @@ class SweepRun:
                 self._write_table()
                 due = time.monotonic() + max(_REST, _SHARE * (time.monotonic() - started))
 
-    def _write_table(self) -> dict[str, int]:
+    def _write_table(self) -> None:
         """Write sweep.csv as things stand, and count the points by status."""
         grid = self.plan.grid
         rows = [(point, self._row(self.plan.key(index))) for index, point in enumerate(grid)]
         replace_text(self.directory / TABLE, table_lines([axis.key for axis in grid.axes], rows))
-        return dict(sorted(Counter(row.status for _, row in rows).items()))
+        self.statuses = dict(sorted(Counter(row.status for _, row in rows).items()))
 
     def _row(self, key: str) -> Row:
         """Return the row of a point, from its files where it is computed or was not looked at."""
@@ -185,7 +168,7 @@ class SweepRun:
 
     def _jobs(self, shares_files: bool) -> Iterator[PointJob]:
         root, drawn = self.directory if shares_files else None, self.figure_format if self.figures else ""
-        for index in range(len(self.plan.grid)):
+        for index in range(self.total):
             if self.fail_fast and self.failed:
                 return
             key = self.plan.key(index)
@@ -247,4 +230,4 @@ class SweepRun:
     def _report(self) -> None:
         self.passed += 1
         if self.watch:
-            self.watch(Progress(len(self.plan.grid), self.passed, self.computed, self.failed))
+            self.watch(self)

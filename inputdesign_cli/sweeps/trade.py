@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.figures.sweep_table import SweepTable
-from inputdesign_cli.figures.trade import Trade
+from inputdesign_cli.figures.sweep_table import SweepTable, Trade
 from inputdesign_cli.specification import Spec
 
 _LENGTHS = (0.25, 0.5, 1.0, 2.0)

@@ -303,6 +303,7 @@ def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
 
 
 def test_a_report_replaces_pages_of_its_own_only(analyse, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("inputdesign_cli.report.run_page.run_charts", lambda *_, **__: {})
     assert analyse(write(tmp_path / "a.yaml", "a")) == (0, "")
 
     def report(name):
@@ -320,6 +321,7 @@ def test_a_report_replaces_pages_of_its_own_only(analyse, tmp_path, monkeypatch,
 
 
 def test_a_report_may_go_to_standard_output(analyse, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("inputdesign_cli.report.run_page.run_charts", lambda *_, **__: {})
     assert analyse(write(tmp_path / "a.yaml", "a")) == (0, "")
     before = set(tmp_path.rglob("*"))
     monkeypatch.setattr(sys, "argv", ["idesign", "report", "runs/a", "-o", "-"])

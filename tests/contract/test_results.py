@@ -6,13 +6,12 @@ proved gap, or another record of it came out.
 """
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.contract.condensed import condensed
+from tests.support.commands import caller
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -60,8 +59,8 @@ def differences(expected, found, where):
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in EXPECTED]
 )
-def test_results_hold_what_they_held(name, tmp_path):
-    run = [sys.executable, "-m", "inputdesign_cli", *map(str, command(name)), "-o", str(tmp_path / "run")]
-    subprocess.run([*run, "--no-figures", "--quiet"], cwd=ROOT, check=False, capture_output=True)
+def test_results_hold_what_they_held(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    caller(monkeypatch)(*command(name), "-o", tmp_path / "run", "--no-figures", "--quiet")
     found = condensed(json.loads((tmp_path / "run/result.json").read_text()))
     assert list(differences(EXPECTED[name], found, name)) == []

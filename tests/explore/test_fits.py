@@ -28,6 +28,7 @@ def test_the_fit_is_that_of_its_definition():
     assert found.simulation[0] == pytest.approx(plain, abs=0.3)
 
 
+@pytest.mark.slow
 def test_noise_explains_itself_by_chance_as_seldom_as_stated():
     """The best of 10 sets of three random signals explains that much in 5 % at most."""
     rng = np.random.default_rng(4)

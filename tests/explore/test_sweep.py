@@ -5,15 +5,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.explore.drift import levelled, slopes_of
-from inputdesign_cli.explore.sweep import (
-    Regressed,
-    arx_models,
-    delay_ranges,
-    noise_model,
-    sweep,
-    whitened,
-    whitening,
-)
+from inputdesign_cli.explore.sweep import Regressed, delay_ranges, noise_model, sweep, whitened, whitening
 from tests.explore.plants import column, held, with_noise
 
 
@@ -53,20 +45,6 @@ def test_poles_of_a_second_order_are_found_in_several_records():
     assert swept.best.order in (2, 3)
     left = sum(e @ e for e in Regressed(parts, 2).errors(swept.by_order[2])) / 1200
     assert left == pytest.approx(swept.by_order[2].loss)
-
-
-def test_arx_models_are_those_of_least_squares():
-    """All of them from one matrix of products; each is compared with a regression of its own."""
-    rng = np.random.default_rng(4)
-    u, y = record(rng, 2)
-    first = 3 + 2
-    for a, b, theta, loss, rows in arx_models([(u, y)], 3, (2,)):
-        own = [-y[first - k : len(y) - k, 0] for k in range(1, a + 1)]
-        own += [u[first - 2 - k : len(u) - 2 - k, 0] for k in range(b)]
-        columns = np.stack([*own, np.ones(len(y) - first)], axis=1)
-        expected, left, *_ = np.linalg.lstsq(columns, y[first:, 0], rcond=None)
-        np.testing.assert_allclose(theta, expected[:-1], rtol=1e-4, atol=1e-6)
-        assert loss * rows == pytest.approx(float(left[0]), rel=1e-6)
 
 
 def test_records_through_an_autoregression_are_white():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.campaign import draw_campaign
+from inputdesign_cli.figures.studies import draw_campaign
 from inputdesign_cli.figures.style import painted
 from inputdesign_cli.outcome.curves import CampaignCurves
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.trade import Trade, draw_trade
+from inputdesign_cli.figures.sweep import draw_trade
+from inputdesign_cli.figures.sweep_table import Trade
 from inputdesign_cli.outcome.curves import BoundCurves, BoundPanel, OrderCurves, ResponseCurves
 from tests.support.curves import SEEN, G, W, lines_by_label
 
@@ -52,6 +53,7 @@ def test_every_amplitude_of_a_trade_is_drawn():
     assert apart(list(drawn.values()))
 
 
+@pytest.mark.slow
 def test_ratios_of_nine_entries_are_told_apart(page):
     panels = tuple(
         BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=entry) for entry in product(range(3), repeat=2)

@@ -4,7 +4,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from inputdesign_cli.figures.style import rendered
-from inputdesign_cli.figures.sweep_figures import draw_sweep, sweep_figures
+from inputdesign_cli.figures.sweep import draw_sweep, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepAxis, SweepContent, SweepTable
 
 

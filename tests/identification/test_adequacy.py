@@ -151,6 +151,7 @@ def test_a_drift_is_found():
     assert [test.fault for test in found.tests.failed][-1] == "drift"
 
 
+@pytest.mark.slow
 def test_a_drift_of_one_output_is_found_in_s():
     rng = np.random.default_rng(5)
     model, u = two_by_two(), rng.standard_normal((400, 2))

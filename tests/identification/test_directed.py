@@ -160,6 +160,7 @@ def test_a_dead_time_in_s_is_found(hold):
     assert test.larger.theta[test.larger.names.index("delay")] == pytest.approx(0.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_level_and_a_state_add_unknowns_not_verdicts():
     u, y = (x[0] for x in data("oe", 150, np.random.default_rng(7)))
     found = identify(one_channel([0, 1.0, 0.5], F=[1, -0.7]), u, y + 30.0, rest=False)

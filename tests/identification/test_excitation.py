@@ -53,6 +53,7 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=2, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])

@@ -67,6 +67,7 @@ def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
     )
 
 
+@pytest.mark.slow
 @SEEDS
 def test_a_rich_record_leaves_no_rival(seed):
     assert estimated("binary", seed)[0].search.rivals == ()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, ModelReference, PowerLimit
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, ModelReference
 from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.identification.polynomial_rows import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.loop_error import error_filters, prefilter, study_losses

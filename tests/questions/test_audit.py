@@ -41,7 +41,10 @@ DESIGNS = {
 }
 
 
-@pytest.fixture(scope="module", params=DESIGNS)
+SLOW = pytest.mark.slow
+
+
+@pytest.fixture(scope="module", params=[pytest.param(n, marks=SLOW) if n == "two" else n for n in DESIGNS])
 def designed(request):
     task = build_task(parse_spec(DESIGNS[request.param]))
     done = task.designed()

@@ -11,7 +11,9 @@ from inputdesign_cli.questions.common.spectrum import axis, distinct
 SPECS = Path(__file__).parents[2] / "specs"
 
 
-@pytest.fixture(scope="module", params=["two_by_two_loop", "first_order"])
+@pytest.fixture(
+    scope="module", params=["first_order", pytest.param("two_by_two_loop", marks=pytest.mark.slow)]
+)
 def design(request):
     return solve(load_spec(SPECS / f"{request.param}.yaml"))
 

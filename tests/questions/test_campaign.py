@@ -11,7 +11,7 @@ from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.identification import identify, information_of_data
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.campaign.build import build_campaign, build_planner, build_rules
-from inputdesign_cli.questions.campaign.plans import ratio_of, standing
+from inputdesign_cli.questions.campaign.plans import standing
 from inputdesign_cli.questions.campaign.rounds import continued
 from inputdesign_cli.questions.campaign.schedule import Schedule, Standing
 from inputdesign_cli.questions.campaign.study import ways_of
@@ -116,7 +116,7 @@ def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
     assert coefficients[0] == pytest.approx(coefficients[1], rel=1e-9)
     # The ratio is what the design says of the prior alone.
     question = at.question(model, known.information)
-    assert ratio_of(question, question.information) == pytest.approx(known.ratio)
+    assert question.ratio(question.information) == pytest.approx(known.ratio)
 
 
 def test_a_plan_that_ends_with_its_part_is_made_for_what_the_data_leave_open():

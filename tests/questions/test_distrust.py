@@ -28,6 +28,7 @@ def static_gain(theta):
     return theta.get("K", b / (1.0 + below))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integral", [0.0, pytest.param(0.1, marks=pytest.mark.slow)], ids=["P", "PI"])
 def test_the_inverse_of_a_controller_is_no_plant(integral, tmp_path):
     """Control without a reference: u = -C y + dither, and y moves by its own noise."""

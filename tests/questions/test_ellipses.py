@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import analyse, load_spec, solve
-from inputdesign_cli.figures.ellipses import boundary
+from inputdesign_cli.figures.estimates import boundary
 
 SPECS = Path(__file__).parents[2] / "specs"
 

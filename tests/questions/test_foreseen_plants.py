@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.questions.building.knowledge import build_foreseen
 from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.questions.building.uncertainty import build_foreseen
 
 SPEC = """
 sample_time: 5

@@ -113,9 +113,8 @@ def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
 def test_without_time_nothing_is_begun():
     asked = build_convex(load_spec("specs/heater.yaml"))
     with time_limit(0.01):
-        foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), ())
-    assert foreseen.entry is None
-    (found,) = foreseen.findings
+        entry, (found,) = asked.foresight.foreseen(np.ones((SAMPLES, 1)), ())
+    assert entry is None
     assert found.code == "other-minima-not-looked-at"
     assert "solver.time_limit left no time" in found.message
 

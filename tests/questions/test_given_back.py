@@ -14,8 +14,8 @@ from inputdesign_cli.spectrum import TabulatedSpectrum
 SPECS = Path(__file__).parents[2] / "specs"
 # Those whose design is a density that just meets what is asked.
 DENSITIES = (
-    *("application", "campaign", "first_order", "flexible_transmission", "weighted_variance"),
-    *(pytest.param(name, marks=pytest.mark.slow) for name in ("limited_signal", "motor_loop")),
+    *("application", "first_order", "weighted_variance"),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("flexible_transmission", "motor_loop")),
     *(pytest.param(name, marks=pytest.mark.slow) for name in ("two_by_two_arx", "two_by_two_loop")),
 )
 _OF_THE_DESIGN = ("limits", "simulation", "objective", "solver", "uncertainty", "campaign")

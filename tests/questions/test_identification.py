@@ -115,6 +115,7 @@ def test_offsets_and_outliers_are_told(write):
     assert not known.result["identification"]["free_start"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_short_pilot_from_rest_is_not_said_to_begin_otherwise(write, seed):
     """Nor does its estimate of C run to the unit circle, which would remember for ever what was before it."""
@@ -146,7 +147,8 @@ def test_noise_from_before_the_record_is_no_start_in_motion(write, seed):
     assert "start-estimated" not in {one["code"] for one in result.get("findings", [])}
 
 
-def test_an_operating_point_does_not_move_the_estimate(write):
+@pytest.mark.parametrize("others", [(), pytest.param((False, True), marks=pytest.mark.slow)])
+def test_an_operating_point_does_not_move_the_estimate(write, others):
     """Known, unknown, or its means removed: the same model, within a standard deviation."""
     columns = record(np.random.default_rng(3).standard_normal(500))
     plain = identify(load_spec(SPEC), write(columns)).result["identification"]
@@ -155,9 +157,8 @@ def test_an_operating_point_does_not_move_the_estimate(write):
     spec = load_spec(SPEC, ["signal.offset=40"])
     ways = [
         identify(spec, write(moved), operating_point={"y1": 52.3}),
-        identify(load_spec(SPEC), write(moved)),
-        identify(load_spec(SPEC), write(moved), remove_means=True),
         identify(spec, write({**moved, "y1": moved["y1"] + 40.0 * gain})),
+        *(identify(load_spec(SPEC), write(moved), remove_means=removed) for removed in others),
     ]
     for n, found in enumerate(way.result["identification"] for way in ways):
         for name, value in plain["theta"].items():

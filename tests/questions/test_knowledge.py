@@ -44,7 +44,7 @@ def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
     assert found.verdict == "met"
     assert "rivals" not in identification
     assert identification["ruled_out"][0]["theta"]["L"] == pytest.approx(HEATER[2] + PERIOD * H, abs=20.0)
-    assert "far outside the uncertainty of the plant" in said(found.results)
+    assert "The uncertainty excludes another minimum" in said(found.results)
 
 
 @pytest.mark.slow

@@ -83,6 +83,7 @@ def recorded_in_s(spec, samples, hold, rng):
     return {"time_s": step * np.arange(samples), "u1": u[:, 0], "u2": u[:, 1], "y1": y[:, 0], "y2": y[:, 1]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("denominator", [pytest.param(EACH, marks=pytest.mark.slow), "[1, 1.5, 1.5]"])
 def test_plants_in_s_come_back(hold, denominator, write):

@@ -74,6 +74,7 @@ def test_decoupled_loops_cost_as_much_as_each_alone():
     assert design.objective == pytest.approx(sum(costs), rel=2e-6)
 
 
+@pytest.mark.slow
 def test_what_a_design_writes_is_what_an_analysis_reads(tmp_path):
     """The powers and the accuracy of spectrum.csv, and of signal.csv, as given excitations."""
     outcome = solve(changed("signal={samples: 2000, seed: 1, scale: design}"))

@@ -246,7 +246,7 @@ def test_the_result_does_not_depend_on_where_it_is_computed(spec, overrides):
     assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [True, False])
 def test_plants_in_s_keep_their_promise(hold):
     overrides = ["plant.sample=zoh"] if hold else []

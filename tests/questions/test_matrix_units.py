@@ -17,7 +17,7 @@ accuracy: {model_error: {relative: 0.1}}
 MILLI = "plant.B=[[[0, 1.0, 0.4], [0, -0.0005, 0.0003]], [[0, 0.6, 0.2], [0, 0.0012, -0.0005]]]"
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("spectrum", ["{type: fir, order: 4}", "{type: free}"])
 @pytest.mark.parametrize(
     ("asked", "same"),

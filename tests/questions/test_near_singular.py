@@ -64,7 +64,7 @@ signal: {{seed: 1}}
 """
     found = solve(parse_spec(text)).result
     assert ("worst_ratio" in found["signal"]) == told
-    assert any("working precision" in note for note in found.get("notes", [])) != told
+    assert ("record-undetermined" in [one["code"] for one in found.get("findings", [])]) != told
     if told:  # by 60 digits: 0.999999990644
         assert math.isclose(found["signal"]["worst_ratio"], 1.0, abs_tol=1e-6)
 
@@ -86,7 +86,7 @@ def test_what_another_excitation_could_tell_is_not_called_impossible():
     lines = ["limits={band: [0.01, 3.14]}", "spectrum={type: multisine, lines: 20}"]
     result = solve(parse_spec(NEAR, overrides=lines)).result
     assert result["status"] == "optimal"
-    assert "the slowest mode has a time constant of" in result["notes"][0]
+    assert result["findings"][0]["code"] == "experiment-short"
 
 
 @pytest.mark.parametrize(("pole", "told"), [(0.5, False), (0.99, False), (0.999, True)])

@@ -138,6 +138,7 @@ def test_the_words_of_a_model_are_read_back(plant):
     np.testing.assert_allclose(again.plant_at(w), moved.plant_at(w), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_study_estimates_the_named_parameters():
     spec = spec_of(WORDS["process"], REST + "simulation: {runs: 20, seed: 1}\n")
     found = simulate(spec).result["simulation"]["inputs"]["design"]

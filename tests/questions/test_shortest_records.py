@@ -12,9 +12,8 @@ from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.time_limit import OutOfTimeError
-from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.questions.common.record import Made, make_record
-from inputdesign_cli.questions.least_cost.shortest_record import ShortestRecord, Way
+from inputdesign_cli.questions.least_cost.record_search import ShortestRecord, Way
 from inputdesign_cli.questions.task import build_task
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.selection import Record
@@ -29,15 +28,6 @@ limits: {amplitude: 1}
 signal: {candidates: 2, seed: 0}
 solver: {any_spectrum: false}
 """
-MOVES = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-accuracy: {model_error: {relative: 0.05, alpha: 2.45}}
-spectrum: {type: fir, order: 8}
-limits: {amplitude: 0.7, rate: 0.9}
-signal: {candidates: 2}
-solver: {any_spectrum: false}
-"""
 TWO = """
 plant:
   A: [1, -0.7]
@@ -50,43 +40,6 @@ signal: {candidates: 1}
 solver: {any_spectrum: false}
 """
 SHORTEST = "objective: shortest_experiment\n"
-
-
-def meets(text: str, samples: int, objective: str) -> bool:
-    """Whether `solve` at a stated length finds a record that meets the accuracy."""
-    stated = f"{text}experiment: {{samples: {samples}}}\nobjective: {objective}\n"
-    try:
-        signal = solve(parse_spec(stated)).result["signal"]
-    except IdesignError:
-        return False
-    return signal["worst_ratio"] <= 1.0 + 1e-9
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("texts", "objectives"),
-    [
-        pytest.param(
-            [LAG.replace("seed: 0", f"seed: {seed}") for seed in range(3)],
-            ["least_cost", "best_accuracy"],
-            marks=pytest.mark.slow,
-        ),
-        ([MOVES], ["best_accuracy"]),
-        ([TWO], ["least_cost"]),
-    ],
-    ids=["lag", "moves", "two inputs"],
-)
-def test_hardly_a_shorter_stated_length_meets_the_accuracy(texts, objectives):
-    """With 40 samples whose phases are tried twice, one in four may meet it by chance."""
-    tries = []
-    for text in texts:
-        found = solve(parse_spec(text + SHORTEST)).result
-        samples = found["signal"]["samples"]
-        assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
-        assert samples >= found["samples"]
-        shorter = {int(samples * share) for share in (0.9, 0.96)} - {samples}
-        tries += [meets(text, length, objective) for objective in objectives for length in shorter]
-    assert sum(tries) <= 0.25 * len(tries)
 
 
 @dataclass
@@ -302,19 +255,3 @@ def test_what_is_known_may_do_without_an_experiment(text, more):
     found = solve(parse_spec(text + SHORTEST + prior)).result
     assert (found["status"], found["objective"]["value"]) == ("nothing_needed", 0.0)
     assert "signal" not in found
-
-
-@pytest.mark.slow
-def test_records_shorter_than_a_dead_time_do_not_end_the_search():
-    """The spectrum alone would take fewer than the dead time of twelve; wider limits never take longer."""
-    late = LAG.replace("B: [0, 1.0]", "B: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1.0]").replace(
-        "candidates: 2", "type: binary"
-    )
-    lengths = [
-        solve(parse_spec(late.replace("amplitude: 1", f"amplitude: {a}") + SHORTEST)).result["signal"][
-            "samples"
-        ]
-        for a in (1.0, 2.0, 3.0, 5.0, 8.0)
-    ]
-    assert lengths == sorted(lengths, reverse=True)
-    assert lengths[-1] > 12

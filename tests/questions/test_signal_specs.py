@@ -105,6 +105,10 @@ def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not
     moves = np.abs(np.diff(outcome.tables["signal"].columns["u1"], prepend=0.0))
     assert np.isclose(moves, 0.1).mean() > 0.5
     assert moves.max() <= 0.1
+
+
+@pytest.mark.slow
+def test_where_noise_does_not_fit_ramps_between_two_levels_are_named():
     with pytest.raises(InfeasibleError) as error:
         solve(parse_spec(SLOW + "signal: {type: filtered_noise}\n"))
     assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
@@ -182,9 +186,9 @@ def test_the_share_of_each_limit_that_single_samples_take():
     assert shares == pytest.approx({"amplitude.input": np.abs(u).max() / 1.6, "rate": moves.max() / 1.6})
     assert shares["rate"] == pytest.approx(2.0 * shares["amplitude.input"])
     assert 0.98 < shares["rate"] <= 1.0 + 1e-9
-    (note,) = [note for note in outcome.result["notes"] if "shortest record" in note]
+    (longer,) = [one for one in outcome.result["findings"] if one["code"] == "record-longer"]
     rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
-    assert note.endswith(f"the record takes {rate} of limits.rate")
+    assert f"{rate} of limits.rate" in longer["message"]
     (said,) = [value for name, value, _ in facts(outcome.outcome, "s") if name == "limits"]
     assert said.endswith(f"single samples take {rate} of rate, {values} of input amplitude")
     assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))

@@ -13,6 +13,7 @@ from inputdesign_cli import load_spec, solve
 SPEC = Path(__file__).parent.parent.parent / "specs" / "two_by_two_arx.yaml"
 
 
+@pytest.mark.slow
 def test_limits_on_each_channel():
     changes = [
         "spectrum.order=4",

@@ -9,22 +9,22 @@ FIRST = "specs/first_order.yaml"
 
 @pytest.fixture(scope="module")
 def flexible():
-    return simulate(load_spec(FLEXIBLE)).result
+    return simulate(load_spec(FLEXIBLE, ["simulation.runs=200"])).result
 
 
 def test_the_flexible_transmission_keeps_its_promise_on_its_model_only(flexible):
     # Errata: 83 % of the runs for the design and 93 % for the white input on the true plant; 99 % and 100 %
-    # where the plant is the design model. Four standard errors of 500 runs are 6.7, 4.6 and 1.8 %.
+    # where the plant is the design model. Four standard errors of 200 runs are 10.6, 7.3 and 2.8 %.
     design = flexible["simulation"]["inputs"]["design"]
     white = flexible["simulation"]["inputs"]["white_that_suffices"]
-    assert design["within_r_adm"] == pytest.approx(0.83, abs=0.067)
-    assert white["within_r_adm"] == pytest.approx(0.93, abs=0.046)
-    assert design["on_design_model"]["within_r_adm"] == pytest.approx(0.99, abs=0.018)
-    assert white["on_design_model"]["within_r_adm"] > 0.985
+    assert design["within_r_adm"] == pytest.approx(0.83, abs=0.106)
+    assert white["within_r_adm"] == pytest.approx(0.93, abs=0.073)
+    assert design["on_design_model"]["within_r_adm"] == pytest.approx(0.99, abs=0.028)
+    assert white["on_design_model"]["within_r_adm"] > 0.97
     low, middle, high = design["violations"]["frequency_quantiles"]
     assert 0.36 < low < middle < high < 0.42
     found = f"{100 * design['within_r_adm']:.0f} %"
-    assert any(found in note and "initial estimate" in note for note in flexible["notes"])
+    assert any(found in note and "not the design model" in note for note in flexible["notes"])
 
 
 def test_powers_are_those_of_the_loop(flexible):

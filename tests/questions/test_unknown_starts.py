@@ -1,6 +1,7 @@
 """Records that live on their start from rest say so: errors with unknown starts, by plain regression."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,13 @@ import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_begun_anywhere
+from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.outcome.design import RequirementMet, Signal
 from inputdesign_cli.outcome.estimate import Assessment
 from inputdesign_cli.outcome.outcome import Outcome
 from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.questions.common.task import growth_by_start
+from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.report.facts import verdict
 
 N = 500
@@ -75,6 +79,19 @@ def test_a_plant_that_forgets_its_start_has_no_note():
     done, notes = told(SETTLED)
     assert notes == []
     assert "begun_anywhere" not in done.result["signal"]
+
+
+def test_what_later_samples_show_bounds_what_an_unknown_start_costs():
+    task = build_convex(parse_spec(SETTLED))
+    record, nominal = task.delivered().record, task.simulation.nominal
+    experiment = replace(nominal, samples=len(record))
+    plant = FiniteRecord(experiment, len(record))
+    found = growth_by_start(
+        experiment, record, 1.0, [make(experiment) for make in task.asked.question.requirements]
+    )
+    anywhere = information_begun_anywhere(experiment.model, record, plant.signals("output", record), 1.0)
+    (exact,) = np.sqrt(np.diag(plant.information(record)) / np.diag(plant.known + anywhere))
+    assert 1.0 < exact <= found <= 1.2
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,7 @@ def test_a_far_estimate_contradicts_the_spec_by_its_statistic_alone(deviations, 
     )
     distance = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2))
     assert distance.nominal.probability == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
-    assert [one.code for one in far_from_nominal(UNITS, distance)] == ["another-plant"] * contradicts
+    assert [one.code for one in far_from_nominal(distance)] == ["another-plant"] * contradicts
 
 
 @pytest.mark.parametrize(("admitted", "contradicts"), [(0.5, True), (30.0, False)])
@@ -203,5 +203,5 @@ def test_a_difference_that_nothing_is_asked_of_contradicts_nothing(admitted, con
         admissible=SimpleNamespace(at=lambda w: np.full(w.shape, admitted)),
     )
     distance = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2), asked=True)
-    (found,) = far_from_nominal(UNITS, distance)
+    (found,) = far_from_nominal(distance)
     assert found.code == ("another-plant" if contradicts else "far-from-the-spec")

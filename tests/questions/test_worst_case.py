@@ -28,7 +28,7 @@ def test_of_an_interval_the_end_that_asks_for_most_is_found():
     assert "risk" not in found["robust"]  # the plant was not drawn
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "covariance"), [(FIRST, COVARIANCE), (LOOP, "[[0.001, 0.0003], [0.0003, 4.0e-4]]")]
 )

@@ -235,14 +235,6 @@ def test_no_damage_to_a_file_leads_to_another_error(kind, tmp_path):
             read_log(path, Preparation(columns={"u1": "u", "y1": "y"}))
 
 
-def test_elements_of_no_known_type_do_not_end_the_program(tmp_path):
-    scipy.io.savemat(tmp_path / "log.mat", {"u": U, "y": Y})
-    broken = bytearray((tmp_path / "log.mat").read_bytes())
-    broken[176] = 0  # the type of the numbers of u
-    (tmp_path / "log.mat").write_bytes(broken)
-    assert refused(tmp_path / "log.mat").code == "data-unreadable"
-
-
 def named(path, wanted=None):
     started = time.monotonic()
     with pytest.raises(DataError) as caught:

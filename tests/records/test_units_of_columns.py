@@ -116,6 +116,14 @@ def test_an_input_that_may_be_in_two_columns_is_refused(header, log):
     assert "--columns u1=u" in raised.value.diagnostics[0].hint
 
 
+def test_of_several_inputs_the_first_has_its_number(tmp_path):
+    (tmp_path / "d.csv").write_text(
+        "u,u1,u2,y\n" + "".join(f"{k},{k % 3},{k % 5},{k % 7}\n" for k in range(20))
+    )
+    record = read_data([tmp_path / "d.csv"], replace(UNITS, inputs=2), Preparation())
+    np.testing.assert_array_equal(record.u.T, [np.arange(20) % 3, np.arange(20) % 5])
+
+
 def test_the_variance_of_noise_that_is_estimated_need_not_be_stated():
     for noise in ("", "noise: {C: [1, 0.1]}\n"):
         parse_spec(STRUCTURE + noise, design=False)

@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 from datetime import datetime
-from functools import reduce
+from functools import cache, reduce
 from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree
@@ -22,11 +22,13 @@ from tests.support.outcomes import typed
 from tests.support.pages import XHTML, parse, words
 from tests.support.sweep_files import run_sweep
 
+page_of = cache(report_text)  # the pictures of a page take most of its time
+
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", ["open", "closed"])
 def test_the_page_of_a_run(runs, name):
-    page = parse(report_text(runs / name))
+    page = parse(page_of(runs / name))
     result = json.loads((runs / name / "result.json").read_text())
     headings = [element.text for element in page.iter(f"{XHTML}h2")]
     loop = ["The loop"] if name == "closed" else []
@@ -60,7 +62,7 @@ def test_the_page_of_a_run(runs, name):
 
 def test_a_page_tells_which_result_it_is_about(runs):
     digest = hashlib.sha256((runs / "open" / "result.json").read_bytes()).hexdigest()
-    page = parse(report_text(runs / "open"))
+    page = parse(page_of(runs / "open"))
     (stamp,) = [meta for meta in page.iter(f"{XHTML}meta") if meta.get("name") == "sha256"]
     assert stamp.get("content") == digest
     assert digest in words(page)
@@ -122,7 +124,7 @@ def test_a_pipe_in_a_run_directory_is_not_waited_for(runs, tmp_path, name):
 
 
 def test_charts_are_pictures_with_words(runs):
-    page = parse(report_text(runs / "closed"))
+    page = parse(page_of(runs / "closed"))
     images = list(page.iter(f"{XHTML}img"))
     assert len(images) == 5
     for image in images:
@@ -133,10 +135,11 @@ def test_charts_are_pictures_with_words(runs):
 
 
 def test_the_same_run_gives_the_same_page(runs):
-    assert report_text(runs / "open") == report_text(runs / "open")
+    assert report_text(runs / "open") == page_of(runs / "open")
 
 
-def test_a_simulation_of_an_unknown_kind_is_among_all_numbers(runs, tmp_path):
+def test_a_simulation_of_an_unknown_kind_is_among_all_numbers(runs, tmp_path, monkeypatch):
+    monkeypatch.setattr("inputdesign_cli.report.run_page.run_charts", lambda *_, **__: {})
     shutil.copytree(runs / "open", tmp_path / "run")
     file = tmp_path / "run" / "result.json"
     simulation = {"runs": 10, "seed": 1, "inputs": {"white": {"a": 0.5}}}
@@ -152,7 +155,7 @@ def test_the_sources_of_a_run_are_those_of_the_bibliography(runs):
     keys = re.findall(r"^@\w+\{(.*),$", text, re.MULTILINE)
     assert keys == ["bombois-least-costly", "kiefer-wolfowitz-1960", "ljung-1999"]
     assert text.count("{") == text.count("}")
-    said = words(parse(report_text(runs / "open")))
+    said = words(parse(page_of(runs / "open")))
     assert all(title in said for title in re.findall(r"title = \{(.*)\}", text))
     known = (resources.files("inputdesign_cli.report") / "sources.bib").read_text()
     listed = (Path(__file__).parents[2] / "docs" / "references.md").read_text()

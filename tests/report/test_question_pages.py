@@ -19,7 +19,7 @@ from tests.support.pages import LOOP, SPEC, XHTML, parse, rows, words
 SPECS = Path(__file__).parents[2] / "specs"
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("name", "overrides", "verb", "said"),
     [

@@ -25,7 +25,7 @@ RAW = (
 )  # fmt: skip
 
 quick = settings(
-    max_examples=60, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+    max_examples=30, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -139,7 +139,7 @@ def mutated(draw):
     return data
 
 
-@settings(quick, max_examples=150)
+@settings(quick, max_examples=60)
 @given(mutated())
 def test_examples_with_parts_replaced(data):
     read_or_complain(yaml.safe_dump(data, allow_unicode=True, default_flow_style=None))

@@ -16,7 +16,8 @@ noise: {variance: 1.0}
 experiment: {samples: 200}
 accuracy: {model_error: {relative: 0.05, alpha: 2.45}}
 spectrum: {type: fir, order: 4}
-signal: {candidates: 2}
+signal: {candidates: 1}
+solver: {any_spectrum: false}
 campaign: {block: 60}
 """
 GAIN, POLE = 3.5, 0.72

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from inputdesign_cli.design.loop_error import LoopErrorProblem, MatrixPlant, ModelReference, PowerLimit
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.loop_error import LoopErrorProblem, MatrixPlant, ModelReference
 from inputdesign_cli.plant import TransferMatrix, zero_order_hold
 
 POLE = np.exp(-2 / 75)

@@ -42,7 +42,7 @@ DAMAGES = {
 }
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
     out, run = swept

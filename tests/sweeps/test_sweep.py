@@ -23,7 +23,10 @@ def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
     seen = []
     out = tmp_path / "out"
     done = run_sweep(
-        spec, ["experiment.samples=10,20", "spectrum.order=0:2:1"], directory=out, watch=seen.append
+        spec,
+        ["experiment.samples=10,20", "spectrum.order=0:2:1"],
+        directory=out,
+        watch=lambda p: seen.append((p.passed, p.computed)),
     )
     assert done.statuses == {"optimal": 6}
     table = rows(out)
@@ -42,7 +45,7 @@ def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
     assert {p.name for p in out.iterdir()} == {
         "sweep.csv", "sweep.json", "sweep.yaml", "points", "curves.png", "map.png", ".lock", ".process"
     }  # fmt: skip
-    assert [(p.passed, p.computed) for p in seen] == [(i, i) for i in range(1, 7)]
+    assert seen == [(i, i) for i in range(1, 7)]
 
 
 def test_a_second_call_computes_nothing_and_a_wider_one_the_rest(spec, stub, tmp_path):
@@ -233,6 +236,7 @@ def test_a_number_has_the_fewest_digits_that_can_be_read_back():
     assert [found[name] for name in "abcn"] == ["0.1", "0.3333333333333333", "2", "7"]
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_process_gives(spec, tmp_path):
     settings = ["experiment.samples=50,100,-1", "spectrum.order=1,2"]
     run_sweep(spec, settings, directory=tmp_path / "one")

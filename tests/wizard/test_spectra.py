@@ -66,6 +66,7 @@ def test_gaps_are_told_without_exponents():
     assert "e+" not in draft.text
 
 
+@pytest.mark.slow
 def test_the_record_does_not_repeat():
     """A record that repeats every 120 samples would tell a dead time up to 600 s only."""
     spec = compose(ENGINEER, "x", Path()).spec().with_(uncertainty=None, **{"signal.candidates": 1})

@@ -99,7 +99,7 @@ class Windows:
             letter = int(choice[state])
             letters.append(letter)
             state = (state * len(self.letters) + letter) % self.states
-        return self.letters[letters[seen[state]:]]
+        return self.letters[letters[seen[state] :]]
 
     def lags(self, cycle: Array) -> Array:
         """Return the autocovariances E u_t u_(t-k)^T, k < m, of a periodic signal (period, r), (m, r, r)."""

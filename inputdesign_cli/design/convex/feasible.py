@@ -171,9 +171,7 @@ def _within_limits(
 def _known_within_limits(problem: Problem, start: Array, free: ExchangeResult) -> ExchangeResult | None:
     if _keeps_limits(problem, free):
         return _unweighted(problem, free)
-    even = scaled_up(
-        replace(problem, limits=(), densities=(), polytope=None, finer=problem), start, 0.0, []
-    )
+    even = scaled_up(replace(problem, limits=(), densities=(), polytope=None, finer=problem), start, 0.0, [])
     found = replace(
         free,
         basis=problem.basis,

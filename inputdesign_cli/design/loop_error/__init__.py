@@ -20,7 +20,4 @@ from inputdesign_cli.design.loop_error.parametric import (
     ParametricCriterion as ParametricCriterion,
 )
 from inputdesign_cli.design.loop_error.plant import MatrixPlant as MatrixPlant
-from inputdesign_cli.design.loop_error.problem import (
-    LoopErrorProblem as LoopErrorProblem,
-    PowerLimit as PowerLimit,
-)
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem as LoopErrorProblem

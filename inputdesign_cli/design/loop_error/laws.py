@@ -27,13 +27,7 @@ from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.information.quadrature import Quadrature
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import (
-    delay_of,
-    determinant_and_adjugate,
-    join_roots,
-    roots_in_z,
-    unit_circle,
-)
+from inputdesign_cli.plant.polynomial import all_roots, delay_of, determinant_and_adjugate, unit_circle
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
 
@@ -145,7 +139,7 @@ class _DesiredLaw:
         whole = self.desired.whole
         numerator, d = whole.common_fraction()
         zeros = [determinant_and_adjugate(N)[0] for N in (complement(numerator, d), numerator)]
-        return logarithmic_distance(join_roots([whole.poles, *map(roots_in_z, zeros)]))
+        return logarithmic_distance(np.append(whole.poles, all_roots(zeros)))
 
 
 @dataclass(frozen=True)
@@ -250,5 +244,4 @@ class MinimumVariance:
     @property
     def singularities(self) -> ComplexArray:
         """See `ControlLaw`."""
-        roots = [roots_in_z(terms) for terms in self._terms()]
-        return np.concatenate([self.plant.singularities, logarithmic_distance(join_roots(roots))])
+        return np.append(self.plant.singularities, logarithmic_distance(all_roots(self._terms())))

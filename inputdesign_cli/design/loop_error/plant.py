@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, roots_in_z, stack
+from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, roots_in_z
 from inputdesign_cli.plant.polynomial_model import PolynomialModel
-from inputdesign_cli.plant.transfer import product_of
 
 
 class MatrixPlant(PolynomialModel):
@@ -33,14 +32,10 @@ class MatrixPlant(PolynomialModel):
         H = self.noise_at(w)
         return H @ self.covariance @ np.conj(np.swapaxes(H, 1, 2))
 
-    @cached_property
+    @property
     def numerator(self) -> Array:
         """N (outputs, inputs, l): G = R^-1 N with R diagonal, R_i = A_i prod_j F_ij."""
-        rows = [
-            [product_of([b, *below[:j], *below[j + 1 :]]).tolist() for j, b in enumerate(above)]
-            for above, below in zip(self.B, self.F, strict=True)
-        ]
-        return stack(rows)
+        return self._fractions[:, 1:]
 
     @cached_property
     def _inverse(self) -> tuple[Array, Array]:

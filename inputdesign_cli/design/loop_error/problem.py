@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.convex import limits as convex
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.loop_error.closed_form import (
     adjoint,
     best_spectrum,
@@ -33,22 +32,14 @@ _HALVINGS = 4
 _WHITE = Rational(np.ones(1))
 
 
-@dataclass(frozen=True)
-class PowerLimit:
-    """mean tr(M Phi) <= most, M of one input or output, of its moves, or of all of them (channel None)."""
-
-    kind: Literal["input", "output", "moves"]
-    most: float
-    channel: int | None = None
-
-    def metric(self, w: ArrayLike, G: ComplexArray) -> ComplexArray:
-        """M (K, n, n), G that of the plant at the frequencies."""
-        size = G.shape[1] if self.kind == "output" else G.shape[2]
-        picked = np.eye(size) if self.channel is None else np.diag(np.eye(size)[self.channel])
-        if self.kind == "output":
-            return np.asarray(adjoint(G) @ picked @ G)
-        share = np.abs(1.0 - np.exp(-1j * np.atleast_1d(w))) ** 2 if self.kind == "moves" else np.ones(len(G))
-        return np.asarray(share[:, None, None] * picked.astype(complex))
+def metric(limit: PowerLimit, w: ArrayLike, G: ComplexArray) -> ComplexArray:
+    """Return M (K, n, n) with mean tr(M Phi) the limited power; G is that of the plant at `w`."""
+    size = G.shape[1] if limit.kind == "output" else G.shape[2]
+    picked = np.eye(size) if limit.channel is None else np.diag(np.eye(size)[limit.channel])
+    if limit.kind == "output":
+        return np.asarray(adjoint(G) @ picked @ G)
+    share = np.abs(1.0 - np.exp(-1j * np.atleast_1d(w))) ** 2 if limit.kind == "moves" else np.ones(len(G))
+    return np.asarray(share[:, None, None] * picked.astype(complex))
 
 
 @dataclass(frozen=True)
@@ -95,12 +86,12 @@ class LoopErrorProblem:
     def metrics(self, w: ArrayLike) -> ComplexArray:
         """M_i (p, K, n, n) of the limits."""
         G = self.plant.plant_at(w)
-        return np.array([limit.metric(w, G) for limit in self.limits])
+        return np.array([metric(limit, w, G) for limit in self.limits])
 
     @cached_property
     def most(self) -> Array:
         """Return the limits on the powers, (p,)."""
-        return np.array([limit.most for limit in self.limits])
+        return np.array([limit.bound for limit in self.limits])
 
     @cached_property
     def singularities(self) -> ComplexArray:
@@ -190,5 +181,5 @@ class LoopErrorProblem:
 
     def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
         """The best input of the model structure among all spectra within the limits."""
-        limits = [convex.PowerLimit(one.kind, one.most, channel=one.channel) for one in self.limits]
-        return least_error(criterion, Experiment(self.structure, 1, self.band), limits, tolerance=tolerance)
+        experiment = Experiment(self.structure, 1, self.band)
+        return least_error(criterion, experiment, self.limits, tolerance=tolerance)

@@ -24,7 +24,6 @@ from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.findings.top_up_levels import level_notes, prior_left_out
-from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.estimate import Verdict
@@ -38,7 +37,7 @@ from inputdesign_cli.questions.assessment.identify import (
     identified,
     told,
 )
-from inputdesign_cli.questions.assessment.outcome import response_of_data
+from inputdesign_cli.questions.assessment.outcome import response_without_model
 from inputdesign_cli.questions.least_cost.outcome import requirement_met
 from inputdesign_cli.records import Preparation
 
@@ -74,7 +73,13 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
         SpecError: nothing is asked that data could meet.
         DataError: a file cannot be used.
     """
-    check_assessable(task)
+    if not task.assessable:
+        raise bad_spec(
+            "nothing-to-assess",
+            "the spec states no accuracy that data could meet or miss",
+            hint="state one, for example accuracy: {model_error: {relative: 0.05}}",
+            key="accuracy",
+        )
     began = time.perf_counter()
     task, found = identified(task, paths, preparation)
     assessment = judge(task, found, began)
@@ -90,17 +95,6 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     return replace(assessment, results=_topped_up(judged, topped, remarks, needed))
 
 
-def check_assessable(task: Identification) -> None:
-    """Raise `SpecError` (`nothing-to-assess`) where no accuracy is asked for."""
-    if not task.assessable:
-        raise bad_spec(
-            "nothing-to-assess",
-            "the spec states no accuracy that data could meet or miss",
-            hint="state one, for example accuracy: {model_error: {relative: 0.05}}",
-            key="accuracy",
-        )
-
-
 def judge(task: Identification, found: Identified, began: float, *, first: bool | None = None) -> Assessment:
     """Compare an estimate and its data with what is asked, without a top-up.
 
@@ -114,7 +108,9 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
     more: list[Finding] = []
     if not faults(units, found.estimate, found.data):
         more += objections(units, without, met=met)
-        more += _of_nominal(task, found, distance, first)
+        if distance is not None and not distance.nominal.within_uncertainty:
+            far = far_from_nominal(distance)
+            more += far if first is None or not far else of_first_part(distance) if first else []
     findings = [*(results.outcome.findings or ()), *more]
     against = reasons(findings)
     verdict: Verdict = "undecided" if against else "met" if met else "missed"
@@ -136,30 +132,16 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
     return Assessment(verdict, _without_model(judged, units, found) if against else judged)
 
 
-def _of_nominal(
-    task: Identification, found: Identified, distance: Distance | None, first: bool | None
-) -> list[Finding]:
-    """Return a finding where the estimate is far from every plant that the design was made for."""
-    if distance is None or distance.nominal.within_uncertainty:
-        return []
-    far = far_from_nominal(task.header.units, distance)
-    if first is None or not far:
-        return far
-    return of_first_part(distance) if first else []
-
-
 def _compared(
     task: Identification, found: Identified
 ) -> tuple[list[RequirementMet], list[Neglected], Distance | None]:
     """Return each requirement at the estimate, the parameters neglected, and the distance from the spec."""
-    question = found.question
+    question, estimate = found.question, found.estimate
     if question is None:
         return [], [], None
-    units, information, estimate = task.header.units, question.information, found.estimate
+    units, information, factor = task.header.units, question.information, estimate.factor
     listed = [requirement_met(units, one, information) for one in question.requirements]
     without = neglected(found.model, estimate, question.asked, information)
-    asked, foreseen = bool(question.asked), task.foreseen
-    factor = estimate.factor
     uncertain = np.linalg.inv(information) + factor.T @ task.nominal_covariance @ factor
     distance = from_nominal(
         units,
@@ -168,10 +150,10 @@ def _compared(
         estimate,
         question.errors,
         np.asarray(np.linalg.inv(uncertain), dtype=float),
-        asked=asked,
+        asked=bool(question.asked),
         nominal_covariance=task.nominal_covariance,
     )
-    if foreseen is not None and foreseen.admits(estimate.theta, estimate.covariance):
+    if task.foreseen is not None and task.foreseen.admits(estimate.theta, estimate.covariance):
         distance = replace(distance, nominal=replace(distance.nominal, within_uncertainty=True))
     return listed, without, distance
 
@@ -196,12 +178,10 @@ def _remarks(task: Identification, found: Identified, topped: Results) -> list[F
 
 def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     """Return the results with the response of the data alone beside the model, where it can be had."""
-    data = found.data
-    delays = partial(response_delays, found.model, step=units.step)
-    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
+    response = response_without_model(units, found.model, found.data)
     if response is None:
         return judged
-    table, curves, lines = response_of_data(units, found.model, response, by_reference=data.r is not None)
+    table, curves, lines = response
     shown = _assessed(judged, frequency_response=lines)
     return replace(
         shown,
@@ -217,7 +197,7 @@ def _experiments(question: ModelQuestion, both: Array) -> int | None:
     more = question.experiment.whiten_matrix(both) - data
 
     def enough(times: int) -> bool:
-        return all(r.worst(data + times * more).ratio <= 1.0 + _REACHED for r in question.requirements)
+        return question.ratio(data + times * more) <= 1.0 + _REACHED
 
     most = 2
     while not enough(most):

@@ -17,21 +17,21 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.header import build_header
-from inputdesign_cli.questions.building.knowledge import (
-    build_foreseen,
-    build_knowledge,
-    build_nominal_covariance,
-)
 from inputdesign_cli.questions.building.model_error import (
     build_calibration,
     model_error_alpha,
     unstated_errors,
 )
-from inputdesign_cli.questions.building.prior import build_earlier, stated_prior
+from inputdesign_cli.questions.building.parameters import build_earlier, stated_prior
 from inputdesign_cli.questions.building.rebuild import restated
 from inputdesign_cli.questions.building.requirements import build_requirements
 from inputdesign_cli.questions.building.signal_settings import operating_points
 from inputdesign_cli.questions.building.system import build_experiment, build_model, prior_record, record_step
+from inputdesign_cli.questions.building.uncertainty import (
+    build_foreseen,
+    build_knowledge,
+    build_nominal_covariance,
+)
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
@@ -51,10 +51,8 @@ def build_identification(spec: Spec) -> Identification:
             key="plant",
         )
     nominal = build_model(spec)
-    stated = stated_prior(spec)
     # Errors of a prior are raised before any data are read, even if it does not count for these data.
-    if stated is not None:
-        stated.over(spec, nominal.names)
+    stated_prior(spec, nominal.names)
     prior_record(spec)
     controller = spec.experiment.controller
     record_step(spec)  # raises if samples are too far apart for the plant

@@ -91,6 +91,10 @@ class ModelQuestion:
         """What has r_u: what is asked of the model error, or else every entry of G."""
         return self.asked or self.entries
 
+    def ratio(self, information: Array) -> float:
+        """Return the largest ratio to what is asked at an information (k, k) in these coordinates."""
+        return max(requirement.worst(information).ratio for requirement in self.requirements)
+
 
 @dataclass(frozen=True)
 class Identification:
@@ -108,8 +112,7 @@ class Identification:
         foreseen: the plants that the design was made for; None if it was made for the plant of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
-        with_noise: the same, where the noise of every output has C and D more than a model; None if no
-                other noise is tried.
+        with_noise: the same, where the noise of every output has C and D more than a model.
     """
 
     header: Header
@@ -123,27 +126,38 @@ class Identification:
     knowledge: Knowledge | None
     foreseen: Foreseen | None
     at: Callable[[Model, int, Array, str], ModelQuestion]
-    with_noise: Callable[[Model, Sequence[Noise]], Identification] | None = None
+    with_noise: Callable[[Model, Sequence[Noise]], Identification]
 
 
 @dataclass(frozen=True)
 class Identified:
-    """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate.
+    """An estimate, its data, and what is asked of it.
 
-    `ruled_out` are other minima, which knowledge of the plant rules out; `loop_told` is whether a note says
-    already that inputs answer the outputs; `noise_refuted` is the probability of the residuals with the noise
-    of the spec, where a larger one was estimated in its place.
+    Attributes:
+        question: None where it cannot be asked of this estimate; `unasked` says why.
+        ruled_out: other minima, which knowledge of the plant rules out.
+        loop_told: whether a note says already that inputs answer the outputs.
+        noise_refuted: the probability of the residuals with the noise of the spec, where a larger one was
+            estimated in its place.
     """
 
     estimate: Estimate
     model: Model
     data: Record
     preparation: Preparation
-    question: ModelQuestion | None
+    question: ModelQuestion | None = None
     unasked: str = ""
     ruled_out: tuple[Rival, ...] = ()
     loop_told: bool = False
     noise_refuted: float | None = None
+
+    def asked_by(self, task: Identification, source: str) -> Identified:
+        """Return it with what a spec asks at the estimate, where it can be asked."""
+        samples, factor = len(self.data.y), self.estimate.factor
+        try:
+            return replace(self, question=task.at(self.model, samples, factor, source))
+        except IdesignError as error:
+            return replace(self, unasked=told(error))
 
 
 def identified(
@@ -152,7 +166,7 @@ def identified(
     """Return the estimate from the data in `paths`, jointly, and the question that it answers.
 
     The nominal parameters are one of the starts. Where the residuals refute the noise of the spec, a larger
-    one is estimated along.
+    one, C and D of small orders more, is estimated along.
 
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
@@ -160,24 +174,16 @@ def identified(
     known = {**task.operating_point, **preparation.operating_point}
     taken = replace(preparation, operating_point=known)
     found = estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
-    return _with_larger_noise(task, found, paths[0])
-
-
-def _with_larger_noise(
-    task: Identification, found: Identified, first: Path
-) -> tuple[Identification, Identified]:
-    """Return the estimate with C and D of small orders more, if the noise of the spec is refuted without."""
     estimate = found.estimate
-    if task.with_noise is None or not estimate.tests.coloured:
-        return task, found
     plant = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
-    for more in noises_of_residuals(estimate.errors, estimate.lengths):
+    noises = noises_of_residuals(estimate.errors, estimate.lengths) if estimate.tests.coloured else ()
+    for more in noises:
         try:
             larger = replace(task.with_noise(found.model, more), header=task.header)
             start = larger.nominal.theta.copy()
             for k in np.flatnonzero(larger.nominal.in_plant):
                 start[k] = plant[larger.nominal.names[k]]
-            other = estimated(larger, found.data, first, found.preparation, start=start)
+            other = estimated(larger, found.data, paths[0], taken, start=start)
         except IdesignError:  # this plant cannot have this noise, or it cannot be estimated
             continue
         if other.estimate.search.converged and not other.estimate.tests.coloured:
@@ -226,11 +232,8 @@ def estimated(
             "experiment.prior",
         )
     model = nominal.at(estimate.theta, estimate.noise)
-    try:
-        question = task.at(model, len(data.y), estimate.factor, f"{first.name} (estimate)")
-    except IdesignError as error:
-        return Identified(estimate, model, data, taken, None, told(error), ruled_out)
-    return Identified(estimate, model, data, taken, question, "", ruled_out)
+    found = Identified(estimate, model, data, taken, ruled_out=ruled_out)
+    return found.asked_by(task, f"{first.name} (estimate)")
 
 
 def told(error: IdesignError) -> str:
@@ -241,9 +244,11 @@ def told(error: IdesignError) -> str:
 def findings_of(task: Identification, found: Identified) -> list[Finding]:
     """Return everything that speaks for or against data and estimate."""
     units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
-    rivals: list[Finding] = []
-    if question is not None:
-        rivals = other_minima(units, model, estimate, question.asked, question.entries, question.information)
+    rivals = (
+        other_minima(units, model, estimate, question.asked, question.entries, question.information)
+        if question is not None
+        else []
+    )
     return [
         *unsettled(model, estimate),
         *larger_noise(model, found.noise_refuted),
@@ -276,8 +281,8 @@ def speaking_against(task: Identification, found: Identified) -> list[Finding]:
 
 def mismeasured(task: Identification, found: Identified) -> list[Finding]:
     """Return faults of measurement."""
-    data = found.data
-    return [*faults(task.header.units, found.estimate, data), *loop_faults(task.controller, data)]
+    own = faults(task.header.units, found.estimate, found.data)
+    return [*own, *loop_faults(task.controller, found.data)]
 
 
 def identification_results(task: Identification, found: Identified, began: float) -> Results:
@@ -287,7 +292,7 @@ def identification_results(task: Identification, found: Identified, began: float
         began: `time.perf_counter()` when the work began.
     """
     header, question, estimate = task.header, found.question, found.estimate
-    tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
+    tables, curves = data_curves(header.units, found.data, estimate)
     bound = None
     if question is not None:
         tables["bound"], curves["bound"], bound = bound_of_data(

@@ -14,7 +14,15 @@ from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.findings.frequency_responses import BY_U
 from inputdesign_cli.findings.rivals import rival_entries
-from inputdesign_cli.identification import Estimate, FrequencyResponse, ResidualTest, Rival, ScoreTest
+from inputdesign_cli.identification import (
+    Estimate,
+    FrequencyResponse,
+    ResidualTest,
+    Rival,
+    ScoreTest,
+    frequency_response,
+    response_delays,
+)
 from inputdesign_cli.outcome import Identification, Information, MeasuredLines, ModelError as Bound
 from inputdesign_cli.outcome.curves import (
     BoundCurves,
@@ -32,7 +40,7 @@ from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.confidence import Confidence
-from inputdesign_cli.records import Preparation
+from inputdesign_cli.records import Preparation, Record
 from inputdesign_cli.specification import is_prior
 
 # Beyond a disc by more than this share of G.
@@ -108,27 +116,40 @@ def model_text(units: Units, model: Model, estimate: Estimate) -> str:
     return "\n".join(lines) + "\n"
 
 
-def data_curves(
-    units: Units, u: Array, y: Array, estimate: Estimate
-) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """Return fit.csv and residuals.csv with their figures.
+def fit_of(
+    units: Units,
+    data: Record,
+    errors: Array,
+    simulated: Sequence[tuple[float | None, Array]],
+    time: Array | None = None,
+) -> tuple[dict[str, Array], FitCurves]:
+    """Return the columns of fit.csv with its figure, in which files follow each other.
 
     Args:
-        u, y: the records, (samples, r) and (samples, p).
+        errors: (samples, p) of the prediction.
+        simulated: of every output the fit of the simulation, None where there is none, and its samples.
+        time: instants of the samples; None: the sample time makes them.
     """
-    instants = units.sample_time * np.arange(len(y), dtype=np.float64)
-    predicted = y - estimate.errors
-    columns = {units.time_header: instants}
-    if len(estimate.lengths) > 1:
-        columns["record"] = np.repeat(np.arange(1.0, len(estimate.lengths) + 1), estimate.lengths)
-    columns |= {**_columns(units, "u", u), **_columns(units, "y", y)}
-    columns |= _columns(units, "y", predicted, "_predicted")
+    even = units.sample_time * np.arange(len(data.y), dtype=np.float64)
+    columns = {units.time_header: even if time is None else time}
+    if len(data.lengths) > 1:
+        columns["record"] = np.repeat(np.arange(1.0, len(data.lengths) + 1), data.lengths)
+    columns |= {**_columns(units, "u", data.u), **_columns(units, "y", data.y)}
+    columns |= _columns(units, "y", data.y - errors, "_predicted")
     panels = []
-    for i, fit in enumerate(estimate.simulation.fit):
-        curve = None if fit is None else estimate.simulation.outputs[:, i]
+    for i, (fit, samples) in enumerate(simulated):
+        measured, curve = data.y[:, i], None if fit is None else samples
         if curve is not None:
             columns[f"y{_number(units, i)}_simulated"] = curve
-        panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i, units.label(f"y{i + 1}")))
+        panels.append(FitPanel(measured, measured - errors[:, i], curve, fit, i, units.label(f"y{i + 1}")))
+    instants = even if time is None or np.any(np.diff(time) <= 0.0) else time
+    return columns, FitCurves(instants, tuple(panels), tuple(data.lengths))
+
+
+def data_curves(units: Units, data: Record, estimate: Estimate) -> tuple[dict[str, Table], dict[str, Curves]]:
+    """Return fit.csv and residuals.csv with their figures."""
+    found = estimate.simulation
+    columns, fit = fit_of(units, data, estimate.errors, list(zip(found.fit, found.outputs.T, strict=True)))
     columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
     white, cross = estimate.tests.whiteness, estimate.tests.independence
     shared = min(white.lags.size, cross.lags.size)
@@ -136,19 +157,16 @@ def data_curves(
     residuals |= _pairs(units, "autocorrelation", white.correlation[:shared])
     residuals |= {"cross_correlation_lag": cross.lags[:shared]}
     residuals |= _pairs(units, "cross_correlation", cross.correlation[:shared])
-    curves: dict[str, Curves] = {
-        "fit": FitCurves(instants, tuple(panels), tuple(estimate.lengths)),
-        "residuals": ResidualCurves(
-            white.lags,
-            white.correlation,
-            cross.lags,
-            cross.correlation,
-            white.limit,
-            white.probability,
-            cross.probability,
-        ),
-    }
-    return {"fit": Table(columns), "residuals": Table(residuals)}, curves
+    correlations = ResidualCurves(
+        white.lags,
+        white.correlation,
+        cross.lags,
+        cross.correlation,
+        white.limit,
+        white.probability,
+        cross.probability,
+    )
+    return {"fit": Table(columns), "residuals": Table(residuals)}, {"fit": fit, "residuals": correlations}
 
 
 def bound_of_data(
@@ -184,6 +202,33 @@ def _columns(units: Units, name: str, values: Array, of: str = "") -> dict[str, 
 def _pairs(units: Units, name: str, values: Array) -> dict[str, Array]:
     _, rows, columns = values.shape
     return {f"{name}{units.suffix(i, j)}": values[:, i, j] for i in range(rows) for j in range(columns)}
+
+
+def response_without_model(
+    units: Units, model: Model, data: Record, *, inputs: Sequence[int] | None = None, loop: bool = False
+) -> tuple[Table, ResponseCurves, MeasuredLines] | None:
+    """Return the frequency response of the data alone beside a model, where it can be had.
+
+    A reference counts if it is from outside and moves.
+
+    Args:
+        inputs, loop: see `response_of_data`.
+    """
+    some = list(range(units.inputs)) if inputs is None else list(inputs)
+    u, r = data.u[:, some], None if data.r is None else data.r[:, some]
+
+    def delays(samples: int) -> NDArray[np.int64]:
+        return response_delays(model, samples, step=units.step)[:, some]
+
+    for reference in [r, None]:
+        if reference is None or not np.any(np.all(reference == u, axis=0)):
+            found = frequency_response(u, data.y, reference, lengths=data.lengths, delays=delays)
+            if found is not None:
+                by_reference = reference is not None
+                return response_of_data(
+                    units, model, found, by_reference=by_reference, inputs=inputs, loop=loop
+                )
+    return None
 
 
 def response_of_data(

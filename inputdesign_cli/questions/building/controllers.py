@@ -14,21 +14,12 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant import Model, Rational, TransferMatrix, delayed, discretised, pid
 from inputdesign_cli.questions.building.weights import rational
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.loop import (
-    ContinuousController,
-    Controller,
-    LoopMargin,
-    LoopsController,
-    Pid,
-    PidController,
-    SingleController,
-    Tuning,
-)
+from inputdesign_cli.specification.models import loop
 from inputdesign_cli.specification.models.transfer import DiscreteMatrix
 
 
 def controller_matrix(
-    controller: Controller, sample_time: float, channels: tuple[int, int]
+    controller: loop.Controller, sample_time: float, channels: tuple[int, int]
 ) -> TransferMatrix:
     """Return C of the loop u = r - C y.
 
@@ -38,7 +29,7 @@ def controller_matrix(
     match controller:
         case DiscreteMatrix():
             return TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
-        case LoopsController(loops=loops):
+        case loop.LoopsController(loops=loops):
             nothing = Rational(np.zeros(1))
             rows = [[nothing] * channels[1] for _ in range(channels[0])]
             for one in loops:
@@ -48,12 +39,12 @@ def controller_matrix(
             return TransferMatrix.diagonal(_single(controller, sample_time), 1)
 
 
-def _single(controller: SingleController, sample_time: float) -> Rational:
+def _single(controller: loop.SingleController, sample_time: float) -> Rational:
     match controller:
-        case PidController(pid=stated):
+        case loop.PidController(pid=stated):
             times = stated.Ti, stated.Td, stated.filter_time
             return delayed(pid(stated.Kp, *times, sample_time, stated.sample), controller.delay)
-        case ContinuousController(continuous=ratio):
+        case loop.ContinuousController(continuous=ratio):
             made = discretised(ratio.numerator, ratio.denominator_factors, sample_time, controller.sample)
             return delayed(made, controller.delay)
         case _:
@@ -72,7 +63,7 @@ class Process:
     dead_time: float
 
 
-def loop_controller(spec: Spec, stated: LoopMargin, model: Model) -> Controller | None:
+def loop_controller(spec: Spec, stated: loop.LoopMargin, model: Model) -> loop.Controller | None:
     """Return C of the loop to be kept: tuned, stated, or the controller of the experiment.
 
     An uncertain plant has settings for each scenario, since the rules will be applied to the estimate.
@@ -85,7 +76,7 @@ def loop_controller(spec: Spec, stated: LoopMargin, model: Model) -> Controller 
     """
     if stated.tuning is None:
         return stated.controller or spec.experiment.controller
-    return PidController(pid=tuned(process_of(_with_values(spec, model)), stated.tuning))
+    return loop.PidController(pid=tuned(process_of(_with_values(spec, model)), stated.tuning))
 
 
 def _with_values(spec: Spec, model: Model) -> Spec:
@@ -101,7 +92,7 @@ def _with_values(spec: Spec, model: Model) -> Spec:
     return spec.with_(**changes) if changes else spec
 
 
-def tuned(process: Process, tuning: Tuning) -> Pid:
+def tuned(process: Process, tuning: loop.Tuning) -> loop.Pid:
     """Return the settings of a PI or PID controller."""
     K, T, L = process.gain, process.time_constant, process.dead_time
     Td = 0.0
@@ -118,14 +109,13 @@ def tuned(process: Process, tuning: Tuning) -> Pid:
         if T is not None:
             Kp, Ti = 0.2 + 0.45 * T / L, (0.4 * L + 0.8 * T) / (L + 0.1 * T) * L
             Td = 0.5 * L * T / (0.3 * L + T)
-    return Pid(Kp=Kp / K, Ti=Ti, Td=Td, sample=tuning.sample)
+    return loop.Pid(Kp=Kp / K, Ti=Ti, Td=Td, sample=tuning.sample)
 
 
 def process_of(spec: Spec) -> Process:
     """Return gain, time constant and dead time of the nominal plant; the half rule shares a second lag.
 
-    Raises:
-        SpecError: `not-supported`.
+    Raises `SpecError`: `not-supported`.
     """
     plant = spec.plant
 

@@ -54,13 +54,12 @@ def implied_limits(spec: Spec) -> list[PowerLimit]:
 def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
     """Return the bounds on the density of the excitation at every frequency of its band.
 
-    Raises:
-        SpecError, DataError: a curve cannot be used, or the lower bound crosses the upper one.
+    Raises `SpecError` or `DataError`: a curve cannot be used, or the lower bound crosses the upper one.
     """
     stated = spec.limits.spectrum
     if stated is None:
         return []
-    unit, limits = build_units(spec).frequency, []
+    units, limits = build_units(spec), []
     for curve, upper in ((stated.max, True), (stated.min, False)):
         if curve is None or curve == 0.0:
             continue
@@ -72,18 +71,14 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
         if upper and zero is None and level(grid).min() <= 0.0:
             zero = float(grid[int(np.argmin(level(grid)))])
         if zero is not None:
-            why = "no spectrum with a density vanishes there and is positive around it"
-            if not upper:
-                why = "how far a spectrum stays above it is counted relative to it"
-            bound = f"the {'upper' if upper else 'lower'} bound vanishes at"
-            message = f"{bound} {zero / unit:.6g} rad/{spec.time_unit}: {why}"
+            message = f"the {'upper' if upper else 'lower'} bound vanishes at {units.named(zero)}"
             raise spec.complain("bad-limit", message, hint="give a small positive bound instead", key=key)
         limits.append(DensityLimit(level, grid, upper))
     if len(limits) == 2:
         grid = np.union1d(limits[0].grid, limits[1].grid)
         room = limits[0].level(grid) - limits[1].level(grid)
         if room.min() <= 0:
-            at = f"{grid[int(np.argmin(room))] / unit:.6g} rad/{spec.time_unit}"
+            at = units.named(grid[int(np.argmin(room))])
             message = f"min reaches max at {at}: no spectrum fits in between"
             raise spec.complain("bad-limit", message, hint="lower min or raise max there", key=_KEY)
     return limits
@@ -94,8 +89,7 @@ def _level(
 ) -> tuple[Callable[[Array], Array], Array, ComplexArray, float | None]:
     """Return the level over frequency in rad/sample, its kinks, points of fast change, and its zero.
 
-    Raises:
-        SpecError: `bad-limit`, it is infinite somewhere in the band.
+    Raises `SpecError`: `bad-limit`, it is infinite somewhere in the band.
     """
     nowhere, smooth = np.zeros(0), np.zeros(0, dtype=complex)
     if isinstance(curve, float | int):

@@ -8,19 +8,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from inputdesign_cli.accuracy import (
-    Absolute,
-    AdmissibleError,
-    EllipsoidError,
-    Entry,
-    Floored,
-    ModelError,
-    Relative,
-    Sensitivity,
-    Table,
-    Weighted,
-    active_entries,
-)
+from inputdesign_cli import accuracy
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
@@ -90,18 +78,20 @@ def build_model_errors(
         return []
     band = required_band(spec, experiment, error.band)
     if error.norm == "frobenius" or error.sensitivity is not None:
-        places: list[Entry | None] = [(0, 0) if build_units(spec).single else None]
+        places: list[accuracy.Entry | None] = [(0, 0) if build_units(spec).single else None]
     else:
-        places = list(active_entries(experiment.model, band[1]))
+        places = list(accuracy.active_entries(experiment.model, band[1]))
     return [_on_entry(spec, error, experiment, band, entry, nominal) for entry in places]
 
 
-def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
+def unstated_errors(spec: Spec, experiment: Experiment) -> list[accuracy.ModelError]:
     """Return model errors of every entry, to evaluate r_u without a stated bound; r_adm has no meaning."""
     band, alpha = required_band(spec, experiment, None), model_error_alpha(spec, experiment.model)
     return [
-        ModelError(experiment=experiment, band=band, entry=entry, admissible=Absolute(1.0), alpha=alpha)
-        for entry in active_entries(experiment.model, band[1])
+        accuracy.ModelError(
+            experiment=experiment, band=band, entry=entry, admissible=accuracy.Absolute(1.0), alpha=alpha
+        )
+        for entry in accuracy.active_entries(experiment.model, band[1])
     ]
 
 
@@ -110,10 +100,18 @@ def _on_entry(
     error: StatedError,
     experiment: Experiment,
     band: tuple[float, float],
-    entry: Entry | None,
+    entry: accuracy.Entry | None,
     nominal: Model | None,
 ) -> OnModelError:
-    units, admissible = build_units(spec), _admissible_of(spec, error, experiment.model, band, entry, nominal)
+    units, model = build_units(spec), experiment.model
+    scenario = None if nominal is None else spec.uncertainty
+    # r_adm of a scenario is its own down to a floor, or that of the nominal plant.
+    fixed = scenario is not None and scenario.r_adm == "fixed"
+    admissible = _admissible(spec, error, nominal if fixed and nominal is not None else model, band, entry)
+    if scenario is not None and nominal is not None and not fixed and scenario.floor > 0.0:
+        admissible = accuracy.Floored(
+            admissible, _admissible(spec, error, nominal, band, entry), scenario.floor
+        )
     if error.weight is not None:
         key = f"{_KEY}.weight"
         weight = build_weight(spec, error.weight, key)
@@ -123,18 +121,17 @@ def _on_entry(
             message = f"{key} vanishes at {units.named(void)}, where region: ellipsoid has nothing to bound"
             hint = "leave that frequency out of the band, or use region: first_order"
             raise spec.complain("not-supported", message, hint=hint, key=key)
-        admissible = Weighted(admissible, weight)
-    bound: Callable[..., OnModelError] = ModelError
+        admissible = accuracy.Weighted(admissible, weight)
+    bound: Callable[..., OnModelError] = accuracy.ModelError
     if error.region == "ellipsoid":
-        _check_fraction(spec, experiment.model, entry)
-        bound = partial(EllipsoidError, against="absolute" if error.relative is None else "relative")
-    alpha = model_error_alpha(spec, experiment.model)
+        _check_fraction(spec, model, entry)
+        bound = partial(accuracy.EllipsoidError, against="absolute" if error.relative is None else "relative")
+    alpha = model_error_alpha(spec, model)
     made = bound(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
     if nominal is None:
         check_bounded(spec, made, _KEY if spec.accuracy.loop is None else _LOOP)
-    stated = spec.uncertainty
-    # Scenarios have a positive r_adm since the nominal plant has one.
-    if nominal is None or stated is None or (stated.r_adm != "fixed" and stated.floor == 0.0):
+    # Otherwise it is positive since that of the nominal plant is.
+    if scenario is None or (not fixed and scenario.floor == 0.0):
         try:
             check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
         except SpecError as missed:
@@ -142,10 +139,10 @@ def _on_entry(
     return made
 
 
-def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
+def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelError) -> SpecError | None:
     """Return the error for a margin that the loop does not have with the nominal plant."""
     stated = spec.accuracy.loop
-    if stated is None or not isinstance(admissible, Sensitivity):
+    if stated is None or not isinstance(admissible, accuracy.Sensitivity):
         return None
     peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
     less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
@@ -180,7 +177,7 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
             raise spec.complain("unbounded-error", message, hint=hint, key=key)
 
 
-def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
+def _check_fraction(spec: Spec, model: Model, entry: accuracy.Entry | None) -> None:
     """Raise `SpecError` (`not-supported`) unless the entry is a fraction affine in the parameters."""
     key = f"{_KEY}.region"
     if entry is None:
@@ -194,37 +191,14 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
         raise spec.complain("not-supported", message, hint=hint, key=key)
 
 
-def _admissible_of(
-    spec: Spec,
-    error: StatedError,
-    model: Model,
-    band: tuple[float, float],
-    entry: Entry | None,
-    nominal: Model | None,
-) -> AdmissibleError:
-    """Return r_adm of a model; of a scenario its own down to a floor, or the nominal one (`uncertainty`).
-
-    Raises:
-        SpecError: see `build_model_errors`.
-    """
-    stated = spec.uncertainty
-    if nominal is None or stated is None:
-        return _admissible(spec, error, model, band, entry)
-    known = _admissible(spec, error, nominal, band, entry)
-    if stated.r_adm == "fixed":
-        return known
-    own = _admissible(spec, error, model, band, entry)
-    return Floored(own, known, stated.floor) if stated.floor > 0.0 else own
-
-
 def _admissible(
-    spec: Spec, error: StatedError, model: Model, band: tuple[float, float], entry: Entry | None
-) -> AdmissibleError:
+    spec: Spec, error: StatedError, model: Model, band: tuple[float, float], entry: accuracy.Entry | None
+) -> accuracy.AdmissibleError:
     """Return r_adm; a table has a column r_adm_21 for each entry, or r_adm for all."""
     if error.relative is not None:
-        return Relative(model, error.relative, entry)
+        return accuracy.Relative(model, error.relative, entry)
     if error.absolute is not None:
-        return Absolute(error.absolute)
+        return accuracy.Absolute(error.absolute)
     if error.table is not None:
         units, column = build_units(spec), "r_adm"
         path = spec.resolve_path(error.table)
@@ -234,11 +208,10 @@ def _admissible(
     return _sensitivity(spec, error, model, band)
 
 
-def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> Table:
+def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> accuracy.Table:
     """Return one column of a file, positive over the whole `band` of the section that has `key`.
 
-    Raises:
-        DataError: the file cannot be read, or does not have the column on the whole band (`bad-table`).
+    Raises `DataError`: the file cannot be read, or does not have the column on the whole band (`bad-table`).
     """
     units = build_units(spec)
     columns = read_frequency_table(spec, name, [column], key)
@@ -254,10 +227,12 @@ def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str
         message = f"it covers {covered}, but the band is {asked}"
         hint = f"extend the table, or restrict {key.rpartition('.')[0]}.band"
         raise bad_table(spec, name, message, hint, key)
-    return Table(frequency, value)
+    return accuracy.Table(frequency, value)
 
 
-def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float, float]) -> Sensitivity:
+def _sensitivity(
+    spec: Spec, error: StatedError, model: Model, band: tuple[float, float]
+) -> accuracy.Sensitivity:
     asked, kept = error.sensitivity, spec.accuracy.loop
     if kept is not None:
         given = loop_controller(spec, kept, model)
@@ -274,9 +249,9 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float
     if asked.weight is not None:
         weight = rational(asked.weight)
         check_finite(spec, weight, band, "admissible-not-positive", key)
-        return Sensitivity(loop, weight)
+        return accuracy.Sensitivity(loop, weight)
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
     settings: dict[str, float] = {}
     if given.kind == "pid":
-        settings = {key: float(v) for key in ("Kp", "Ti", "Td") if (v := getattr(given.pid, key))}
-    return Sensitivity(loop, Rational.build([peak]), None if kept is None else settings)
+        settings = {k: v for k, v in given.pid.model_dump(include={"Kp", "Ti", "Td"}).items() if v}
+    return accuracy.Sensitivity(loop, Rational.build([peak]), None if kept is None else settings)

@@ -1,17 +1,18 @@
-"""Spec -> the parameters to be estimated: coefficients, some of them known, or named parameters."""
+"""Spec -> the parameters to be estimated, and the information about them that `experiment.prior` states."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.expressions import Expression
+from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
@@ -39,8 +40,7 @@ def reparametrised(
 ) -> Model:
     """Return the model in the named parameters of the spec, without the known ones.
 
-    Raises:
-        SpecError: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
+    Raises `SpecError`: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
     """
     named, known = plant.named_parameters, (*(plant.known or ()), *(spec.noise.known or ()))
     if not named and not known:
@@ -118,8 +118,7 @@ def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
     """Return a matrix over some named parameters as one (k, k) over all `known`; no names stand for all.
 
-    Raises:
-        SpecError: `unknown-parameter` or `wrong-shape`.
+    Raises `SpecError`: `unknown-parameter` or `wrong-shape`.
     """
     for name in names or ():
         check_known(spec, known, name, key)
@@ -132,3 +131,46 @@ def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[st
     index = [list(known).index(name) for name in listed]
     full[np.ix_(index, index)] = matrix
     return full
+
+
+PRIOR = "experiment.prior.information"
+
+
+def stated_prior(spec: Spec, names: Sequence[str]) -> tuple[Array, Mapping[str, float] | None] | None:
+    """Return the information (k, k) about all parameters that the spec states, and their values, if stated.
+
+    It may stand in a model file; None for a record, or no prior. Raises `SpecError`: `bad-model-file`, or the
+    prior does not fit the parameters.
+    """
+    prior = spec.experiment.prior
+    if prior is None:
+        return None
+    if not isinstance(prior.information, str):
+        matrix = np.array(prior.information, dtype=float)
+        return embedded(spec, names, matrix, prior.names, PRIOR), prior.values
+    if not prior.names_a_model:
+        return None
+    found = load_estimate(spec, prior.information, PRIOR)
+    information = inverse(np.array(found.covariance, dtype=float))
+    return embedded(spec, names, information, tuple(found.parameters), PRIOR), found.parameters
+
+
+def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
+    """Return the prior as an estimate, with nominal values of other parameters; None without values."""
+    information, values = stated_prior(spec, nominal.names) or (None, None)
+    if information is None or values is None:
+        return None
+    theta = [values.get(name, value) for name, value in zip(nominal.names, nominal.theta, strict=True)]
+    return Earlier(np.array(theta, dtype=float), information)
+
+
+def inverse(covariance: Array) -> Array:
+    """Return the inverse of a covariance or information matrix (k, k), by way of correlations.
+
+    Raises `LinAlgError`: it is singular.
+    """
+    scale = np.sqrt(np.diag(covariance))
+    if not np.all(scale > 0.0):
+        raise np.linalg.LinAlgError
+    half = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
+    return np.asarray(half.T @ half)

@@ -68,8 +68,7 @@ class Rebuild(Generic[Built]):
     def at(self, model: Model | None, change: Change | None = None) -> Built:
         """Return the object at a model; None is the plant of the spec.
 
-        Raises:
-            IdesignError: it cannot be built of this model.
+        Raises `IdesignError`: it cannot be built of this model.
         """
         values: dict[str, object] = {} if model is None else {**blocks_of(model)}
         if change is not None:

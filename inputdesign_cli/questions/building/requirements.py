@@ -15,13 +15,8 @@ from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.building import model_error
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.building.model_error import (
-    build_model_errors,
-    check_bounded,
-    confidence_factor,
-    required_band,
-)
 from inputdesign_cli.questions.building.parameters import embedded
 from inputdesign_cli.questions.building.weights import build_weight, check_finite
 from inputdesign_cli.questions.common.infeasible import StatedBound
@@ -56,7 +51,7 @@ def build_requirements(
     found: list[RequirementFactory] = []
     for key in spec.accuracy.requirements:
         if key in ("model_error", "loop"):
-            found += [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
+            found += [_maker(error) for error in model_error.build_model_errors(spec, experiment, nominal)]
         elif key in added("requirements"):
             found += cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
         else:
@@ -67,8 +62,7 @@ def build_requirements(
 def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
     """Return the maker of `accuracy.criterion`, of the parameters or of their relative errors.
 
-    Raises:
-        SpecError: `zero-parameter` when a relative error of a parameter that is zero is asked for.
+    Raises `SpecError`: `zero-parameter` when a relative error of a parameter that is zero is asked for.
     """
     letter = spec.accuracy.criterion
     if letter is None:
@@ -94,8 +88,7 @@ def build_asked(
 ) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
     """Return the makers of the goal of a design, and of the requirements besides a criterion.
 
-    Raises:
-        SpecError, DataError: see `build_requirements` and `build_criterion`.
+    Raises `SpecError` or `DataError`: see `build_requirements` and `build_criterion`.
     """
     requirements = build_requirements(spec, experiment, nominal)
     criterion = build_criterion(spec, experiment)
@@ -138,7 +131,7 @@ def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]
     """Require M >= (chi2 gamma / 2) V'', chi2 the quantile for the parameters of the hessian."""
     asked = spec.accuracy.application
     assert asked is not None
-    chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
+    chi2 = model_error.confidence_factor(asked.confidence, len(asked.parameters)) ** 2
     hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
     return [_target(spec, experiment, hessian, asked.parameters, "accuracy.application")]
 
@@ -167,13 +160,13 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
     stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
     assert stated is not None
     weight = build_weight(spec, stated.weight, f"{key}.weight")
-    band = required_band(spec, experiment, stated.band)
+    band = model_error.required_band(spec, experiment, stated.band)
     check_finite(spec, weight, band, "admissible-not-positive", f"{key}.weight")
     bound = partial(WeightedVariance, experiment=experiment, band=band, weight=weight, limit=stated.max)
     entries = active_entries(experiment.model, band[1])
     found = [bound(entry=entry, relative=stated.relative) for entry in entries]
     for variance in found:
-        check_bounded(spec, variance, key)
+        model_error.check_bounded(spec, variance, key)
         if stated.relative:
             _check_nowhere_zero(spec, variance)
     return [_maker(variance) for variance in found]

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
-
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.questions.building.demand import check_record, longest_record
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
@@ -148,14 +144,6 @@ def operating_points(spec: Spec) -> Array:
     return np.array([one.operating_point for one in quantisers]) if quantisers else _offsets(spec)
 
 
-def deviations(spec: Spec, table: Table) -> Array:
-    """Return the samples (n, r) of signal.csv about their operating points; a given record unchanged."""
-    columns = build_units(spec).excitations
-    values = np.stack([np.asarray(table.columns[name]) for name in columns], axis=1)
-    given = spec.given is not None and spec.given.type == "signal"
-    return values if given else values - operating_points(spec)
-
-
 def sampling_rate(spec: Spec) -> float:
     """Return the number of samples per second."""
     return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
@@ -181,17 +169,13 @@ def _other_methods(spec: Spec) -> tuple[str, ...]:
     """Other types that may serve as well; empty if the spec states how the signal is made."""
     if spec.signal.stated("phases", "lines", "bits"):
         return ()
-    levels: list[str] = ["slewed" if _ramps_needed(spec) else "binary"]
-    if not spec.plant.sampled or spec.signal.ramp:
-        levels = []
-    others = dict.fromkeys((_usual_method(spec), "multisine", *levels))
-    return tuple(method for method in others if method != _method(spec))
-
-
-def _ramps_needed(spec: Spec) -> bool:
-    """Whether the limits on moves prevent an input from switching between its levels at once."""
-    moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
-    return moves is not None and not spec.closed_loop and peak is not None and bool(np.isfinite(moves).any())
+    others = [_usual_method(spec), "multisine"]
+    if spec.plant.sampled and not spec.signal.ramp:
+        moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
+        # Limits on moves may prevent an input from switching between its levels at once.
+        slow = moves is not None and peak is not None and bool(np.isfinite(moves).any())
+        others.append("slewed" if slow and not spec.closed_loop else "binary")
+    return tuple(method for method in dict.fromkeys(others) if method != _method(spec))
 
 
 def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array | None:
@@ -200,30 +184,28 @@ def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array
 
 
 _STEPS_ROUNDING = 1e-12
-Fault = tuple[str, str, str, str]
-"""Code, key, message and hint of settings that no record can have."""
 
 
 def check_signal(spec: Spec) -> None:
     """Refuse settings that no record can have.
 
-    Raises:
-        SpecError: `conflicting-keys` when the samples are no whole number of periods of held values, or
-            the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few
-            levels, and for ramps between levels without a limit on moves; `out-of-range`;
-            `coarse-converter` when a limit is below the converter's step;
-            `no-sample-rate` for a WAV file of a sampling rate that is not a whole number of hertz.
+    Raises `SpecError`: `conflicting-keys` when the samples are no whole number of periods of held values, or
+    the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few levels, and
+    for ramps between levels without a limit on moves; `out-of-range`; `coarse-converter` when a limit is
+    below the converter's step; `no-sample-rate` for a WAV file of a sampling rate that is not a whole number
+    of hertz.
     """
     settings = build_signal_settings(spec)
     fixed = spec.goal != "shortest_experiment" or spec.signal.samples is not None
-    by_length = _length_faults(spec, settings) if fixed else iter(())
-    by_level = (_level_faults(spec, channel) for channel in range(spec.plant.inputs))
-    for code, key, message, hint in chain(by_length, _kind_faults(spec, settings), *by_level):
-        raise spec.complain(code, message, hint=hint, key=key)
+    if fixed:
+        _check_length(spec, settings)
+    _check_kind(spec, settings)
+    for channel in range(spec.plant.inputs):
+        _check_level(spec, channel)
 
 
-def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
-    """Samples, periods, holds, ramps and harmonics fit each other."""
+def _check_length(spec: Spec, settings: SignalSettings) -> None:
+    """Refuse samples, periods, holds, ramps and harmonics that do not fit each other."""
     samples, block, ramp = spec.signal_samples, settings.block, settings.ramp
     key = "signal.periods" if settings.periods > 1 else "signal.hold"
     least, period = least_period(spec.plant.inputs), samples // block
@@ -231,55 +213,48 @@ def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
         nearest = " or ".join(str(n) for n in (samples - samples % block, block * (period + 1)) if n)
         hint = f"write signal.samples: {nearest}, or another number of periods"
         message = f"{samples} samples are no multiple of {block}: periods times samples of a hold"
-        yield "conflicting-keys", key, message, hint
-    elif block > 1 and period < least:
+        raise spec.complain("conflicting-keys", message, hint=hint, key=key)
+    if block > 1 and period < least:
         hint = "ask for more samples, fewer periods or a shorter hold"
-        yield (
-            "conflicting-keys",
-            key,
-            f"the values of a period are {period}, and must be {least} or more",
-            hint,
-        )
+        message = f"the values of a period are {period}, and must be {least} or more"
+        raise spec.complain("conflicting-keys", message, hint=hint, key=key)
     if 2 * ramp > samples:
         message = f"ramp is {ramp}, but the signal has {samples} samples to fade in and out"
-        yield "out-of-range", "signal.ramp", message, f"write at most {samples // 2}"
+        raise spec.complain("out-of-range", message, hint=f"write at most {samples // 2}", key="signal.ramp")
     if isinstance(settings.lines, tuple):
         values = settings.period(samples) // blocks_of(settings.vectors, spec.plant.inputs)
         top, last = values // 2, settings.lines[-1]
         if last > top:
-            message = (
-                f"lines reaches harmonic {last}, but a period of {values} values has harmonics 0 to {top}"
-            )
-            yield "out-of-range", "signal.lines", message, "remove the higher ones, or make the period longer"
+            message = f"lines reaches harmonic {last}; a period of {values} values has harmonics 0 to {top}"
+            raise spec.complain("out-of-range", message, hint="make the period longer", key="signal.lines")
 
 
-def _kind_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
-    """Settings and files go with the type of the signal."""
+def _check_kind(spec: Spec, settings: SignalSettings) -> None:
+    """Refuse settings and files that do not go with the type of the signal."""
     method, bits, inputs = settings.method, settings.bits, spec.plant.inputs
     kind = kind_of(method)
     if settings.ramp and kind.of_levels:
         message = f"ramp does not go with type: {method}, whose values are of a few levels"
-        yield "unsuitable-key", "signal.ramp", message, "remove it, or use filtered_noise or multisine"
+        raise spec.complain("unsuitable-key", message, hint="remove it, or use multisine", key="signal.ramp")
     if kind.slewed and (spec.closed_loop or spec.limits.rate is None):
-        why = "in a loop does not limit what is applied" if spec.closed_loop else "is not stated"
-        message = f"type: slewed ramps between two levels at the speed of limits.rate, which {why}"
-        instead = "" if spec.closed_loop else "state limits.rate, or "
-        yield "unsuitable-key", "signal.type", message, f"{instead}use type: binary, which switches at once"
+        message = "type: slewed ramps between two levels at the speed of limits.rate, in open loop"
+        hint = "state limits.rate in open loop, or use type: binary, which switches at once"
+        raise spec.complain("unsuitable-key", message, hint=hint, key="signal.type")
     if not kind.several and inputs > 1:
         message = f"type: {method} is a signal of one input, and the plant has {inputs}"
-        yield "not-supported", "signal.type", message, "use type: multisine"
+        raise spec.complain("not-supported", message, hint="use type: multisine", key="signal.type")
     if method == "prbs" and bits is not None and 2**bits - 1 < least_period(inputs):
         # Several inputs apply shifted parts of the sequence.
         message = f"a register of {bits} bits repeats after {2**bits - 1} values, too few for {inputs} inputs"
-        yield "out-of-range", "signal.bits", message, "take more bits, or remove the key"
+        raise spec.complain("out-of-range", message, hint="take more bits", key="signal.bits")
     rate = sampling_rate(spec)
     if "wav" in (spec.signal.also or ()) and (round(rate) < 1 or abs(rate - round(rate)) > 1e-9 * rate):
         message = f"a WAV file needs a whole number of samples a second; the sample time gives {rate:.6g}"
-        yield "no-sample-rate", "signal.also", message, "use mat, or signal.csv, which has time stamps"
+        raise spec.complain("no-sample-rate", message, hint="use mat, or signal.csv", key="signal.also")
 
 
-def _level_faults(spec: Spec, channel: int) -> Iterator[Fault]:
-    """Level, limits and converter of an input fit each other; in a loop, limits are not of the signal."""
+def _check_level(spec: Spec, channel: int) -> None:
+    """Refuse a level, limits and a converter that do not fit; in a loop, limits are not of the signal."""
     bounds, inputs = build_bounds(spec), spec.plant.inputs
     limits = {
         key: float(bound[channel])
@@ -291,15 +266,15 @@ def _level_faults(spec: Spec, channel: int) -> Iterator[Fault]:
         of = f" of input {channel + 1}" if inputs > 1 else ""
         hint = "lower it, or remove it: the tool finds the level that the accuracy needs"
         message = f"amplitudes is {levels[channel]:g}, above limits.amplitude {most:g}{of}"
-        yield "conflicting-keys", "signal.amplitudes", message, hint
+        raise spec.complain("conflicting-keys", message, hint=hint, key="signal.amplitudes")
     for quantiser in bounds.quantisers[channel : channel + 1]:
         step, span = quantiser.step, quantiser.span
         if quantiser.reach() < step:
             message = f"the offset {quantiser.offset:g} leaves no room in [{-span:g}, {span - step:g}]"
             hint = "move the offset, or widen quantisation.range"
-            yield "coarse-converter", "signal.offset", message, hint
+            raise spec.complain("coarse-converter", message, hint=hint, key="signal.offset")
         for key, bound in limits.items():
             if bound * (1 + _STEPS_ROUNDING) < step:
                 message = f"{key} is {bound:g}, less than one step {step:g} of the converter"
                 hint = "take a converter of more bits or of a smaller range, or raise the limit"
-                yield "coarse-converter", key, message, hint
+                raise spec.complain("coarse-converter", message, hint=hint, key=key)

@@ -48,8 +48,7 @@ def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
 def _true_system(spec: Spec) -> TrueSystem | None:
     """Return the system of `simulation.plant` and `simulation.noise`; None if neither is stated.
 
-    Raises:
-        SpecError: the loop is stable with the nominal plant, and unstable with the true one.
+    Raises `SpecError`: the loop is stable with the nominal plant, and unstable with the true one.
     """
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):

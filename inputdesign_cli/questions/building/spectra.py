@@ -143,11 +143,9 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
     """Return the spectrum of `r` inputs in a table, and its coefficients.
 
     Columns phi, or phi_11, phi_12_re, phi_12_im, phi_22, .. are a density, linear in between. Columns power,
-    or power_11, .. are the powers of sinusoids at these frequencies, their mean squares.
-
-    Raises:
-        DataError: the file cannot be read, or holds no spectrum (`bad-table`).
-        SpecError: `too-large` for more sinusoids than `spectrum.given.frequencies` takes.
+    or power_11, .. are the powers of sinusoids at these frequencies, their mean squares. Raises `DataError`:
+    the file cannot be read, or holds no spectrum (`bad-table`). Or `SpecError`: `too-large` for more
+    sinusoids than `spectrum.given.frequencies` takes.
     """
     path = spec.resolve_path(name)
     lines = has_column(path, _POWER, key=_KEY) and not has_column(path, _DENSITY, key=_KEY)
@@ -157,7 +155,11 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
     if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
         wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
         raise bad_table(spec, name, f"{symbol} must be {wanted}", _HINTS[symbol], _KEY)
-    frequency = _below_nyquist(spec, name, frequency)
+    if spec.plant.sampled and frequency[-1] > np.pi * (1 + 1e-4):
+        message = f"it reaches {build_units(spec).named(frequency[-1])}, beyond the Nyquist frequency"
+        raise bad_table(spec, name, message, "frequencies end at pi/sample_time", _KEY)
+    if spec.plant.sampled:  # the last one may lie beyond pi by rounding
+        frequency = np.minimum(frequency, np.pi)
     if not lines:
         return TabulatedSpectrum(frequency, values), np.ones(1)
     most = SIZES["spectrum.given.frequencies"]
@@ -188,14 +190,3 @@ def _read(spec: Spec, name: str, symbol: str, r: int, *, least: int) -> tuple[Ar
     for i, j in pairs:
         values[:, j, i] = values[:, i, j].conj()
     return columns["frequency"], values
-
-
-def _below_nyquist(spec: Spec, name: str, frequency: Array) -> Array:
-    """The frequencies; the last may lie beyond pi by rounding. It raises `DataError` (`bad-table`)."""
-    if not spec.plant.sampled:
-        return frequency
-    if frequency[-1] > np.pi * (1 + 1e-4):
-        reached = f"{frequency[-1] / build_units(spec).frequency:g} rad/{spec.time_unit}"
-        message = f"it reaches {reached}, beyond the Nyquist frequency"
-        raise bad_table(spec, name, message, "frequencies end at pi/sample_time", _KEY)
-    return np.minimum(frequency, np.pi)

@@ -24,26 +24,17 @@ from inputdesign_cli.plant import (
     hold_entries,
 )
 from inputdesign_cli.plant.model import DELAY
+from inputdesign_cli.questions.building import parameters
 from inputdesign_cli.questions.building.controllers import controller_matrix
-from inputdesign_cli.questions.building.demand import check_effects, check_model
+from inputdesign_cli.questions.building.demand import check_effects, check_model, on_finite_information
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.building.integrators import on_finite_information
-from inputdesign_cli.questions.building.parameters import degrees_of, delays_of, reparametrised
-from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
 from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
-from inputdesign_cli.specification.models.spectrum import (
-    GivenMultisine,
-    GivenSignal,
-    GivenSpectrum,
-    GivenTable,
-    MultisineSpectrum,
-    PolynomialSpectrum,
-)
 
 # A pole this near to the unit circle is on it, but for rounding.
 _ROUNDING = 1e-9
@@ -52,9 +43,8 @@ _ROUNDING = 1e-9
 def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> StateSpaceModel:
     """Return the state-space model at the nominal parameters.
 
-    Raises:
-        SpecError: `unstable-polynomial` for an unstable predictor, or an unstable plant without a controller;
-            `conflicting-keys` for K together with coloured noise.
+    Raises `SpecError`: `unstable-polynomial` for an unstable predictor, or an unstable plant without a
+    controller; `conflicting-keys` for K together with coloured noise.
     """
     stated = plant.state_space
     shapes = {"D": (plant.outputs, plant.inputs), "K": (len(stated.A), plant.outputs)}
@@ -91,8 +81,7 @@ _WITHIN = 0.95
 def build_model(spec: Spec) -> Model:
     """Return the model of `plant` and `noise`.
 
-    Raises:
-        SpecError: `not-supported` for a regression; what is wrong with known and with named parameters.
+    Raises `SpecError`: `not-supported` for a regression; what is wrong with known and with named parameters.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
     noise = spec.noise
@@ -113,9 +102,9 @@ def build_model(spec: Spec) -> Model:
                 _arrays(matrix.denominator_matrix, -1),
                 covariance,
                 common=matrix.common,
-                delay=delays_of(plant),
+                delay=parameters.delays_of(plant),
                 common_delay=matrix.common_delay,
-                degrees=degrees_of(plant),
+                degrees=parameters.degrees_of(plant),
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
         case StateSpacePlant() as plant:
@@ -126,7 +115,7 @@ def build_model(spec: Spec) -> Model:
             raise spec.complain("not-supported", message, hint=hint, key="plant")
     if any(noise.drifts) or any(len(p) > 1 for p in (*C, *D)):
         model = Coloured(model, C, D, noise.held, noise.drifts)
-    return reparametrised(spec, plant, model)
+    return parameters.reparametrised(spec, plant, model)
 
 
 def polynomial_model(
@@ -167,10 +156,9 @@ def bare_experiment(spec: Spec, model: Model, loop: Loop | None = None) -> Exper
 def build_experiment(spec: Spec) -> Experiment:
     """Return the experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
-    Raises:
-        SpecError: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
-            algebraic loop; a prior that does not fit the parameters.
-        DataError: the record of a prior cannot be used.
+    Raises `SpecError`: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
+    algebraic loop; a prior that does not fit the parameters. Or `DataError`: the record of a prior cannot be
+    used.
     """
     model, controller = build_model(spec), spec.experiment.controller
     check_model(spec, model)
@@ -194,9 +182,8 @@ def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
 def excitation_band(spec: Spec) -> tuple[float, float]:
     """Return the band of the excitation in rad/sample, or rad per time unit in continuous time.
 
-    Raises:
-        SpecError: `needs-band` in continuous time without a band.
-        DataError: the table of a given spectrum cannot be read.
+    Raises `SpecError`: `needs-band` in continuous time without a band. Or `DataError`: the table of a given
+    spectrum cannot be read.
     """
     band = _stated_band(spec)
     if spec.plant.sampled:
@@ -215,17 +202,17 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
 def _stated_band(spec: Spec) -> tuple[float, float] | None:
     """The band of the spectrum or of the limits; in continuous time also of a given excitation."""
     match spec.spectrum:
-        case PolynomialSpectrum(band=band):
+        case spectrum.PolynomialSpectrum(band=band):
             return band
-        case MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
+        case spectrum.MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
             return _around(given)
-        case GivenSpectrum(given=stated) if spec.limits.band is None and not spec.plant.sampled:
+        case spectrum.GivenSpectrum(given=stated) if spec.limits.band is None and not spec.plant.sampled:
             match stated:
-                case GivenSignal():
+                case spectrum.GivenSignal():
                     return 0.0, np.pi / spec.sample_time
-                case GivenMultisine():
+                case spectrum.GivenMultisine():
                     return _around(stated.frequencies)
-                case GivenTable(file=name):
+                case spectrum.GivenTable(file=name):
                     rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)
                     return _around(rows["frequency"].tolist())
     return spec.limits.band
@@ -244,9 +231,8 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     """The information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
-    stated = stated_prior(spec)
-    if stated is not None:
-        return stated.over(spec, experiment.model.names)
+    if (stated := parameters.stated_prior(spec, experiment.model.names)) is not None:
+        return stated[0]
     record = prior_record(spec)
     return None if record is None else information_in(spec, experiment, record)
 
@@ -260,22 +246,18 @@ def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
 def prior_record(spec: Spec) -> Array | None:
     """Return the earlier samples (n, r) that `experiment.prior` names; None if it names none.
 
-    Raises:
-        DataError: they cannot be used.
+    Raises `DataError`: they cannot be used.
     """
     prior = spec.experiment.prior
     if prior is None or prior.names_a_model or not isinstance(prior.information, str):
         return None
-    return read_excitation_record(spec, prior.information, PRIOR)
+    return read_excitation_record(spec, prior.information, parameters.PRIOR)
 
 
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
     """Return the samples (n, r) of an excitation from columns u1, u2, .. (in closed loop r1, ..) of a file.
 
-    A single input may have the column u.
-
-    Raises:
-        DataError: the file cannot be used.
+    A single input may have the column u. Raises `DataError`: the file cannot be used.
     """
     units = build_units(spec)
     names = [units.excitation] if units.inputs == 1 else list(units.excitations)
@@ -286,8 +268,7 @@ def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
 def record_step(spec: Spec) -> float:
     """Return the time between samples in the unit of the experiment's frequencies: 1, or sample_time.
 
-    Raises:
-        SpecError: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
+    Raises `SpecError`: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
     """
     if spec.plant.sampled:
         return 1.0

@@ -42,9 +42,8 @@ def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
     """Return the wanted columns of a signal, in which no sample may be missing, not even between its rows.
 
-    Raises:
-        DataError: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in between;
-            `beyond-precision`.
+    Raises `DataError`: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in
+    between; `beyond-precision`.
     """
     sheet = read_sheet(path, key=key)
     for line in sheet.passed:
@@ -60,8 +59,7 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 def has_column(path: Path, start: str, *, key: str) -> bool:
     """Return whether some header of a data file begins like this.
 
-    Raises:
-        DataError: `data-unreadable`.
+    Raises `DataError`: `data-unreadable`.
     """
     return any(name.startswith(start) for name in read_sheet(path, key=key).header)
 

@@ -7,8 +7,6 @@ takes all power of the input away, while the power of the output there informs a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,10 +46,8 @@ _OUTCOMES = {
 def check_every_direction_counts(spec: Spec, question: Question) -> None:
     """Refuse a design in which some combination of the inputs may have any power.
 
-    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero.
-
-    Raises:
-        SpecError: `no-cost` or `needs-limits`.
+    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero. Raises
+    `SpecError`: `no-cost` or `needs-limits`.
     """
     priced = priced_powers(question)
     if priced is None:
@@ -77,14 +73,14 @@ def _free_direction(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:
 def check_reach(spec: Spec, question: Question) -> Reach:
     """Return what a bound over every spectrum may claim; refuse a family that has no best spectrum.
 
-    Raises:
-        SpecError: `no-cost` or `needs-limits`.
+    Raises `SpecError`: `no-cost` or `needs-limits`.
     """
     found = free_information(question)
     if found is None:
         return Reach()
+    frequencies, unbounded, reached = found
     units = build_units(spec)
-    places = " and ".join(units.named(w) for w in found.frequencies)
+    places = " and ".join(units.named(w) for w in frequencies)
     keys = dict.fromkeys(limit.key for limit in question.limits if limit.upper)
     uncounted = "costs nothing" if question.goal == "cost" else f"is not limited by {', '.join(keys)}"
     free = f"excitation at {places} informs about the parameters and {uncounted}"
@@ -96,25 +92,21 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         others = f"{section}.output_power or {others}"  # at a pole in the loop only outputs have power
     avoid = "leave it out by limits.band"
     off = 2.0 * _OFF * hi
-    ends = [any(abs(w - end) < off for w in found.frequencies) for end in (lo, hi)]
+    ends = [any(abs(w - end) < off for w in frequencies) for end in (lo, hi)]
     # Lines are kept off an end of the band; they close in on a frequency inside it from both sides.
-    inside = question.goal == "factor" and any(lo + off <= w <= hi - off for w in found.frequencies)
-    on_it = question.goal == "factor" and found.reached and not question.basis.free
+    inside = question.goal == "factor" and any(lo + off <= w <= hi - off for w in frequencies)
+    on_it = question.goal == "factor" and reached and not question.basis.free
     approached = "the best is approached with power ever nearer to it"
-    outcome = _OUTCOMES[question.goal] if found.unbounded else approached
-    if found.reached and (found.unbounded or inside or on_it):
+    outcome = _OUTCOMES[question.goal] if unbounded else approached
+    if reached and (unbounded or inside or on_it):
         add, code = "add", "needs-limits"
         if section == "cost":
             add, code = "give a weight, however small, to", "no-cost"
         message = f"{free}: {outcome}, and no spectrum is the best"
         hint = f"{add} {others}; or {avoid if question.basis.free else 'choose other lines'}"
         raise spec.complain(code, message, hint=hint, key=section)
-    if found.unbounded or inside:
-        return Reach(
-            bounded=False,
-            note="the design is the best of its spectrum type, and there is no bound over every spectrum: "
-            f"{free}, so that {outcome}; with {others} there is one",
-        )
+    if unbounded or inside:
+        return Reach(bounded=False, note=f"{free}, so that {outcome}; with {others} there is one")
     inner = (lo + ends[0] * _OFF * hi, hi - ends[1] * _OFF * hi)
     if not question.basis.free:
         return Reach(attained=False, band=inner)
@@ -122,26 +114,12 @@ def check_reach(spec: Spec, question: Question) -> Reach:
     return Reach(attained=False, band=inner, note=note)
 
 
-@dataclass(frozen=True)
-class FreeInformation:
-    """Frequencies at which the information per unit of price grows without bound.
-
-    Attributes:
-        frequencies: in the unit of the experiment.
-        unbounded: whether power ever nearer to them meets all requirements at no price, or the criterion has
-            no bound; otherwise the best value is only approached there.
-        reached: whether spectra of the family can have power there.
-    """
-
-    frequencies: tuple[float, ...]
-    unbounded: bool
-    reached: bool
-
-
-def free_information(question: Question) -> FreeInformation | None:
+def free_information(question: Question) -> tuple[tuple[float, ...], bool, bool] | None:
     """Return the frequencies of the band at which the information per unit of price has no bound.
 
-    None without one, and for robust designs: the poles of other plants lie elsewhere.
+    Then whether power ever nearer to them meets all requirements at no price, or the criterion has no bound
+    (otherwise the best value is only approached there), and whether spectra of the family can have power
+    there. None without one, and for robust designs: the poles of other plants lie elsewhere.
     """
     priced = priced_powers(question)
     if priced is None or question.others:
@@ -167,7 +145,7 @@ def free_information(question: Question) -> FreeInformation | None:
     if not reached and not basis.has_density:
         lines = basis.lines(basis.even)[0]
         reached = bool(np.any(np.abs(lines[:, None] - np.array(places)) <= _ON * experiment.band[1]))
-    return FreeInformation(places, gained > 0.5 * grown / experiment.size, reached)
+    return places, gained > 0.5 * grown / experiment.size, reached
 
 
 def priced_powers(question: Question) -> list[PricedPower] | None:

@@ -1,9 +1,9 @@
-"""Spec -> the plants that the true one might be, each with the requirements on the design there."""
+"""`uncertainty` -> what is known of the plant before any data, the plants it may be, rival dead times."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,15 +16,18 @@ from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Model
-from inputdesign_cli.questions.building.demand import check_effects
-from inputdesign_cli.questions.building.integrators import on_finite_information
-from inputdesign_cli.questions.building.knowledge import KEY, UncertainPlant
+from inputdesign_cli.questions.building import system
+from inputdesign_cli.questions.building.demand import check_effects, on_finite_information
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.model_error import confidence_factor, unstated_errors
+from inputdesign_cli.questions.building.parameters import build_earlier, check_known, embedded, inverse
 from inputdesign_cli.questions.building.requirements import build_asked
-from inputdesign_cli.questions.building.system import build_loop
+from inputdesign_cli.questions.common.foresight import Foresight
+from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.sizes import most
-from inputdesign_cli.specification.models.uncertainty import SOURCES
+from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
 from inputdesign_cli.spectrum import Basis
 
 _DEFAULT_SCENARIOS, _DEFAULT_RADIUS = 100, 0.998
@@ -35,103 +38,11 @@ _AT_A_TIME = 50
 _ON_CIRCLE = 1e-9
 # Frequencies at which an entry of G is evaluated, in shares of the band.
 _PROBES = np.array([0.31, 0.57, 0.83])
-
-
-def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Plants | None:
-    """Return the scenarios of `uncertainty`; None without this section.
-
-    Args:
-        experiment: on the nominal plant, of the length that the question is about.
-        basis: of the design; None of an excitation that is given.
-
-    Raises:
-        SpecError: `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`,
-            `wrong-estimate`; a requirement cannot be asked of one of the plants.
-        DataError: a record cannot be used.
-    """
-    stated = spec.uncertainty
-    if stated is None:
-        return None
-    scenario = _Scenarios(spec, stated, experiment)
-    paid: Paid = stated.cost or ("mean" if spec.closed_loop else "nominal")
-    names = experiment.model.names
-    if isinstance(stated.scenarios, tuple):
-        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
-    number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
-    batch = scenario.batch(number, np.random.default_rng([stated.seed, 0]))
-
-    def afresh() -> Iterator[Batch]:
-        rng = np.random.default_rng([stated.seed, 1])
-        for begun in range(0, stated.fresh, _AT_A_TIME):
-            yield scenario.batch(min(_AT_A_TIME, stated.fresh - begun), rng)
-
-    return Plants(
-        batch,
-        stated.stated(*SOURCES)[0],
-        names,
-        stated.r_adm,
-        paid,
-        discard=int(stated.discard * number),
-        afresh=afresh if stated.fresh else None,
-        fresh=stated.fresh,
-        at=scenario.possible,
-        unknowns=None if basis is not None and basis.free else _unknowns(spec, basis),
-        region=None if stated.worst_case is None else scenario.worst_region(stated.worst_case),
-    )
-
-
-def _needed(spec: Spec, basis: Basis | None) -> int | None:
-    """Return the number of scenarios for the stated risk; None if no risk is stated."""
-    stated = spec.uncertainty
-    if stated is None or stated.risk is None:
-        return None
-    if basis is not None and basis.free:
-        message = "how many plants a risk takes depends on the number of unknowns: a free spectrum has none"
-        hint = "write scenarios: 200 in place of risk, or choose spectrum: {type: fir}"
-        raise spec.complain("not-supported", message, hint=hint, key=f"{KEY}.risk")
-    needed = samples_for(stated.risk, 1.0 - CONFIDENCE, _unknowns(spec, basis))
-    if needed > most("uncertainty.scenarios"):
-        takes = f"a risk of {stated.risk:g} with {_unknowns(spec, basis)} unknowns takes {needed} plants"
-        message = f"{takes}, and at most {most('uncertainty.scenarios')} are taken"
-        hint = "allow more risk, or lower the order of the spectrum"
-        raise spec.complain("too-large", message, hint=hint, key=f"{KEY}.risk")
-    return needed
-
-
-def _unknowns(spec: Spec, basis: Basis | None) -> int:
-    """Count the unknowns of the program: of the spectrum, and the factor, length or cost.
-
-    A given excitation has no unknowns. The number of plants that prove a risk is then the number for one:
-    (1 - risk)^plants is the probability that all of them meet the accuracy by chance.
-    """
-    if basis is None:
-        return 1
-    stated = spec.uncertainty
-    return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
-
-
-def farthest_radius(spec: Spec, experiment: Experiment) -> float:
-    """Return the radius beyond which poles of the plant, or of its loop, count as unstable.
-
-    Raises:
-        SpecError: `unsuitable-key`, `no-stable-plant`.
-    """
-    nominal = experiment.model
-    within = None if spec.uncertainty is None else spec.uncertainty.stable_within
-    if nominal.continuous:
-        if within is not None:
-            message = "a radius is one of poles in z, and the plant is not sampled"
-            hint = "remove stable_within: unstable plants are not drawn"
-            raise spec.complain("unsuitable-key", message, hint=hint, key=f"{KEY}.stable_within")
-        return 1.0
-    own = (experiment.loop or nominal).radius
-    if within is None:
-        return max(_DEFAULT_RADIUS, 0.5 * (1.0 + own))
-    if own > within:
-        message = f"the nominal model itself has a pole, or a zero of its noise, at radius {own:.6g}"
-        hint = f"write {0.5 * (1.0 + own):.6g}, or leave it out"
-        raise spec.complain("no-stable-plant", message, hint=hint, key=f"{KEY}.stable_within")
-    return within
+KEY = "uncertainty"
+# Confidences of an ellipsoid: of the plants that are possible, and of the plants that a design is made for.
+POSSIBLE, _DESIGNED = 0.999, 0.998
+# An estimate that is farther from the plant of the spec, in standard deviations, is of another plant.
+_AWAY = 3.0
 
 
 class _NoPlantError(Exception):
@@ -142,8 +53,129 @@ class _NoPlantError(Exception):
         self.code, self.what = code, what
 
 
-class _Scenarios(UncertainPlant):
-    """Makes plants of parameters."""
+@dataclass(frozen=True)
+class UncertainPlant:
+    """The parameters of an uncertain plant, and the plants that they make.
+
+    Attributes:
+        spec: exists here only while a question is built.
+        stated: its section `uncertainty`.
+        experiment: on the nominal plant.
+    """
+
+    spec: Spec
+    stated: Uncertainty
+    experiment: Experiment
+
+    @property
+    def nominal(self) -> Model:
+        """The plant of the spec."""
+        return self.experiment.model
+
+    @cached_property
+    def spread(self) -> Knowledge:
+        """How far the parameters spread around the nominal ones (k,), in columns (k, m).
+
+        They are even over the box of all intervals, or normal with the covariance columns columns^T. Raises
+        `SpecError`: `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, or
+        `wrong-estimate`. Or `DataError`: a record cannot be used.
+        """
+        if self.stated.intervals is not None:
+            return self._box(self.stated.intervals)
+        covariance = self._covariance()
+        varied = np.flatnonzero(np.diag(covariance) > 0.0)
+        columns = np.zeros((len(covariance), varied.size))
+        columns[varied] = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
+        return Knowledge(self.nominal.theta, columns, box=False)
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """Draw parameters (k,)."""
+        known, size = self.spread, self.spread.columns.shape[1]
+        z = rng.uniform(-1.0, 1.0, size) if known.box else rng.standard_normal(size)
+        return np.asarray(known.centre + known.columns @ z)
+
+    def region(self, confidence: float) -> Knowledge:
+        """Return the region of the draws: the ellipsoid of a confidence, or the box of all intervals."""
+        known = self.spread
+        if known.box:
+            return replace(known, columns=known.columns[:, np.any(known.columns != 0.0, axis=0)])
+        return replace(known, columns=confidence_factor(confidence, known.columns.shape[1]) * known.columns)
+
+    def second_moments(self) -> Array:
+        """Return the mean (k, k) of (theta - nominal)(theta - nominal)^T over the draws, or over the list."""
+        nominal, listed = self.nominal.theta, self.stated.scenarios
+        if isinstance(listed, tuple):
+            away = np.array([self.moved(values, f"{KEY}.scenarios") for values in listed]) - nominal
+            return np.asarray(away.T @ away / len(listed))
+        columns, off = self.spread.columns, self.spread.centre - nominal
+        # The variance of even draws is a third of the squared half width.
+        return np.asarray(columns @ columns.T / (3.0 if self.spread.box else 1.0) + np.outer(off, off))
+
+    def moved(self, values: Mapping[str, float], key: str) -> Array:
+        """Return the nominal parameters (k,) with other values of some of them.
+
+        Raises `SpecError`: `unknown-parameter`.
+        """
+        names, theta = list(self.nominal.names), self.nominal.theta.copy()
+        for name, value in values.items():
+            check_known(self.spec, names, name, key)
+            theta[names.index(name)] = value
+        return theta
+
+    def _box(self, intervals: Mapping[str, tuple[float, float]]) -> Knowledge:
+        names, nominal = list(self.nominal.names), self.nominal.theta
+        centre, columns = nominal.copy(), np.zeros((nominal.size, len(intervals)))
+        for column, (name, (low, high)) in enumerate(intervals.items()):
+            key = f"{KEY}.intervals.{name}"
+            check_known(self.spec, names, name, key)
+            row = names.index(name)
+            if not low <= nominal[row] <= high:
+                message = f"{name} is {nominal[row]:.6g} in the plant, outside of [{low:g}, {high:g}]"
+                hint = "widen the interval, or move the plant into it"
+                raise self.spec.complain("bad-interval", message, hint=hint, key=key)
+            centre[row], columns[row, column] = 0.5 * (low + high), 0.5 * (high - low)
+        return Knowledge(centre, columns, box=True)
+
+    def _covariance(self) -> Array:
+        """The covariance (k, k) of the parameters, zero for known ones."""
+        stated, names = self.stated, self.nominal.names
+        key = f"{KEY}.{stated.stated(*SOURCES)[0]}"
+        source = stated.covariance if stated.covariance is not None else stated.information
+        if isinstance(source, str):
+            if not source.endswith((".yaml", ".yml")):
+                record = system.read_excitation_record(self.spec, source, key)
+                earlier = replace(self.experiment, prior=None)
+                return self._inverted(system.information_in(self.spec, earlier, record), key)
+            found = load_estimate(self.spec, source, key)
+            covariance, listed = np.array(found.covariance, dtype=float), tuple(found.parameters)
+            full = embedded(self.spec, names, covariance, listed, key)
+            self._check_same_plant(source, found.parameters, full, key)
+            return full
+        matrix = np.array(source, dtype=float)
+        if stated.covariance is None:
+            matrix = self._inverted(matrix, key)
+        return embedded(self.spec, names, matrix, stated.parameters, key)
+
+    def _inverted(self, information: Array, key: str) -> Array:
+        try:
+            return inverse(information)
+        except np.linalg.LinAlgError:
+            message = "the information matrix is singular: no plants can be drawn of some parameters"
+            hint = "name the parameters that it is about, or take an experiment that informs about all"
+            raise self.spec.complain("not-positive-definite", message, hint=hint, key=key) from None
+
+    def _check_same_plant(self, name: str, values: Mapping[str, float], covariance: Array, key: str) -> None:
+        """Raise `SpecError` (`wrong-estimate`) if the file is about another plant than the spec."""
+        rows = zip(self.nominal.names, self.nominal.theta, np.sqrt(np.diag(covariance)), strict=True)
+        both = ", ".join(
+            f"{parameter} is {values[parameter]:.4g} there and {nominal:.4g} here"
+            for parameter, nominal, deviation in rows
+            if parameter in values and abs(values[parameter] - nominal) > _AWAY * deviation
+        )
+        if both:
+            message = f"{name} is an estimate of another plant: {both}, more than {_AWAY:g} deviations apart"
+            hint = f"take plant and noise from the same file: include: {name}"
+            raise self.spec.complain("wrong-estimate", message, hint=hint, key=key)
 
     @cached_property
     def _radius(self) -> float:
@@ -153,10 +185,8 @@ class _Scenarios(UncertainPlant):
     def at(self, theta: Array, radius: float) -> Alternative:
         """Return the plant with these parameters, and the requirements on the design there.
 
-        Raises:
-            _NoPlantError: they give no plant of this structure, or a pole of it, or of its loop, lies beyond
-                the radius.
-            SpecError: a requirement cannot be asked of this plant.
+        Raises `_NoPlantError`: they give no plant of this structure, or a pole of it, or of its loop, lies
+        beyond the radius. Or `SpecError`: a requirement cannot be asked of this plant.
         """
         model, loop = self._sound(theta, radius)
         self._check_seen(theta, model)
@@ -167,9 +197,8 @@ class _Scenarios(UncertainPlant):
             return Alternative(experiment, *build_asked(self.spec, experiment, self.nominal))
         except SpecError as error:
             found = error.diagnostics[0]
-            raise self.spec.complain(
-                found.code, f"at the scenario {self._named(theta)}: {found.message}", hint=found.hint, key=KEY
-            ) from error
+            message = f"at the scenario {self._named(theta)}: {found.message}"
+            raise self.spec.complain(found.code, message, hint=found.hint, key=KEY) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
         model, controller = self.nominal.at(theta), self.spec.experiment.controller
@@ -183,7 +212,7 @@ class _Scenarios(UncertainPlant):
         loop = None
         if controller is not None:
             try:
-                loop = build_loop(self.spec, model, controller)
+                loop = system.build_loop(self.spec, model, controller)
             except SpecError as error:
                 raise _NoPlantError("no-stable-plant", error.diagnostics[0].message) from error
         if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
@@ -250,21 +279,16 @@ class _Scenarios(UncertainPlant):
     def batch(self, number: int, rng: np.random.Generator) -> Batch:
         """Draw a number of plants; draws that give no stable plant are repeated.
 
-        Raises:
-            SpecError: `no-stable-plant` if hardly any draw gives one.
+        Raises `SpecError`: `no-stable-plant` if hardly any draw gives one.
         """
         radius, thetas, plants = self._radius, list[Array](), list[Alternative]()
         most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
         while len(plants) < number:
             if drawn >= most_draws:
-                what = "loops" if self.spec.closed_loop else "plants"
-                raise self.spec.complain(
-                    "no-stable-plant",
-                    f"only {len(plants)} of {drawn} {what} drawn have all their poles within {radius:.6g}, "
-                    f"and dead times, gains and expressions that a plant can have{last}",
-                    hint="the uncertainty reaches far beyond what is possible: state it more tightly",
-                    key=KEY,
-                )
+                few = f"only {len(plants)} of {drawn} plants drawn are sound"
+                message = f"{few}, in their loop if there is one, with poles within {radius:.6g}{last}"
+                hint = "the uncertainty reaches far beyond what is possible: state it more tightly"
+                raise self.spec.complain("no-stable-plant", message, hint=hint, key=KEY)
             theta, drawn = self.draw(rng), drawn + 1
             try:
                 plants.append(self.at(theta, radius))
@@ -273,3 +297,166 @@ class _Scenarios(UncertainPlant):
                 continue
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), drawn)
+
+
+def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Plants | None:
+    """Return the scenarios of `uncertainty`; None without this section.
+
+    Args:
+        experiment: on the nominal plant, of the length that the question is about.
+        basis: of the design; None of an excitation that is given.
+
+    Raises:
+        SpecError: `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`,
+            `wrong-estimate`; a requirement cannot be asked of one of the plants.
+        DataError: a record cannot be used.
+    """
+    stated = spec.uncertainty
+    if stated is None:
+        return None
+    scenario = UncertainPlant(spec, stated, experiment)
+    paid: Paid = stated.cost or ("mean" if spec.closed_loop else "nominal")
+    names = experiment.model.names
+    if isinstance(stated.scenarios, tuple):
+        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
+    number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
+    batch = scenario.batch(number, np.random.default_rng([stated.seed, 0]))
+
+    def afresh() -> Iterator[Batch]:
+        rng = np.random.default_rng([stated.seed, 1])
+        for begun in range(0, stated.fresh, _AT_A_TIME):
+            yield scenario.batch(min(_AT_A_TIME, stated.fresh - begun), rng)
+
+    return Plants(
+        batch,
+        stated.stated(*SOURCES)[0],
+        names,
+        stated.r_adm,
+        paid,
+        discard=int(stated.discard * number),
+        afresh=afresh if stated.fresh else None,
+        fresh=stated.fresh,
+        at=scenario.possible,
+        unknowns=None if basis is not None and basis.free else _unknowns(spec, basis),
+        region=None if stated.worst_case is None else scenario.worst_region(stated.worst_case),
+    )
+
+
+def _needed(spec: Spec, basis: Basis | None) -> int | None:
+    """Return the number of scenarios for the stated risk; None if no risk is stated."""
+    stated = spec.uncertainty
+    if stated is None or stated.risk is None:
+        return None
+    if basis is not None and basis.free:
+        message = "how many plants a risk takes depends on the number of unknowns: a free spectrum has none"
+        hint = "write scenarios: 200 in place of risk, or choose spectrum: {type: fir}"
+        raise spec.complain("not-supported", message, hint=hint, key=f"{KEY}.risk")
+    needed = samples_for(stated.risk, 1.0 - CONFIDENCE, _unknowns(spec, basis))
+    if needed > most("uncertainty.scenarios"):
+        takes = f"a risk of {stated.risk:g} with {_unknowns(spec, basis)} unknowns takes {needed} plants"
+        message = f"{takes}, and at most {most('uncertainty.scenarios')} are taken"
+        hint = "allow more risk, or lower the order of the spectrum"
+        raise spec.complain("too-large", message, hint=hint, key=f"{KEY}.risk")
+    return needed
+
+
+def _unknowns(spec: Spec, basis: Basis | None) -> int:
+    """Count the unknowns of the program: of the spectrum, and the factor, length or cost.
+
+    A given excitation has no unknowns. The number of plants that prove a risk is then the number for one:
+    (1 - risk)^plants is the probability that all of them meet the accuracy by chance.
+    """
+    if basis is None:
+        return 1
+    stated = spec.uncertainty
+    return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
+
+
+def farthest_radius(spec: Spec, experiment: Experiment) -> float:
+    """Return the radius beyond which poles of the plant, or of its loop, count as unstable.
+
+    Raises `SpecError`: `unsuitable-key`, `no-stable-plant`.
+    """
+    nominal = experiment.model
+    within = None if spec.uncertainty is None else spec.uncertainty.stable_within
+    if nominal.continuous:
+        if within is not None:
+            message = "a radius is one of poles in z, and the plant is not sampled"
+            hint = "remove stable_within: unstable plants are not drawn"
+            raise spec.complain("unsuitable-key", message, hint=hint, key=f"{KEY}.stable_within")
+        return 1.0
+    own = (experiment.loop or nominal).radius
+    if within is None:
+        return max(_DEFAULT_RADIUS, 0.5 * (1.0 + own))
+    if own > within:
+        message = f"the nominal model itself has a pole, or a zero of its noise, at radius {own:.6g}"
+        hint = f"write {0.5 * (1.0 + own):.6g}, or leave it out"
+        raise spec.complain("no-stable-plant", message, hint=hint, key=f"{KEY}.stable_within")
+    return within
+
+
+def build_knowledge(spec: Spec, confidence: float = POSSIBLE) -> Knowledge | None:
+    """Return the region of the plants that are possible; None if it is not stated, or plants are listed.
+
+    Raises `SpecError` or `DataError`: see `UncertainPlant.spread`.
+    """
+    stated = spec.uncertainty
+    if stated is None or isinstance(stated.scenarios, tuple):
+        return None
+    return UncertainPlant(spec, stated, system.build_experiment(spec)).region(confidence)
+
+
+def build_foreseen(spec: Spec, nominal: Model) -> Foreseen | None:
+    """Return the plants that the design was made for; None without a stated region."""
+    region = build_knowledge(spec, _DESIGNED)
+    return None if region is None else Foreseen(region, np.flatnonzero(nominal.in_plant))
+
+
+def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
+    """Return the covariance (k, k) of the parameters of the spec's own plant; zero if it states none.
+
+    It follows from `uncertainty`, or else from the `estimate` block that identify wrote.
+    """
+    covariance = np.zeros((nominal.theta.size, nominal.theta.size))
+    if spec.uncertainty is not None:
+        moments = UncertainPlant(spec, spec.uncertainty, system.build_experiment(spec)).second_moments()
+        covariance[: len(moments), : len(moments)] = moments
+    elif spec.estimate is not None:
+        names, values = list(nominal.names), spec.estimate.parameters
+        rows = [row for row, name in enumerate(values) if name in names]
+        own = [names.index(name) for name in values if name in names]
+        stated = np.array(spec.estimate.covariance, dtype=float)[np.ix_(rows, rows)]
+        away = np.array(list(values.values()))[rows] - nominal.theta[own]
+        if np.all(np.abs(away) <= _AWAY * np.sqrt(np.diag(stated))):
+            covariance[np.ix_(own, own)] = stated
+    return covariance
+
+
+def build_foresight(spec: Spec, nominal: Experiment) -> Foresight | None:
+    """Return how rival dead times are foreseen; None for plants that have none to be estimated.
+
+    Args:
+        nominal: the experiment, in raw parameters.
+    """
+    model = nominal.model
+    late = np.flatnonzero(model.dead_times)
+    if late.size == 0:
+        return None
+    names = ", ".join(_quoted(model.names[i]) for i in late)
+    stated = spec.spectrum
+    # Filtered noise has power between the lines of a multisine, where other dead times differ.
+    denser = "" if stated is None or stated.type == "fir" else " (spectrum: {type: fir, order: 12})"
+    return Foresight(
+        units=build_units(spec),
+        nominal=nominal,
+        entries=unstated_errors(spec, nominal),
+        earlier=build_earlier(spec, model),
+        advice=f"excite more frequencies{denser}, or hold what is known (plant.known: [{names}])",
+        knowledge=build_knowledge(spec),
+        looks=spec.solver.any_spectrum,
+    )
+
+
+def _quoted(name: str) -> str:
+    """Write a name as in a list of YAML."""
+    return f'"{name}"' if "[" in name else name

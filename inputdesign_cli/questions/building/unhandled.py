@@ -35,9 +35,6 @@ def check_compared(inputs: Iterable[str], *known: str) -> None:
     """Raise `SpecError` (`not-supported`) for inputs that this kind of question does not compare with."""
     for name in inputs:
         if name not in known:
-            raise bad_spec(
-                "not-supported",
-                f"this version compares the design with {' or '.join(known)} inputs here, not with {name}",
-                hint=f"write compare: [{', '.join(known)}]",
-                key="simulation.compare",
-            )
+            message = f"the design is compared with {' or '.join(known)} inputs here, not with {name}"
+            hint = f"write compare: [{', '.join(known)}]"
+            raise bad_spec("not-supported", message, hint=hint, key="simulation.compare")

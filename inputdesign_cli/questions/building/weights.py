@@ -58,12 +58,10 @@ def check_finite(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], 
     at = on_the_limit(weight.pole_points, band)
     if at is None:
         return
-    units = build_units(spec)
-    circle, mended = "imaginary axis", "s + 0.001 in place of s"
+    limit, mended = "imaginary axis", "s + 0.001 in place of s"
     if spec.plant.sampled:
-        circle, mended = "unit circle", "a factor [1, -0.999] in place of [1, -1]"
-    where = f"{at / units.frequency:.6g} {units.per_time}"
-    message = f"{key} has a pole on the {circle}, at {where}: it is infinite there"
+        limit, mended = "unit circle", "a factor [1, -0.999] in place of [1, -1]"
+    message = f"{key} has a pole on the {limit}, at {build_units(spec).named(at)}: it is infinite there"
     hint = f"move it inside ({mended}), or keep the band that it is for away from it"
     raise spec.complain(code, message, hint=hint, key=key)
 

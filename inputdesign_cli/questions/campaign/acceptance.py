@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -45,20 +46,19 @@ def accepted(
     if part.excitation is None:
         ended = shorter(given.name, due.file, part.samples, due.samples)
         return entry, [*without_excitation(given.name, due.file), *ended]
+    strongest = max(each.power for each in memory.campaign.plans) ** 0.5
     matches = {
-        plan.file: _matched(memory, plan, part, part.excitation)
+        plan.file: matched(_whole(memory, plan), part.excitation - plan.offset, part.rows, strongest)
         for plan in memory.campaign.plans
         if plan.samples >= part.samples
     }
-    match = matches[due.file]
+    match, levelled = matches[due.file], part.excitation - due.offset
     likest = max(matches, key=lambda name: abs(matches[name].likeness))
     other = likest if abs(matches[likest].likeness) > max(LIKE, abs(match.likeness)) else None
     if not unlike:
-        levelled = part.excitation - due.offset
-        _check_columns(given.name, due.file, part, _whole(memory, due)[part.rows], levelled)
-        _check_applied(given.name, due.file, match, other, loop=part.kind == "r")
+        _check_applied(given.name, due.file, part, match, other, _whole(memory, due)[part.rows], levelled)
     samples = match.begins + part.samples
-    energy = float(np.sum((part.excitation - due.offset) ** 2)) * samples / len(part.rows)
+    energy = float(np.sum(levelled**2)) * samples / len(part.rows)
     scale = match.scale if match.likeness > LIKE else None
     entry = PartRecord(file, given.name, samples, due.file, False, energy, match.likeness, scale)
     findings = hardly_followed(
@@ -80,29 +80,16 @@ def _check_answers(given: str, part: Part) -> None:
     In a loop that is the reference: without one, a controller without dynamics makes a copy of y of u.
     """
     columns = _signals(part)
-    for output in (name for name in columns if name.startswith("y")):
-        for name in (name for name in columns if name.startswith(part.kind)):
-            if len(part.rows) > _FEW and copied(columns[output], columns[name]):
-                raise DataError.because(
-                    "record-copied",
-                    f"{output} of {given} is a copy of {name}, at some scale and level: what the plant "
-                    "answered is not in it",
-                    hint=f"{_renamed(name, output)}; is a sensor wired to the actuator, or does the logger "
-                    "write the same signal twice?",
-                )
-
-
-def _check_columns(given: str, due: str, part: Part, plan: Array, applied: Array) -> None:
-    """Raise `DataError` (`record-unlike`) where another column than its own is what was planned."""
-    found = standing_in(plan, applied, _signals(part))
-    if found is not None:
-        own = f"{part.kind}{found[0]}"
-        raise DataError.because(
-            "record-unlike",
-            f"the columns of {given} look swapped: {found[1]} follows {due} as {own} should "
-            f"(correlation {found[2]:.2f}), and {own} does not",
-            hint=f"{_renamed(own, found[1])}; {_FORCED}",
-        )
+    outputs, inputs = ([name for name in columns if name.startswith(kind)] for kind in ("y", part.kind))
+    for output, name in itertools.product(outputs, inputs):
+        if len(part.rows) > _FEW and copied(columns[output], columns[name]):
+            raise DataError.because(
+                "record-copied",
+                f"{output} of {given} is a copy of {name}, at some scale and level: what the plant "
+                "answered is not in it",
+                hint=f"{_renamed(name, output)}; is a sensor wired to the actuator, or does the logger "
+                "write the same signal twice?",
+            )
 
 
 def _renamed(applied: str, other: str) -> str:
@@ -117,35 +104,36 @@ def _signals(part: Part) -> dict[str, Array]:
     return dict(list(part.table.columns.items())[1:])
 
 
-def _check_applied(given: str, due: str, match: Match, other: str | None, *, loop: bool) -> None:
-    """Raise `DataError` (`record-other-part`, `record-other-scale`, `record-unlike`) for what is no plan."""
-    if other is not None:
-        raise DataError.because(
-            "record-other-part",
-            f"what was applied in {given} is {other}, not {due}, which is due",
-            hint=f"give the record of {due}; {_FORCED}",
-        )
-    if match.off:
-        raise DataError.because(
-            "record-other-scale",
-            f"{given} was applied at {match.scale:.4g} times the scale of {due}",
-            hint=f"mend the column if it is in another unit; {_FORCED}",
-        )
+def _check_applied(
+    given: str, due: str, part: Part, match: Match, other: str | None, plan: Array, applied: Array
+) -> None:
+    """Raise `DataError` (`record-unlike`, `record-other-part`, `record-other-scale`) for what is no plan.
+
+    Args:
+        plan, applied: (m, r) at the samples of the record.
+    """
+    code, hint, loop = "record-unlike", f"give the record of {due}; {_FORCED}", part.kind == "r"
+    found = standing_in(plan, applied, _signals(part))
+    if found is not None:
+        own = f"{part.kind}{found[0]}"
+        wrong = f"the columns of {given} look swapped: {found[1]} follows {due} as {own} should "
+        wrong += f"(correlation {found[2]:.2f}), and {own} does not"
+        hint = f"{_renamed(own, found[1])}; {_FORCED}"
+    elif other is not None:
+        code, wrong = "record-other-part", f"what was applied in {given} is {other}, not {due}, which is due"
+    elif match.off:
+        code = "record-other-scale"
+        wrong = f"{given} was applied at {match.scale:.4g} times the scale of {due}"
+        hint = f"mend the column if it is in another unit; {_FORCED}"
     # A reference is computed: no actuator clips it. The input of the loop only follows it.
-    if not match.follows or (loop and match.spliced <= LIKE):
-        raise DataError.because(
-            "record-unlike",
-            f"what was applied in {given} is not {due}: {'r' if loop else 'u'}{match.channel} has a "
-            f"correlation of {match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted)",
-            hint=f"give the record of {due}; is it another experiment, or another column (--columns)? "
-            f"{_FORCED.capitalize()}",
-        )
-
-
-def _matched(memory: Memory, plan: PlannedPart, part: Part, excitation: Array) -> Match:
-    """Compare what was applied (m, r) with a plan, about its levels."""
-    strongest = max(each.power for each in memory.campaign.plans) ** 0.5
-    return matched(_whole(memory, plan), excitation - plan.offset, part.rows, strongest)
+    elif not match.follows or (loop and match.spliced <= LIKE):
+        wrong = f"what was applied in {given} is not {due}: {part.kind}{match.channel} has a correlation of "
+        wrong += f"{match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted)"
+        hint = f"give the record of {due}; is it another experiment, or another column (--columns)? "
+        hint += _FORCED.capitalize()
+    else:
+        return
+    raise DataError.because(code, wrong, hint=hint)
 
 
 def _whole(memory: Memory, plan: PlannedPart) -> Array:

@@ -65,12 +65,12 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
     due = plan[begins + rows]
     shares = [_followed(due[:, j], applied[:, j], strongest) for j in range(plan.shape[1])]
     least = int(np.argmin(shares))
-    spliced = shares[least]
-    follows = _follows(spliced, due[:, least], applied[:, least], _SURE_IN_PLACE)
+    spliced, own = shares[least], applied[:, least]
+    follows = _follows(spliced, due[:, least], own, _SURE_IN_PLACE)
     if spliced < LIKE:
-        placed = _in_step(plan[:, least], applied[:, least], begins + rows)
-        shifted = likeness(placed, applied[:, least])
-        follows = follows or _follows(shifted, placed, applied[:, least], _SURE_SHIFTED)
+        placed = _in_step(plan[:, least], own, begins + rows)
+        shifted = likeness(placed, own)
+        follows = follows or _follows(shifted, placed, own, _SURE_SHIFTED)
         spliced = max(spliced, shifted)
     scales = [_scale(due[:, j], applied[:, j]) for j in range(plan.shape[1])]
     off, _, scale = max((off, abs(scale - 1.0), scale) for scale, off in scales)

@@ -43,23 +43,19 @@ def build_rules(spec: Spec) -> Rules:
             key="campaign",
         )
     _check(spec, stated)
-    pilot = stated.pilot
+    pilot, rate = stated.pilot, None
+    if spec.limits.rate is not None and not spec.closed_loop:  # in a loop the reference is applied
+        limit = np.asarray(spec.limits.rate, dtype=float)
+        rate = tuple(np.broadcast_to(limit, (spec.plant.inputs,)).tolist())
     return Rules(
         schedule=_schedule(spec, stated, pilot),
         pilot_power=None if pilot is None else pilot.power,
         power_cap=stated.power_cap or _CAP,
         robust_last=stated.last == "robust",
         stops=stated.stop == "data",
-        rate=_rate(spec),
+        rate=rate,
         seed=spec.signal.seed or 0,
     )
-
-
-def _rate(spec: Spec) -> tuple[float, ...] | None:
-    """Return the largest move of each input; in a loop it limits u, and the reference is applied."""
-    if spec.limits.rate is None or spec.closed_loop:
-        return None
-    return tuple(np.broadcast_to(np.asarray(spec.limits.rate, dtype=float), (spec.plant.inputs,)).tolist())
 
 
 def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:

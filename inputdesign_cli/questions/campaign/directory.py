@@ -13,18 +13,11 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.findings.campaigns import (
-    campaign_refuted,
-    earlier_pictures,
-    planned_otherwise,
-    withdrawn_record,
-)
+from inputdesign_cli.findings.campaigns import campaign_refuted, planned_otherwise, withdrawn_record
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
-from inputdesign_cli.outcome.record import listed_files
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.run_directory import output_errors
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.acceptance import accepted
 from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests
@@ -127,11 +120,15 @@ def _again(
         said: notes and findings about a new record, which was `given`.
     """
     counting = [record.file for record in campaign.records if not record.withdrawn]
+    applied = [
+        np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
+        for record in campaign.records
+    ]
     with _on_disc(files, counting, given) as paths:
         past = Past(
             records=paths,
             done=campaign.done,
-            applied=_applied(files, campaign.records),
+            applied=np.concatenate(applied) if applied else None,
             last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
             first_cost=campaign.first_cost,
             number=len(campaign.rounds) + 1,
@@ -144,15 +141,6 @@ def _again(
     results = _decided(decision, campaign, files, said)
     provenance = {**results.outcome.provenance, "made_from": list(memory.made_from)}
     return replace(results, outcome=replace(results.outcome, provenance=provenance))
-
-
-def _applied(files: Mapping[str, bytes], records: Sequence[PartRecord]) -> Array | None:
-    """Return the planned samples (n, r) that were applied."""
-    parts = [
-        np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
-        for record in records
-    ]
-    return np.concatenate(parts) if parts else None
 
 
 @contextmanager
@@ -245,7 +233,10 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
         entry = replace(entry, plan=_planned(file, plan, decision))
         if plan.designed and campaign.first_cost is None:
             campaign = replace(campaign, first_cost=plan.cost)
-        tables["signal"], curves["signal"] = decision.part, _signal(decision.part)
+        time_of, *signals = decision.part.columns.values()
+        names = [name.split()[0] for name in list(decision.part.columns)[1:]]
+        tables["signal"] = decision.part
+        curves["signal"] = SignalCurves(time_of, dict(zip(names, signals, strict=True)))
     campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=decision.state)
     campaign = replace(campaign, digests=digests(campaign, files))
     tables["rounds"], progress = history(campaign.rounds, rules.end)
@@ -302,12 +293,6 @@ def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:
     )
 
 
-def _signal(part: Table) -> SignalCurves:
-    time, *signals = part.columns.values()
-    names = [name.split()[0] for name in list(part.columns)[1:]]
-    return SignalCurves(time, dict(zip(names, signals, strict=True)))
-
-
 def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]]:
     """Return rounds.csv, a row for each round with an estimate, and its figures.
 
@@ -333,16 +318,3 @@ def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]
         "campaign": CampaignCurves(samples, ratio, energy, end),
         "estimates": EstimateCurves(samples, estimates, spreads),
     }
-
-
-def with_earlier_pictures(results: Results, directory: Path) -> Results:
-    """Return the results with the pictures of the last decision, and a finding that they are older.
-
-    Raises:
-        OutputError: a picture cannot be read.
-    """
-    names = [name for name in listed_files(directory) if name.endswith(".png")]
-    with output_errors(directory):
-        pictures = {name: read_regular(directory / name) for name in names}
-    outcome = results.outcome.saying(earlier_pictures(names))
-    return replace(results, outcome=outcome, files={**results.files, **pictures})

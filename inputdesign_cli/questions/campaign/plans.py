@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -114,8 +114,8 @@ class Planner:
         if known is None and done == 0 and rules.pilot_power is not None:
             return self._kept(self._pilot(rules.pilot_power, take, seed), rules, np.inf, None, earlier)
         cap = rules.cap(first)
-        if first is None and known is not None and rules.learns_first:
-            cap = _ELSEWHERE * self._unlearned
+        if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
+            cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
         last = rules.schedule.last(done)
         change = Change(
             samples=rest,
@@ -131,9 +131,9 @@ class Planner:
             with suppress(IdesignError):
                 found = self._designed(model, replace(change, uncertainty="data"))
                 if found.cost <= cap * REACHED:
-                    return self._kept(found.planned.cut(take), rules, cap, known, earlier)
+                    return self._kept(replace(found.planned, take=take), rules, cap, known, earlier)
         try:
-            plan = self._affordable(model, change, cap, rules.end - done).cut(take)
+            plan = replace(self._affordable(model, change, cap, rules.end - done), take=take)
             # The first plan sets the cap, which its own part keeps as well.
             own = rules.cap(plan.cost) if first is None else np.inf
             return self._kept(plan, rules, min(cap, own), known, earlier)
@@ -142,17 +142,16 @@ class Planner:
                 raise
             # The estimate may be far off; the next part improves it, and nothing is decided by this one.
             cost = np.inf if first is None else min(cap, first)
-            gap = self._stopgap(rules, cost, rest, seed, error).cut(take)
+            gap = replace(self._stopgap(rules, cost, rest, seed, error), take=take)
             return self._kept(gap, rules, cap, None, earlier)
 
     @cached_property
     def _unlearned(self) -> float:
         """Cost of a sample of the design for the plant of the spec; infinite without one, or if free."""
         try:
-            cost = self.cheapest(self.nominal.model) / self.nominal.samples
+            return self._designed(self.nominal.model, Change(self.nominal.samples, self.seed)).cost or np.inf
         except IdesignError:
             return np.inf
-        return cost or np.inf
 
     def _kept(
         self, plan: Planned, rules: Rules, cap: float, known: Standing | None, before: Array
@@ -171,27 +170,18 @@ class Planner:
             caps = [(self._experiment(known.model), cap), (self.nominal, wide * cap)]
         return _within_caps(plan, caps, self.cost, self.step, before)
 
-    def cheapest(self, model: Model) -> float:
-        """Return the cost of the spectrum of the design for a known plant, summed over the samples.
-
-        Raises:
-            IdesignError: there is no design.
-        """
-        return self.nominal.samples * self._knowing(model).cost
-
     def knowing(self, model: Model) -> tuple[float, Array | None]:
-        """Return that cost, and the record (samples, r) of that design; None if no record fits.
+        """Return the cost of the spectrum of the design for a known plant, and the record (samples, r) of it.
+
+        The cost is summed over the samples; the record is None if none fits.
 
         Raises:
             IdesignError: there is no design.
         """
-        found, record = self._knowing(model), None
+        found, record = self._designed(model, Change(self.nominal.samples, self.seed)), None
         with suppress(IdesignError):
             record = found.planned.record
         return self.nominal.samples * found.cost, record
-
-    def _knowing(self, model: Model) -> _Found:
-        return self._designed(model, Change(self.nominal.samples, self.seed))
 
     def _affordable(self, model: Model | None, change: Change, cap: float, longest: int) -> Planned:
         """Return the cheapest experiment; if its samples cost more than the cap, the shortest within the cap.
@@ -289,11 +279,6 @@ def _fits(found: _Found | None, cap: float) -> bool:
     return found is not None and found.cost <= cap * REACHED
 
 
-def ratio_of(question: ModelQuestion, information: Array) -> float:
-    """Return the largest ratio to what is asked at an information (k, k) in the question's coordinates."""
-    return max(requirement.worst(information).ratio for requirement in question.requirements)
-
-
 def standing(
     planner: Planner, estimate: Model, informed: Callable[[Model], Array], last: Model
 ) -> Standing | None:
@@ -311,7 +296,7 @@ def standing(
         try:
             information = informed(model)
             question = planner.question(model, information)
-            ratio = ratio_of(question, question.information)
+            ratio = question.ratio(question.information)
         except (IdesignError, np.linalg.LinAlgError):
             continue
         if np.isfinite(ratio):
@@ -328,71 +313,38 @@ def _within_caps(
 ) -> Planned:
     """Return the plan with a first part whose samples cost at most the cap at each of several plants.
 
+    Noise does not count, as in the cost of a design.
+
     Args:
         caps: plants with their caps; the plan is made for the first plant.
         weights: of the powers; `step`: time between samples in the unit of the experiment's frequencies.
-        before: (m, r), applied earlier.
-    """
-    costs = [_PartCost.of(at, weights, step, before, plan.applied, plan.lead) for at, _ in caps]
-    scale = min(cost.within(cap) for cost, (_, cap) in zip(costs, caps, strict=True))
-    beyond = any(cost.at(scale) > cap * REACHED for cost, (_, cap) in zip(costs, caps, strict=True))
-    kept = plan if scale == 1.0 else plan.weaker(scale**2)
-    return replace(kept, part_cost=costs[0].at(scale), beyond=beyond)
-
-
-@dataclass(frozen=True)
-class _PartCost:
-    """The cost left + 2 scale mixed + scale^2 own of samples that are applied at a scale.
-
-    Attributes:
-        own: cost of the effects of the samples from rest; `left`: of the effects of earlier samples; `mixed`:
-            of their products.
+        before: (m, r), applied earlier, whose effects last.
     """
 
-    own: float
-    mixed: float
-    left: float
-
-    @classmethod
-    def of(
-        cls,
-        experiment: Experiment,
-        weights: Mapping[PowerKind, Weight],
-        step: float,
-        before: Array,
-        part: Array,
-        fixed: int,
-    ) -> _PartCost:
-        """Return the cost of a part (n, r) after `before` (m, r) from rest; `fixed` samples keep scale 1.
-
-        Noise does not count, as in the cost of a design.
-        """
-        whole = np.concatenate([before, part])
-        scaled = np.arange(len(whole))[:, None] >= len(before) + fixed
+    def cost(experiment: Experiment, scale: float) -> float:
+        """Return the cost of a sample of the part, all of it but the lead at a scale."""
+        factors = np.where(np.arange(plan.take) < plan.lead, 1.0, scale)[: len(plan.applied), None]
+        whole = np.concatenate([before, factors * plan.applied])
         at = FiniteRecord(replace(experiment, samples=len(whole)), len(whole), step)
-        own, left = (
-            {kind: at.signals(kind, samples)[len(before) :] for kind in weights}
-            for samples in (whole * scaled, whole * ~scaled)
-        )
+        signals = {kind: at.signals(kind, whole)[len(before) :] for kind in weights}
+        return weighted_sum(weights, {kind: np.mean(x**2, axis=0).tolist() for kind, x in signals.items()})
 
-        def paid(x: Mapping[PowerKind, Array], y: Mapping[PowerKind, Array]) -> float:
-            return weighted_sum(
-                weights, {kind: np.mean(x[kind] * y[kind], axis=0).tolist() for kind in weights}
-            )
+    scale = min(_largest_scale(partial(cost, at), cap) for at, cap in caps)
+    beyond = any(cost(at, scale) > cap * REACHED for at, cap in caps)
+    kept = plan if scale == 1.0 else plan.weaker(scale**2)
+    return replace(kept, part_cost=cost(caps[0][0], scale), beyond=beyond)
 
-        return cls(paid(own, own), paid(own, left), paid(left, left))
 
-    def at(self, scale: float) -> float:
-        """Return the cost of a sample at this scale."""
-        return self.left + 2.0 * scale * self.mixed + scale**2 * self.own
+def _largest_scale(cost: Callable[[float], float], cap: float) -> float:
+    """Return the largest scale up to one at which a cost, quadratic in the scale, is at most `cap`.
 
-    def within(self, cap: float) -> float:
-        """Return the largest scale up to one at which a sample costs at most `cap`.
-
-        If effects of earlier parts alone cost more, the own effects of the part keep the cap.
-        """
-        if self.at(1.0) <= cap:
-            return 1.0
-        if self.left >= cap:
-            return float(min(np.sqrt(cap / self.own), 1.0)) if self.own > 0.0 else 1.0
-        return float((np.sqrt(self.mixed**2 + self.own * (cap - self.left)) - self.mixed) / self.own)
+    If effects of earlier parts alone cost more, the own effects of the part keep the cap.
+    """
+    full = cost(1.0)
+    if full <= cap:
+        return 1.0
+    left, turned = cost(0.0), cost(-1.0)
+    own, mixed = 0.5 * (full + turned) - left, 0.25 * (full - turned)
+    if left >= cap:
+        return float(min(np.sqrt(cap / own), 1.0)) if own > 0.0 else 1.0
+    return float((np.sqrt(mixed**2 + own * (cap - left)) - mixed) / own)

@@ -134,22 +134,29 @@ def decide(task: Rounds, past: Past) -> Decision:
         return decision
     before = None if past.applied is None else past.applied - task.offsets
     plan = task.planner.plan(task.rules, decision.standing, past.done, decision.seed, past.first_cost, before)
-    return replace(decision, plan=plan, part=_part(task, plan, past.done))
+    # The times of a part continue the times of the last one.
+    units, applied = task.identification.header.units, plan.applied + task.offsets
+    time_of = units.sample_time * np.arange(past.done, past.done + len(applied), dtype=np.float64)
+    columns = {units.header(name): values for name, values in zip(units.excitations, applied.T, strict=True)}
+    return replace(decision, plan=plan, part=Table({units.time_header: time_of, **columns}))
 
 
 def _judged(task: Rounds, past: Past) -> Decision:
-    rules = task.rules
+    rules, identification = task.rules, task.identification
+    units = identification.header.units
     decision = Decision(task, rules.seed_of(past.number), "missed" if past.done >= rules.end else "running")
     if not past.records:
         return decision
     started = time.perf_counter()
     try:
-        found = _found(task, past.records)
+        taken = Preparation(operating_point=identification.operating_point)
+        data = continued(read_data(past.records, units, taken), units.sample_time)
+        found = estimated(identification, data, past.records[0], taken)
     except DataError as error:
         if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
             raise
         return replace(decision, findings=tuple(no_estimate_yet(told(error))))
-    assessment = judge(task.identification, found, started, first=past.last is None)
+    assessment = judge(identification, found, started, first=past.last is None)
     stands = _standing(task, found, past)
     findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
     decision, looks = replace(decision, standing=stands, assessed=assessment.results), rules.schedule.looks
@@ -159,17 +166,12 @@ def _judged(task: Rounds, past: Past) -> Decision:
         decision = replace(decision, state="undecided")
     elif rules.over(past.done, met=stands is not None and stands.met):
         decision = replace(decision, state=_ENDED[assessment.verdict])
-    elif _refuted(task, found, past):
+    # Faulty measurements can be mended, and users may go on.
+    elif not past.regardless and rules.refuted(found.estimate) and not mismeasured(identification, found):
         decision = replace(decision, state="undecided", refuted=True)
     elif assessment.verdict == "undecided":
         findings += campaign_doubted()
     return replace(decision, findings=tuple(findings))
-
-
-def _refuted(task: Rounds, found: Identified, past: Past) -> bool:
-    """Return whether tests refute the structure; faulty measurements can be mended, and users may go on."""
-    asked = not past.regardless and task.rules.refuted(found.estimate)
-    return asked and not mismeasured(task.identification, found)
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
@@ -187,32 +189,9 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
     columns |= {f"y{i + 1}": values for i, values in enumerate(data.y.T)}
     if data.r is not None:
         columns |= {f"r{j + 1}": values for j, values in enumerate(data.r.T)}
-    applied = data.r if units.closed_loop else inputs
-    return Part(Table(columns), applied, _numbered(data.time), units.excitation, data.notes)
-
-
-def _numbered(time: Array) -> NDArray[np.int64]:
-    """Return times (n,) as numbers of samples from the first."""
-    if time.size < 2:
-        return np.zeros(time.size, dtype=np.int64)
-    return np.rint((time - time[0]) / np.median(np.diff(time))).astype(np.int64)
-
-
-def _part(task: Rounds, plan: Planned, done: int) -> Table:
-    """Return signal.csv of a part; its times continue the times of the last part."""
-    units = task.identification.header.units
-    applied = plan.applied + task.offsets
-    time_of = units.sample_time * np.arange(done, done + len(applied), dtype=np.float64)
-    columns = {units.header(name): values for name, values in zip(units.excitations, applied.T, strict=True)}
-    return Table({units.time_header: time_of, **columns})
-
-
-def _found(task: Rounds, records: Sequence[Path]) -> Identified:
-    identification = task.identification
-    taken = Preparation(operating_point=identification.operating_point)
-    data = read_data(records, identification.header.units, taken)
-    step = identification.header.units.sample_time
-    return estimated(identification, continued(data, step), records[0], taken)
+    applied, steps = data.r if units.closed_loop else inputs, np.diff(data.time)
+    rows = np.rint((data.time - data.time[0]) / (np.median(steps) if steps.size else 1.0)).astype(np.int64)
+    return Part(Table(columns), applied, rows, units.excitation, data.notes)
 
 
 def continued(data: Record, step: float) -> Record:

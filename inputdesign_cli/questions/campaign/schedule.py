@@ -95,11 +95,6 @@ class Rules:
         """Samples after which the experiment is over, whatever was reached."""
         return self.schedule.most if self.stops else min(self.schedule.samples, self.schedule.most)
 
-    @property
-    def learns_first(self) -> bool:
-        """Whether the first plan follows a pilot and costs are bounded, so that a design must bound it."""
-        return self.pilot_power is not None and self.power_cap is not None
-
     def over(self, done: int, *, met: bool) -> bool:
         """Return whether nothing more is applied after `done` samples."""
         return done >= self.end or (met and self.stops)
@@ -175,10 +170,6 @@ class Planned:
     def applied(self) -> Array:
         """Return the samples of the next part, (take, r)."""
         return self.record[: self.take]
-
-    def cut(self, take: int) -> Planned:
-        """Return the plan with `take` samples to be applied."""
-        return replace(self, take=take)
 
     def following(self, last: Array, rate: Sequence[float] | None) -> Planned:
         """Return the plan after a part that ended at `last` (r,), led back by moves of at most `rate`.

@@ -1,22 +1,38 @@
-"""Try whole campaigns many times on the true system, and experiments in one shot."""
+"""Try whole campaigns many times on the true system, and experiments in one shot; say how they ended."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
+import numpy as np
+
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError, bad_spec
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.batches import run_batches
-from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.questions.campaign.outcome import campaigns_curves, campaigns_entry
+from inputdesign_cli.monte_carlo.statistics import binomial_limits
+from inputdesign_cli.outcome import Simulation
+from inputdesign_cli.outcome.curves import Curves, RatioCurves, TradeCurves
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 from inputdesign_cli.questions.campaign.schedule import Oracle, Rules, Schedule
-from inputdesign_cli.questions.campaign.trials import CampaignStudy, Ended, energy_of, run_campaigns
+from inputdesign_cli.questions.campaign.trials import (
+    CampaignStudy,
+    Ended,
+    Ending,
+    Reference,
+    energy_of,
+    run_campaigns,
+)
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
+
+_ENDINGS: tuple[Ending, ...] = ("stopped", "missed", "undecided", "unplanned")
 
 
 @dataclass(frozen=True)
@@ -100,3 +116,119 @@ def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) 
     # One run a batch: all ways meet the same noise in the same run.
     parts = run_batches(run, runs=study.runs, size=1, seed=study.seed, executor=executor)
     return [run for part in parts for run in part]
+
+
+def campaigns_entry(
+    true: Experiment, ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None, *, runs: int, seed: int
+) -> Simulation:
+    """Return the study.
+
+    Args:
+        true: the experiment on the true system.
+        ways: the runs of the campaign and of the experiments that it is compared with.
+        oracle: cost of an experiment that knows the true plant; None if there is none.
+    """
+    model = true.model
+    record = None if oracle is None else oracle.record
+    return Simulation(
+        runs=runs,
+        seed=seed,
+        samples=true.samples,
+        true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
+        true_variance=float(model.covariance[0, 0])
+        if model.outputs == 1
+        else tuple(map(tuple, model.covariance.tolist())),
+        inputs={name: way_entry(ended, oracle) for name, ended in ways.items()},
+        oracle_cost=None if oracle is None else oracle.cost / true.samples,
+        oracle_record_cost=None if record is None else record / true.samples,
+        others={"numbers": {"way": list(ways), "status": list(_ENDINGS)}},
+    )
+
+
+def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
+    """Return the results of one way of experimenting."""
+    (true, true_limits), (estimate, estimate_limits), (design, design_limits) = (
+        _within(ended, of) for of in ("true", "estimate", "design")
+    )
+    ratios = [run.ratio for run in ended if run.ratio is not None]
+    energies = np.array([run.energy for run in ended])
+    known = oracle is not None and oracle.cost > 0.0
+    counts = Counter(run.status for run in ended)
+    return TriedInput(
+        within_r_adm_true=true,
+        within_r_adm_true_limits=true_limits,
+        within_r_adm_estimate=estimate,
+        within_r_adm_estimate_limits=estimate_limits,
+        within_r_adm=design,
+        within_r_adm_limits=design_limits,
+        true_ratio=_spread(ratios, float(np.mean(np.array(ratios) <= 1.0))) if ratios else None,
+        energy=_spread(energies),
+        cost_over_oracle=_spread(energies / oracle.cost) if oracle is not None and known else None,
+        cost_over_oracle_record=_spread(energies / oracle.record)
+        if oracle is not None and known and oracle.record is not None
+        else None,
+        samples=_spread([run.samples for run in ended]),
+        stopped=counts["stopped"],
+        missed=counts["missed"],
+        undecided=counts["undecided"],
+        unplanned=counts["unplanned"],
+        parts=Spread(float(np.mean([run.parts for run in ended]))),
+        shrunk=sum(run.shrunk for run in ended),
+    )
+
+
+def _within(ended: Sequence[Ended], of: Reference) -> tuple[float | None, Limits | None]:
+    """Return the share of runs within r_adm, with its limits; None if some run cannot be judged."""
+    judged = [run.within[of] for run in ended]
+    if None in judged:
+        return None, None
+    kept = sum(map(bool, judged))
+    return kept / len(judged), binomial_limits(kept, len(judged))
+
+
+def _spread(values: Sequence[float] | np.ndarray, at_most_one: float | None = None) -> Spread:
+    return Spread(float(np.mean(values)), float(np.quantile(values, 0.95)), at_most_one)
+
+
+def campaigns_curves(
+    ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None
+) -> tuple[dict[str, Table], dict[str, Curves]]:
+    """Return campaigns.csv with a row for each run, the true ratios, and cost against coverage."""
+    ratios = {name: [run.ratio for run in ended if run.ratio is not None] for name, ended in ways.items()}
+    curves: dict[str, Curves] = {}
+    if any(ratios.values()):
+        curves["true_ratio"] = RatioCurves({name: np.array(values) for name, values in ratios.items()})
+    tables = {"campaigns": _table(ways)}
+    if oracle is None or any(run.within["true"] is None for ended in ways.values() for run in ended):
+        return tables, curves
+    points = {}
+    for name, ended in ways.items():
+        kept, energies = sum(bool(run.within["true"]) for run in ended), [run.energy for run in ended]
+        limits = binomial_limits(kept, len(ended))
+        costs = np.quantile(np.array(energies) / oracle.cost, [0.05, 0.95])
+        points[name] = (float(np.mean(energies)) / oracle.cost, *costs.tolist(), kept / len(ended), *limits)
+    record = None if oracle.record is None else oracle.record / oracle.cost
+    curves["cost_coverage"] = TradeCurves(points, record)
+    return tables, curves
+
+
+def _table(ways: Mapping[str, Sequence[Ended]]) -> Table:
+    """Return a row for each run; the result has the names of the numbers of ways and endings.
+
+    The true ratios are left out if some run has none, for instance if the true system has another structure.
+    """
+    rows = [(way, run) for way, ended in enumerate(ways.values()) for run in ended]
+
+    def column(values: Sequence[float]) -> np.ndarray:
+        return np.array(values, dtype=float)
+
+    ratios = [run.ratio for _, run in rows if run.ratio is not None]
+    return Table(
+        {
+            "way": column([way for way, _ in rows]),
+            "samples": column([run.samples for _, run in rows]),
+            "energy": column([run.energy for _, run in rows]),
+            **({"true_ratio": column(ratios)} if len(ratios) == len(rows) else {}),
+            "status": column([_ENDINGS.index(run.status) for _, run in rows]),
+        }
+    )

@@ -8,17 +8,17 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import OnModelError, model_errors
+from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.findings.neglected import mattering, neglected
 from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.monte_carlo.study import responses
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.campaign.plans import Planner, ratio_of, standing
+from inputdesign_cli.questions.campaign.plans import Planner, standing
 from inputdesign_cli.questions.campaign.schedule import Rules, Standing
 
 Ending = Literal["stopped", "missed", "undecided", "unplanned"]
@@ -97,39 +97,35 @@ class _Run:
 
     def end(self) -> Ended:
         """Run the campaign from its first plan to its end."""
-        rules = self.study.rules
+        rules, planner = self.study.rules, self.study.planner
         while True:
+            seed = int(self.rng.integers(_SEEDS))
             try:
-                plan = self.study.planner.plan(
-                    rules, self.known, len(self.r), int(self.rng.integers(_SEEDS)), self.first, self.r
-                )
+                plan = planner.plan(rules, self.known, len(self.r), seed, self.first, self.r)
             except (InfeasibleError, InaccurateError, SpecError):
                 return self._ended("unplanned")
             if self.first is None and plan.designed:
                 self.first = plan.cost
             self.r = np.concatenate([self.r, plan.applied])
-            u, y = self._measured()
+            signals = responses(self.study.true, self.r[None], self.e[None, : len(self.r)], planner.step)
+            u, y = (total[0] for _, total in signals)
             self.parts += 1
             self._estimate(u, y)
-            met = self.known is not None and self.known.met
-            over = rules.over(len(self.r), met=met)
-            if not over and not self._doubted(u, y):
+            over = rules.over(len(self.r), met=self._met)
+            asks = rules.stops and not over and self.known is not None
+            near = self._identified(u, y, near=True) if asks else None
+            if not over and (near is None or not rules.refuted(near)):
                 continue
             full = self._anew(u, y)
             if full is not None and not over and rules.refuted(full):
                 return self._ended("undecided")
-            met = self.known is not None and self.known.met
-            if rules.over(len(self.r), met=met):
+            if rules.over(len(self.r), met=self._met):
                 against = full is not None and self._speaks_against(full)
-                return self._ended("undecided" if against else "stopped" if met else "missed")
+                return self._ended("undecided" if against else "stopped" if self._met else "missed")
 
-    def _measured(self) -> tuple[Array, Array]:
-        true, n = self.study.true, len(self.r)
-        if true.loop is None:
-            caused, noise = true.model.simulate(self.r[None], self.e[None, :n], self.study.planner.step)
-            return self.r, (caused + noise)[0]
-        y, u = true.loop.signals(self.r[None], self.e[None, :n])
-        return u[0], y[0]
+    @property
+    def _met(self) -> bool:
+        return self.known is not None and self.known.met
 
     def _estimate(self, u: Array, y: Array) -> None:
         """Estimate from the last estimate, or from several starts if there is none."""
@@ -140,13 +136,6 @@ class _Run:
                 self._stand(model.at(found.theta[0], found.noise[0]), u, y)
                 return
         self._anew(u, y)
-
-    def _doubted(self, u: Array, y: Array) -> bool:
-        """Return whether tests at the present estimate refute the structure."""
-        if self.known is None or not self.study.rules.stops:
-            return False
-        full = self._identified(u, y, near=True)
-        return full is not None and self.study.rules.refuted(full)
 
     def _anew(self, u: Array, y: Array) -> Estimate | None:
         """Return the estimate from several starts, which is built on from now on; None if there is none."""
@@ -206,7 +195,7 @@ class _Run:
         information = FiniteRecord(true, len(self.r), self.study.planner.step).information(self.r)
         try:
             question = self.study.planner.question(true.model, information)
-            return ratio_of(question, question.information)
+            return question.ratio(question.information)
         except (IdesignError, np.linalg.LinAlgError):
             return None
 
@@ -231,10 +220,9 @@ def within(study: CampaignStudy, estimate: Model, of: Reference) -> bool | None:
         errors = model_errors(study.planner.question(models[of], np.eye(len(models[of].names))).requirements)
     except IdesignError:
         return None
-    return all(_kept(error, estimate, study.true.model) for error in errors) if errors else None
-
-
-def _kept(error: OnModelError, estimate: Model, truth: Model) -> bool:
-    w = error.grid
-    off: NDArray[np.complex128] = error.concerned(estimate.plant_at(w) - truth.plant_at(w))
-    return bool(np.all(np.linalg.norm(off, axis=1) <= error.admissible.at(w)))
+    kept = []
+    for error in errors:
+        w = error.grid
+        off = np.abs(error.concerned(estimate.plant_at(w) - study.true.model.plant_at(w)))
+        kept.append(bool(np.all(np.linalg.norm(off, axis=1) <= error.admissible.at(w))))
+    return all(kept) if kept else None

@@ -15,14 +15,7 @@ from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.curves import (
-    BoundCurves,
-    BoundPanel,
-    Curves,
-    Ellipse,
-    EllipseCurves,
-    NyquistCurves,
-)
+from inputdesign_cli.outcome import curves as plots
 from inputdesign_cli.outcome.objectives import WHITE
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
@@ -38,18 +31,11 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Informed:
-    """What an information matrix says of errors over frequency, and what it is compared with.
+    """What an information matrix M (k, k), in the coordinates of the errors, says of them over frequency.
 
-    Attributes:
-        errors: bounds on the model error; r_u of entries of G, if nothing is `stated`.
-        information: M (k, k) in the coordinates of the errors.
-        stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
-        active: for each error, the frequencies of the experiment at which it binds; empty for none.
-        white: M of the baseline; `equal` of white excitation with the means of the design.
-        record: M of the record to be applied.
-        white_labels: what `white` and `equal` are called.
-        of_several: whether the design serves other plants, too, which the curves do not show.
-        label: what gave r_u.
+    Without r_adm `stated` the errors are r_u of entries of G. Each binds at its `active` frequencies. For
+    comparison there are M of the baseline `white`, of white excitation with `equal` means, and of the
+    `record`. `of_several`: the design serves other plants, too, which the curves do not show.
     """
 
     units: Units
@@ -66,9 +52,9 @@ class Informed:
 
     def curves(
         self, experiment: Experiment, pairs: Pairs | None, *, flat: bool = True
-    ) -> tuple[dict[str, Table], dict[str, Curves]]:
+    ) -> tuple[dict[str, Table], dict[str, plots.Curves]]:
         """Return the tables and figures of the bound, the loop and the parameters, as far as they exist."""
-        tables, curves = dict[str, Table](), dict[str, Curves]()
+        tables, curves = dict[str, Table](), dict[str, plots.Curves]()
         with suppress(np.linalg.LinAlgError):  # a parameter that the design does not excite
             tables["bound"], curves["bound"] = self.bound()
             loops = nyquist_curves(self.units, self.errors[:1], self.information, self.active)
@@ -79,18 +65,26 @@ class Informed:
 
     def of_length(
         self, experiment: Experiment, pairs: Pairs | None, samples: int, *, flat: bool = True
-    ) -> dict[str, Curves]:
+    ) -> dict[str, plots.Curves]:
         """Return the curves of records of this many samples with the same spectrum."""
         white = experiment.of_length(self.white, samples) if flat and self.white is not None else None
         information = experiment.of_length(self.information, samples)
         longer = Informed(self.units, self.errors, information, self.stated, white=white)
         return longer.curves(experiment, pairs, flat=flat)[1]
 
-    def bound(self) -> tuple[Table, BoundCurves]:
+    def bound(self) -> tuple[Table, plots.BoundCurves]:
         """Return r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement."""
         binding = self.active or [np.zeros(0)] * len(self.errors)
-        peaks = _peaks(self.errors, self.information) if self.stated else np.zeros(0)
-        w = _axis(self.errors, np.concatenate([*binding, peaks]))
+        near = [
+            violation.frequency
+            for error in (self.errors if self.stated else ())
+            for violation in error.violations(self.information, above=_NEARLY)
+        ]
+        peaks = np.array([at for at in near if at is not None])
+        # What shows the shape of resonances.
+        grid = np.unique(np.concatenate([error.grid for error in self.errors]))
+        shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]
+        w = axis(*self.errors[0].band, np.concatenate([*binding, peaks, shape]))
         frequency = w / self.units.frequency
         columns: dict[str, Array] = {self.units.frequency_header: frequency}
         panels = []
@@ -106,7 +100,7 @@ class Informed:
                 listed[f"r_u_{name}"] = None if M is None else error.error_bound(M, w)
             columns |= {f"{name}{suffix}": found for name, found in listed.items() if found is not None}
             panels.append(
-                BoundPanel(
+                plots.BoundPanel(
                     frequency=frequency,
                     active=distinct(np.maximum(binds, w[0]), w[-1]) / self.units.frequency,
                     label=self.label,
@@ -121,29 +115,13 @@ class Informed:
                     r_u_equal=listed["r_u_equal"],
                 )
             )
-        return Table(columns), BoundCurves(tuple(panels), self.of_several)
-
-
-def _peaks(errors: Sequence[OnModelError], information: Array) -> Array:
-    found = [v.frequency for error in errors for v in error.violations(information, above=_NEARLY)]
-    return np.array([w for w in found if w is not None])
-
-
-def _axis(errors: Sequence[OnModelError], extra: Array) -> Array:
-    """Frequencies of the band with the `extra` ones, and what shows the shape of resonances."""
-    grid = np.unique(np.concatenate([error.grid for error in errors]))
-    shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]
-    return axis(*errors[0].band, np.concatenate([extra, shape]))
+        return Table(columns), plots.BoundCurves(tuple(panels), self.of_several)
 
 
 def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
-    """(k, k): M of white excitation at the cost of the design, or of its length; None if limits bind both.
+    """Return M (k, k) of white excitation at the cost or length of the design; None if limits bind both.
 
-    M less what is known without excitation is in proportion to the power and to the length.
-
-    Args:
-        samples: of the delivered experiment.
-        ratio: of the cost of white excitation that meets the requirements to that of the design.
+    M less what is known without excitation is in proportion to both. The `ratio` is that of the costs.
     """
     problem, white = design.problem, design.white
     if problem.goal == "factor" or ratio <= 0.0:
@@ -155,14 +133,10 @@ def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
 
 def nyquist_curves(
     units: Units, errors: Sequence[OnModelError], information: Array, active: Sequence[Array] = ()
-) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """C G with discs of radius |C| r_u, by file stem; nothing without a loop, or for several channels.
+) -> tuple[dict[str, Table], dict[str, plots.Curves]]:
+    """Return C G with discs of radius |C| r_u, by file stem; nothing without a loop, or for several channels.
 
     The loop is that whose sensitivity is bounded, else that of the experiment.
-
-    Args:
-        errors: the first has r_u and a band; information (k, k) is in its coordinates.
-        active: of each error the frequencies of the experiment at which it binds; empty for none.
     """
     if not errors or not units.single:
         return {}, {}
@@ -185,18 +159,14 @@ def nyquist_curves(
         columns["distance_kept"] = np.abs(kept.weight.at(w))
         lowest, highest = columns["distance_kept"].min(), columns["distance_kept"].max()
         circle = float(lowest) if highest - lowest <= _ROUNDING * highest else None
-    curves = NyquistCurves(frequency, L, radius, circle, limiting / units.frequency)
+    curves = plots.NyquistCurves(frequency, L, radius, circle, limiting / units.frequency)
     return {"nyquist": Table(columns)}, {"nyquist": curves}
 
 
 def experiment_ellipses(
     experiment: Experiment, information: Array, white: Array | None, pairs: Pairs | None
-) -> EllipseCurves | None:
-    """The chosen `pairs`, by default those most correlated where there are several channels.
-
-    Returns:
-        None when there is no pair to show, or some parameter has no finite variance.
-    """
+) -> plots.EllipseCurves | None:
+    """Return the `pairs`, or those most correlated of several channels; None if no variances are finite."""
     single = experiment.model.outputs == experiment.model.inputs == 1
     if experiment.size < 2 or (pairs is None and single):
         return None
@@ -217,11 +187,11 @@ def experiment_ellipses(
     for i, j in index:
         chosen = np.ix_([i, j], [i, j])
         found.append(
-            Ellipse(
+            plots.Ellipse(
                 (names[i], names[j]),
                 theta[[i, j]],
                 covariance[chosen],
                 None if flat is None else flat[chosen],
             )
         )
-    return EllipseCurves(tuple(found))
+    return plots.EllipseCurves(tuple(found))

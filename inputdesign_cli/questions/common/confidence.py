@@ -33,12 +33,9 @@ _EACH, _LONG = 20, 100
 
 @dataclass(frozen=True)
 class SimulatedEstimates:
-    """Estimates from `runs` records of an excitation on the nominal plant.
+    """Estimates from `runs` records of an excitation on the nominal plant, in raw parameters.
 
-    Attributes:
-        nominal: in raw parameters, as long as the records.
-        step: time between samples in the unit of the experiment's frequencies.
-        sets: of `runs` runs each that correct alpha; others check it.
+    Its length is that of the records. `sets` of runs correct alpha; others check it.
     """
 
     nominal: Experiment
@@ -50,12 +47,7 @@ class SimulatedEstimates:
     def corrected(
         self, calibration: Calibration, errors: Sequence[ModelError], information: Array
     ) -> Calibration:
-        """The calibration for records this short; information (k, k) in the coordinates of the errors.
-
-        Raises:
-            InaccurateError: `confidence-not-settled`: more runs are without an estimate than may leave r_adm.
-            OutOfTimeError: see `seconds_left`.
-        """
+        """Return the calibration for records this short, or raise `confidence-not-settled`."""
         streams = [_TO_CORRECT, *range(_TO_CHECK + 1, _TO_CHECK + self.sets)]
         estimates = np.concatenate([self._estimates(stream) for stream in streams])
         found = calibration.corrected(errors, information, estimates)
@@ -157,14 +149,12 @@ def covered(coverage: Coverage) -> Reported:
     )
 
 
-def too_few(coverage: Coverage, probability: float) -> bool:
-    """Whether fewer runs than asked keep r_adm, by more than chance."""
-    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[1] < probability)
-
-
-def too_many(coverage: Coverage, probability: float) -> bool:
-    """Whether more of them do."""
-    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[0] > probability)
+def beyond_chance(coverage: Coverage, probability: float) -> int:
+    """Return -1 if fewer runs than asked keep r_adm, 1 if more, by more than chance, and else 0."""
+    if not coverage.runs:
+        return 0
+    least, most = binomial_limits(coverage.kept, coverage.runs)
+    return int(least > probability) - int(most < probability)
 
 
 def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
@@ -173,17 +163,10 @@ def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
 
 
 def settled_alpha(needed: Callable[[float], float | None], start: float) -> float:
-    """Return the alpha whose design needs just that alpha.
+    """Return the alpha whose design needs just that alpha, or raise `infeasible` or `confidence-not-settled`.
 
     A design for a larger alpha is more accurate, and needs a smaller one: log(needed / alpha) falls, and the
-    secant method in log(alpha) finds its root.
-
-    Args:
-        needed: the calibrated alpha of the design for an alpha; None if there is no design within the limits.
-
-    Raises:
-        InfeasibleError: no alpha was found whose design keeps within the limits.
-        InaccurateError: `confidence-not-settled`.
+    secant method in log(alpha) finds its root. Where there is no design within the limits `needed` is None.
     """
     x, before, missing, refused = np.log(start), None, np.nan, False
     for _ in range(_MOST_ROUNDS):

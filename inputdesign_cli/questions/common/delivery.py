@@ -1,36 +1,42 @@
-"""What all kinds of questions deliver: results that grow, and a study of them."""
+"""What all kinds of questions deliver: results that grow, their last check, and a study of them.
+
+What is about to be written is reread, and evaluated by other means.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.monte_carlo.excitations import Excitation
-from inputdesign_cli.outcome import Outcome, Simulation
+from inputdesign_cli.outcome import Objective, Outcome, Simulation
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Searched
 from inputdesign_cli.outcome.units import Header
 
+KINDS = {"cost": "least_cost", "factor": "accuracy_factor", "samples": "shortest_experiment"}
+"""The kind of objective in the outcome, by the goal of a design."""
 # A gap up to this many tolerances is almost optimal.
 ALMOST = 100.0
 _ROUNDING = 1e-6
 
 
+APART = 1e-6
+"""Two ways to the same number may differ by this share of it."""
+
+
 @dataclass(frozen=True)
 class Delivered:
-    """What a design or an analysis delivers to be tried.
+    """What a design or an analysis delivers to be tried: a record (n, r), None if no excitation is needed.
 
-    Attributes:
-        results: what has been computed so far.
-        record: (n, r), about its operating point; None if no excitation is needed.
-        renewed: realises the spectrum anew in each run; None for a record that was given.
-        alpha: of r_u, see the contract.
-        of_length: curves `bound` and `ellipses` for another number of samples than the results count.
-        rivals: searches a number of records from several starts, if that finds other minima.
+    `renewed` realises the spectrum anew in each run; `of_length` draws `bound` and `ellipses` for another
+    number of samples; `rivals` searches a number of records from several starts, if that finds other minima.
     """
 
     results: Results
@@ -88,3 +94,36 @@ def proof_status(gap: float, tolerance: float) -> str:
     if gap <= tolerance * (1.0 + _ROUNDING):
         return "optimal"
     return "almost_optimal" if gap <= ALMOST * tolerance else "gap_open"
+
+
+def check_claims(wrong: Iterable[str], remedy: str) -> None:
+    """Raise `InaccurateError` (`internal-disagreement`) with the first sentence on a claim that is wrong."""
+    for claim in wrong:
+        hint = f"{remedy}; if the spec is plain, please report it: the spec is enough to see the same"
+        raise InaccurateError.because("internal-disagreement", claim, hint, "accuracy")
+
+
+def of_bounds(claimed: Objective, apart: float = APART, size: float = 0.0) -> Iterator[str]:
+    """No value lies beyond a bound that is called proved, by this share of the value, or of a larger size."""
+    value, largest = claimed.value, claimed.upper_bound is not None
+    for name, bound in (
+        ("upper_bound", claimed.upper_bound),
+        ("lower_bound", claimed.lower_bound),
+        ("any_spectrum_bound", claimed.any_spectrum_bound),
+    ):
+        beyond = 0.0 if bound is None else value - bound
+        if not (beyond if largest else -beyond) <= max(apart, APART) * max(abs(value), size):
+            yield f"the value {value:.10g} lies beyond {name} ({bound:.10g})"
+
+
+def of_cost(found: float, claimed: float) -> Iterator[str]:
+    """The excitation costs what is claimed."""
+    if not abs(found - claimed) <= APART * abs(found):
+        yield f"the spectrum costs {found:.10g}, not {claimed:.10g}"
+
+
+def of_limit(limit: PowerLimit, power: float) -> Iterator[str]:
+    """The power keeps to its limit."""
+    excess = power - limit.bound if limit.upper else limit.bound - power
+    if not excess <= APART * limit.bound:
+        yield f"{limit.key} is {limit.bound:.6g}, but the spectrum has {power:.10g}"

@@ -34,22 +34,11 @@ _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
 
 
 @dataclass(frozen=True)
-class Foreseen:
-    """`foreseen` of the outcome, None if it is not known, and findings."""
-
-    entry: Entry | None = None
-    findings: tuple[Finding, ...] = ()
-
-
-@dataclass(frozen=True)
 class Foresight:
-    """How the data of an experiment are foreseen.
+    """How the data of an experiment are foreseen, by the nominal one in raw parameters, its prior included.
 
-    Attributes:
-        nominal: the experiment in raw parameters, prior information included.
-        entries: errors that have r_u where no requirement bounds one.
-        earlier: what counts along where the data are assessed.
-        knowledge: what the spec says of the parameters, which rules rivals out.
+    `entries` are errors that have r_u where none is bounded, and `earlier` counts along where data are
+    assessed. `knowledge` of the parameters rules rivals out.
     """
 
     units: Units
@@ -60,18 +49,20 @@ class Foresight:
     knowledge: Knowledge | None = None
     looks: bool = True
 
-    def foreseen(self, record: Array, requirements: Sequence[Requirement]) -> Foreseen:
-        """The rivals that a record (n, r) would leave, and what to do about them."""
+    def foreseen(
+        self, record: Array, requirements: Sequence[Requirement]
+    ) -> tuple[Entry | None, list[Finding]]:
+        """Return the rivals that a record (n, r) would leave (None: not known), and what to do about them."""
         reason = self._not_now(len(record))
         if reason:
-            return Foreseen(findings=(not_foreseen(reason),))
+            return None, [not_foreseen(reason)]
         try:
             estimate, _ = self._searched(record, np.random.default_rng(_SEED))
             found = self._beyond(record, estimate, requirements)
         except _ENDS:
-            return Foreseen()
+            return None, []
         entry = Entry(foreseen_entries(self.units, estimate, found))
-        return Foreseen(entry, tuple(foreseen_rivals(self.units, estimate, found, self.advice)))
+        return entry, list(foreseen_rivals(self.units, estimate, found, self.advice))
 
     def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> Searched | None:
         """Return how many of some records end elsewhere, and how many leave rivals; None if not known."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,10 +54,9 @@ class Reach:
 
 @dataclass(frozen=True)
 class StatedBound:
-    """A number of the spec that bounds an error, so that what is bought can be said in its words.
+    """A number of the spec that bounds an error: `factor` times the error is `value` times factor ** `power`.
 
-    An error `factor` times as large as asked stands for `value` times factor ** `power`. A `fraction` is
-    shown in per cent.
+    A `fraction` is shown in per cent.
     """
 
     key: str
@@ -80,11 +79,9 @@ class StatedBound:
 
 @dataclass(frozen=True)
 class Bought:
-    """The best accuracy within limits: `nearest` solves `problem` (goal "factor"), which was asked.
+    """The best accuracy within limits of the spec: `nearest` solves the `problem`, of the goal "factor".
 
-    Args:
-        stated: the numbers of the spec that are loosened alike; none if that has no words.
-        limits: of the spec; others of the problem are implied by them.
+    The numbers `stated` in the spec are loosened alike; there are none if that has no words.
     """
 
     units: Units
@@ -301,7 +298,11 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
             return low
         if at >= high:
             at = float(np.sqrt(low * high))
-        problem, within = _raised(unreachable.problem.on(found.basis), bounds, at), unreachable.within
+        problem, within = unreachable.problem.on(found.basis), unreachable.within
+        raised = list(problem.limits)
+        for index, bound in bounds.items():
+            raised[index] = replace(raised[index], bound=at * bound)
+        problem = replace(problem, limits=tuple(raised), finer=None)
         if within is not None:
             within = np.pad(within, (0, problem.basis.size - within.size))
         found = exchange(
@@ -312,13 +313,6 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
             enough=lambda objective, _: objective < 1.0 - 1e-3,
         )
     return low if np.isfinite(high) else None
-
-
-def _raised(problem: Problem, bounds: Mapping[int, float], factor: float) -> Problem:
-    limits = list(problem.limits)
-    for index, bound in bounds.items():
-        limits[index] = replace(limits[index], bound=factor * bound)
-    return replace(problem, limits=tuple(limits), finer=None)
 
 
 def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:

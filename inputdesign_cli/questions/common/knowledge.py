@@ -51,10 +51,7 @@ class Foreseen:
     of_plant: NDArray[np.int64]
 
     def admits(self, theta: Array, covariance: Array) -> bool:
-        """Return whether an estimate (k,) with its covariance (k, k) is one of these plants.
-
-        A parameter of G that is not drawn must be that of the spec, as far as the estimate shows.
-        """
+        """Return whether an estimate (k,) with its covariance (k, k) is one of these plants."""
         of_plant, centre = self.of_plant, self.region.centre
         away = (theta[: centre.size] - centre)[of_plant]
         own = _OFF**2 * covariance[np.ix_(of_plant, of_plant)]
@@ -67,10 +64,7 @@ class Foreseen:
 def that_agrees(
     knowledge: Knowledge | None, estimate: Estimate, near: Callable[[Array], Estimate]
 ) -> tuple[Estimate, tuple[Rival, ...]]:
-    """Return the likeliest minimum that agrees with the knowledge, and the minima that do not.
-
-    If none does, the knowledge is wrong and rules nothing out.
-    """
+    """Return the likeliest minimum that agrees with the knowledge, and the minima that do not."""
     minima = (Rival(estimate.theta, 0.0), *estimate.search.rivals)
     admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]
     if not admitted or len(admitted) == len(minima):

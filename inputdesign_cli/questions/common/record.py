@@ -34,13 +34,9 @@ _TAKES_PART = 1e-6
 
 @dataclass(frozen=True)
 class Delivery:
-    """How a record is handed over.
+    """How a record is handed over: (r,) what is added to each input, and files beside signal.csv.
 
-    Args:
-        operating_points: (r,) what is added to the record of each input; None when nothing was asked.
-        also: files beside signal.csv: "mat", "npz", "h", "wav".
-        full_scale: what full scale stands for in a WAV file; the largest value when None.
-        sampling_rate: samples a second.
+    They are "mat", "npz", "h", "wav"; `full_scale` of the last is the largest value when None.
     """
 
     operating_points: Array | None = None
@@ -51,20 +47,12 @@ class Delivery:
 
 @dataclass(frozen=True)
 class RecordRequest:
-    """What a spec asks of its record.
+    """What a spec asks of its record, of `samples` samples (None: as many as the experiment has).
 
-    Args:
-        bounds: on single samples; those on powers are the design's.
-        cost: weights of the powers, see `Target`.
-        band: of the excitation, in rad per sample.
-        step: time between samples in the unit of the experiment's frequencies.
-        samples: length; that of the experiment when None.
-        meets: whether the record itself is to meet the accuracy; else it has the power of the design.
-        most_samples: the longest experiment, where one is looked for.
-        longest: samples of the longest record that is computed at all.
-        limit_keys: of the spec, for what limits single samples.
-        stated_method: whether the spec states the kind of signal.
-        others: kinds of signals that may stand in for one that does not fit.
+    Bounds are on single samples, by `limit_keys`. The band is in rad per sample, the step between samples in
+    the unit of the experiment. A record that `meets` keeps the accuracy itself; else it has the power of the
+    design. Where the length is sought it is `most_samples` at most, and at most `longest` are computed at
+    all. `others` may stand in for a kind of signal that does not fit.
     """
 
     settings: SignalSettings
@@ -115,16 +103,11 @@ class Made:
 def make_record(
     request: RecordRequest, design: Design, experiment_samples: int, *, first: bool = False
 ) -> Record | None:
-    """The best of several records of the designed spectrum.
+    """Return the best of several records of the designed spectrum, or the `first` that meets what is asked.
 
     Best is the least power that meets the requirements of every scenario by the record itself, or the best
-    criterion of the plant where it is worst. None when
-    no excitation is needed, or when the record would be too short (criteria per sample without
-    `signal.samples`) or longer than any that is computed.
-
-    Args:
-        experiment_samples: samples of the experiment, and of the record where the request states no other.
-        first: whether to take the first that meets the requirements, whatever it costs.
+    criterion of the plant where it is worst. None when no excitation is needed, or when the record would be
+    too short (criteria per sample without `signal.samples`) or longer than any that is computed.
     """
     problem, settings = design.problem, request.settings
     # In the coordinates of this design, which its requirements use too.
@@ -151,7 +134,9 @@ def make_record(
     def beyond_peaks(record: Array, which: Iterable[int]) -> list[int]:
         return _worst_few({n: peak_share(others[n], bounds, record) for n in which}, MET)
 
-    numbers, limiting = _binding(design), [0]
+    shares, limiting = design.result.certificate.shares, [0]
+    # The nominal plant, and the scenarios that bind the design.
+    numbers = [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
     if len(plants) > 1 and bounds.hard:  # plants that answer most to one record do so to others
         values = generator.values(np.random.default_rng(settings.seed))
         limiting += beyond_peaks(np.repeat(values, settings.hold, axis=0), range(1, len(plants)))
@@ -233,12 +218,6 @@ def peak_at(request: RecordRequest, design: Design, record: Record) -> Callable[
     return share
 
 
-def _binding(design: Design) -> list[int]:
-    """The nominal plant, and the scenarios that bind the design."""
-    shares = design.result.certificate.shares
-    return [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
-
-
 def ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Array) -> float:
     """Return the score of a record (n, r) at a plant; infinite if it does not excite every parameter."""
     try:
@@ -300,10 +279,7 @@ def given_record(
     spectrum: DesignedSpectrum,
     ratio: Callable[[Array], float],
 ) -> Record | None:
-    """One record of a spectrum that was given, of its power as far as the limits on samples allow.
-
-    None when it would be too short or too long.
-    """
+    """Return a record of a given spectrum, of its power as far as limits allow; None if too short or long."""
     settings = replace(request.settings, candidates=1, most_candidates=1)
     samples = request.length(experiment.samples)
     if not request.feasible(experiment.samples, least_period(experiment.inputs)):

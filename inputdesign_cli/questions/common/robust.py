@@ -97,16 +97,11 @@ class Region(Knowledge):
 
 @dataclass(frozen=True)
 class Plants:
-    """The scenarios of a design.
+    """The scenarios of a design: a batch beside the nominal plant, of which `discard` may be left out.
 
-    Args:
-        batch: the plants beside the nominal one.
-        discard: how many of the plants the design may leave out.
-        afresh: draws others from the same distribution, a few at a time; None if plants were listed.
-        fresh: how many of these were asked for.
-        at: the plant with parameters (k,), None if there is no such plant; not given if plants were listed.
-        unknowns: of the program, None if they have no number.
-        region: where the design is to serve the worst plant that is found, too; `searched` what was found.
+    `afresh` draws others from the same distribution, `fresh` in all; None if plants were listed. `at` is the
+    plant with parameters (k,), `unknowns` their number in the program. In the `region` the worst is
+    `searched`, too.
     """
 
     batch: Batch
@@ -155,7 +150,9 @@ def _worst(
     """Return how near each scenario comes, with M_s (S, k, k); a share up to `above` may come out as 0."""
     worst = [Kept(0.0)] * len(problem.scenarios)
     for side in (False, True):
-        admitted = _admitted(design.problem, design, side=side)
+        # Where the best accuracy is sought, requirements may have the ratio that is reached.
+        best = design.problem.goal == "factor" and not side
+        admitted = float(np.sqrt(design.result.objective)) if best else 1.0
         for index, violation in problem.demands.violations(informations, above=above * admitted, side=side):
             number, share = problem.demands.asked[index].scenario, violation.ratio / admitted
             if share > worst[number].share:
@@ -179,11 +176,6 @@ def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.floa
     )
 
 
-def _admitted(problem: Problem, design: Design, *, side: bool) -> float:
-    """The ratio that a requirement may have: where the best accuracy is sought the one that is reached."""
-    return float(np.sqrt(design.result.objective)) if problem.goal == "factor" and not side else 1.0
-
-
 @dataclass(frozen=True)
 class Tried:
     """A plant that the design was not made for: what it keeps, and what is asked there."""
@@ -193,11 +185,7 @@ class Tried:
 
 
 def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Tried]:
-    """Return what plants keep that the design was not made for.
-
-    Args:
-        above: a share up to this one may come out as 0, since no peak as low is searched to the last digit.
-    """
+    """Return what plants keep that the design was not made for; a share up to `above` may come out as 0."""
     seconds_left()
     try:
         at = _at(design, samples, batch.plants)
@@ -217,10 +205,7 @@ def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> 
 
 
 def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:
-    """Draw an estimate (k,) from data of the design if this is the true plant.
-
-    None if the experiment does not determine it.
-    """
+    """Draw an estimate (k,) from data of the design if this is the true plant; None if undetermined."""
     try:
         alone = _at(design, samples, [plant])
         (information,) = alone.informations(design.result.x)

@@ -28,7 +28,9 @@ def searches(design: Design, settings: SignalSettings, *, amplitude_alone: bool)
     """Return whether a record is searched: two levels, the best accuracy, and no limit but the amplitude."""
     free = settings.periods == 1 and not settings.ramp and settings.level is None
     two_levels = kind_of(settings.method).switched
-    return amplitude_alone and free and two_levels and design.any_record is not None and best_is_sought(design)
+    return (
+        amplitude_alone and free and two_levels and design.any_record is not None and best_is_sought(design)
+    )
 
 
 def best_is_sought(design: Design) -> bool:
@@ -36,7 +38,9 @@ def best_is_sought(design: Design) -> bool:
     return design.problem.goal == "factor" and not design.problem.side
 
 
-def searched(design: Design, record: Record, settings: SignalSettings, plants: Mapping[int, FiniteRecord]) -> Array:
+def searched(
+    design: Design, record: Record, settings: SignalSettings, plants: Mapping[int, FiniteRecord]
+) -> Array:
     """Return the best record (samples, r) of two levels that is found from a first one.
 
     The search ends at `settings.tolerance` above the bound over all records, after `settings.seconds`, or

@@ -90,8 +90,12 @@ def with_record(
     signal: Signal,
 ) -> Results:
     """Return the results with a record: signal.csv, predicted_output.csv, their plot, and other files."""
-    columns = applied_columns(request, units, record)
-    time, *signals = columns.values()
+    time = units.sample_time * np.arange(len(record.samples), dtype=np.float64)
+    signals = list(applied(request.delivery, record).T)
+    columns = {
+        units.time_header: time,
+        **dict(zip(map(units.header, units.excitations), signals, strict=True)),
+    }
     around, most, n = request.delivery.operating_points, request.bounds.output, len(time)
     y = FiniteRecord(experiment, n, units.step).signals("output", record.samples)
     noise = noise_deviation(experiment, n, units.step)
@@ -100,6 +104,10 @@ def with_record(
         name, limits = f"y{i + 1}", None if most is None else (-float(most[i]), float(most[i]))
         panels.append(PredictedPanel(name, y[:, i], noise[:, i], limits, units.label(name)))
         predicted |= {units.header(name): y[:, i], f"{name}_noise_deviation": noise[:, i]}
+    moves, rate = {}, request.bounds.rate
+    if rate is not None and not units.closed_loop:  # the largest move from rest, and its limit
+        pairs = zip(_largest_moves(record.samples).tolist(), rate.tolist(), strict=True)
+        moves = dict(zip(units.excitations, pairs, strict=True))
     curves = SignalCurves(
         time,
         dict(zip(units.excitations, signals, strict=True)),
@@ -107,7 +115,7 @@ def with_record(
         {name: units.label(name) for name in units.excitations},
         tuple(panels),
         held=units.sampled,
-        moves=_moves(request, units, record),
+        moves=moves,
         levels=around is not None and bool(np.any(around)),
     )
     tables = {"signal": Table(columns), "predicted_output": Table(predicted)}
@@ -116,13 +124,10 @@ def with_record(
 
 
 def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
-    """Return standard deviations of the noise at the outputs, in the loop where there is one, (n, p).
+    """Return standard deviations (n, p) of the noise at the outputs, in the loop where there is one.
 
     From the response to an impulse of e, whose squares add up. Noise that settles within the record has been
     there before; one that drifts grows from the start on.
-
-    Args:
-        step: time between samples in the unit of the experiment's frequencies.
     """
     model, p = experiment.model, experiment.model.outputs
     e = np.zeros((p, samples, p))
@@ -136,13 +141,6 @@ def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
     return np.where(still, grown[-1], grown)
 
 
-def applied_columns(request: RecordRequest, units: Units, record: Record) -> dict[str, Array]:
-    """The columns of signal.csv. Raises `SpecError` as `applied` does."""
-    time = units.sample_time * np.arange(len(record.samples), dtype=np.float64)
-    values = applied(request.delivery, record).T
-    return {units.time_header: time, **dict(zip(map(units.header, units.excitations), values, strict=True))}
-
-
 def _limits(request: RecordRequest, units: Units, record: Record) -> dict[str, tuple[float, float]]:
     """Between which values each channel of the record is to stay, where that signal is limited."""
     most, around = request.bounds.amplitude, request.delivery.operating_points
@@ -153,26 +151,13 @@ def _limits(request: RecordRequest, units: Units, record: Record) -> dict[str, t
     return dict(zip(units.excitations, pairs, strict=True))
 
 
-def _moves(request: RecordRequest, units: Units, record: Record) -> dict[str, tuple[float, float]]:
-    """The largest move of each channel from rest and its limit, where the record is the input."""
-    most = request.bounds.rate
-    if most is None or units.closed_loop:
-        return {}
-    pairs = zip(_largest_moves(record.samples).tolist(), most.tolist(), strict=True)
-    return dict(zip(units.excitations, pairs, strict=True))
-
-
 def _largest_moves(u: Array) -> Array:
     """Return the largest moves (r,) of inputs (n, r) that start from rest."""
     return np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0)
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
-    """Return the samples shifted to the operating points, (n, r); a record that was given is left as it is.
-
-    Raises:
-        SpecError: `out-of-range` when so much is added that the samples lose their digits.
-    """
+    """Return samples (n, r) about the operating points; raise `out-of-range` where they lose their digits."""
     points = delivery.operating_points
     if points is None or record.method == "given":
         return record.samples

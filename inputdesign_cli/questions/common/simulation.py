@@ -18,27 +18,14 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
-from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.findings.simulated_runs import (
-    initial_estimate_off,
-    one_minimum,
-    other_length,
-    runs_miss_confidence,
-)
+from inputdesign_cli.errors import bad_spec, refuse
+from inputdesign_cli.findings import simulated_runs
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
 from inputdesign_cli.monte_carlo.study import Study, Tried, tried_on_model, tried_on_truth
 from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
-from inputdesign_cli.outcome import Powers, Simulation as Studied
-from inputdesign_cli.outcome.curves import (
-    BoundCurves,
-    CloudCurves,
-    Curves,
-    ErrorBandCurves,
-    ErrorBandPanel,
-    SignalCurves,
-)
+from inputdesign_cli.outcome import Powers, Simulation as Studied, curves as plots
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
@@ -56,13 +43,13 @@ _CLOUD = 2000
 _FADED = 3.0
 
 
-def error_bands(units: Units, predicted: PredictedError, errors: Array, name: str) -> ErrorBandCurves:
+def error_bands(units: Units, predicted: PredictedError, errors: Array, name: str) -> plots.ErrorBandCurves:
     """Quantiles of the errors (runs, n) over frequency, of every entry that the prediction is about."""
     frequency = predicted.w / units.frequency
     r_u = predicted.r_u if name == "design" else None
 
-    def panel(own: Array, entry: tuple[int, int] | None) -> ErrorBandPanel:
-        return ErrorBandPanel(
+    def panel(own: Array, entry: tuple[int, int] | None) -> plots.ErrorBandPanel:
+        return plots.ErrorBandPanel(
             frequency=frequency[own],
             quantiles={q: np.quantile(errors[:, own], q, axis=0) for q in QUANTILES},
             r_u=None if r_u is None else r_u[own],
@@ -71,22 +58,19 @@ def error_bands(units: Units, predicted: PredictedError, errors: Array, name: st
             names=units.passage(entry),
         )
 
-    entries = predicted.entries
-    if entries is None:
-        panels = [panel(np.ones(frequency.size, dtype=bool), None)]
-    else:
-        places = np.unique(entries, axis=0).tolist()
-        panels = [panel(np.all(entries == (i, j), axis=1), (i, j)) for i, j in places]
-    return ErrorBandCurves(tuple(panels), name.replace("_", " "), len(errors))
+    entries, every = predicted.entries, np.ones(frequency.size, dtype=bool)
+    places = [None] if entries is None else [(i, j) for i, j in np.unique(entries, axis=0).tolist()]
+    panels = [panel(every if at is None else np.all(entries == at, axis=1), at) for at in places]
+    return plots.ErrorBandCurves(tuple(panels), name.replace("_", " "), len(errors))
 
 
-def cloud(trials: Trials, covariance: Array | None) -> CloudCurves | None:
+def cloud(trials: Trials, covariance: Array | None) -> plots.CloudCurves | None:
     """The estimates in some planes; None without a covariance (k, k) in theory, or for a single parameter."""
     size = len(trials.names)
     if covariance is None or size < 2:
         return None
     pairs = sorted({round(i) for i in np.linspace(0, size - 2, _PAIRS)})
-    return CloudCurves(
+    return plots.CloudCurves(
         names=trials.names,
         pairs=tuple((i, i + 1) for i in pairs),
         theta=trials.theta[:_CLOUD],
@@ -95,7 +79,7 @@ def cloud(trials: Trials, covariance: Array | None) -> CloudCurves | None:
     )
 
 
-def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, SignalCurves]:
+def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, plots.SignalCurves]:
     """r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
     slowest = float(np.abs(loop.closed_poles).max(initial=0.0))
     tail = min(int(np.ceil(_FADED / (1.0 - slowest))), len(excitation))
@@ -108,27 +92,10 @@ def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, Sig
             columns[f"{letter}{number}" + (f"_{cause}" if cause else "")] = samples
             shown[f"{letter}{'' if units.single else number}{cause}"] = samples
     first = "ruy" if units.single else "yur"
-    return Table(columns), SignalCurves(
+    return Table(columns), plots.SignalCurves(
         instants,
         {name: shown[name] for name in sorted(shown, key=lambda name: first.index(name[0]))},
         held=False,
-    )
-
-
-def study_outcome(study: Study, inputs: Mapping[str, TriedInput], *, excitation: str) -> Studied:
-    """Return `simulation` of the outcome; each run applies a `new` realisation, or the one `record`."""
-    model, size = study.true.model, len(study.nominal.model.names)
-    rng = np.random.default_rng(study.seed)
-    several = tuple(map(tuple, model.covariance.tolist()))
-    return Studied(
-        runs=study.runs,
-        seed=study.seed,
-        inputs=inputs,
-        samples=study.true.samples,
-        excitation=excitation,
-        true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
-        true_variance=float(model.covariance[0, 0]) if model.outputs == 1 else several,
-        wishart_range=tuple(wishart_range(size, study.runs, rng)) if study.runs > 1 else (),
     )
 
 
@@ -140,12 +107,7 @@ def tried_input(
     cost: Mapping[PowerKind, Weight],
     modelled: Tried | None,
 ) -> TriedInput:
-    """Return what one excitation gave on the true system.
-
-    Args:
-        errors: of the runs, see `Trials.errors`; they are compared with what is `predicted`.
-        modelled: runs in which the true system is the design model, if the two differ.
-    """
+    """Return what one excitation gave: errors, compared with what is `predicted`, on the design model too."""
     trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
     frequency = predicted.w / units.frequency
     entry = TriedInput(
@@ -225,14 +187,10 @@ class TrueSystem:
 
 @dataclass(frozen=True)
 class Simulation:
-    """How an experiment is tried.
+    """How an experiment is tried: on the nominal one in raw parameters, or on the `truth`.
 
-    Attributes:
-        nominal: the experiment on the design model, in raw parameters, prior information included.
-        truth: None if the design model is the true system.
-        renewed: whether each run realises the spectrum anew.
-        compare: what else is tried at equal power: signals of a flat spectrum over the band, of these kinds.
-        entries: see `ModelQuestion`.
+    With `renewed` each run realises the spectrum anew. At equal power flat signals of the kinds in `compare`
+    are tried, too. For `entries` see `ModelQuestion`.
     """
 
     units: Units
@@ -247,11 +205,7 @@ class Simulation:
 
 
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
-    """Return the results of the design with the study of its excitation, computed by the executor.
-
-    Raises:
-        SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
-    """
+    """Return the results with the study of their excitation, or raise `SpecError` (`nothing-to-simulate`)."""
     with time_limit(inf):  # that of the solver is for the design
         return _simulated(plan, delivered, executor)
 
@@ -276,9 +230,8 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
     counted, simulated = outcome.samples, len(delivered.record)
     foretold = results.curves if counted == simulated else delivered.of_length(simulated)
     predicted = _predicted(plan, foretold, delivered.alpha, excitations[0].information(nominal))
-    inputs: dict[str, TriedInput] = {}
-    curves: dict[str, Curves] = {name: foretold[name] for name in ("ellipses",) if name in foretold}
-    tables: dict[str, Table] = {}
+    inputs, tables = dict[str, TriedInput](), dict[str, Table]()
+    curves: dict[str, plots.Curves] = {name: foretold[name] for name in ("ellipses",) if name in foretold}
     for excitation in excitations:
         name = excitation.name
         tried = tried_on_truth(study, excitation, executor)
@@ -299,12 +252,23 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
         inputs["design"] = replace(inputs["design"], searched=searched)
     asked = None if outcome.model_error is None else outcome.model_error.confidence
     findings = [
-        *other_length(counted, simulated),
-        *initial_estimate_off(units, inputs),
-        *(runs_miss_confidence(asked, inputs["design"]) if "design" in inputs else []),
-        *one_minimum(searched),
+        *simulated_runs.other_length(counted, simulated),
+        *simulated_runs.initial_estimate_off(units, inputs),
+        *(simulated_runs.runs_miss_confidence(asked, inputs["design"]) if "design" in inputs else []),
+        *simulated_runs.one_minimum(searched),
     ]
-    entry = study_outcome(study, inputs, excitation="new" if plan.renewed else "record")
+    model, rng = true.model, np.random.default_rng(study.seed)
+    several = tuple(map(tuple, model.covariance.tolist()))
+    entry = Studied(
+        runs=study.runs,
+        seed=study.seed,
+        inputs=inputs,
+        samples=true.samples,
+        excitation="new" if plan.renewed else "record",
+        true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
+        true_variance=float(model.covariance[0, 0]) if model.outputs == 1 else several,
+        wishart_range=tuple(wishart_range(nominal.size, study.runs, rng)) if study.runs > 1 else (),
+    )
     return with_study(results, entry, started, findings, tables, curves)
 
 
@@ -325,30 +289,22 @@ def _excitations(plan: Simulation, delivered: Delivered, record: Array) -> list[
 
 
 def _flat(plan: Simulation, kind: str, name: str, power: float, samples: int) -> Excitation:
-    """An excitation of a flat spectrum over the band of the experiment, even over its channels.
-
-    Raises:
-        SpecError: `not-supported` for signals of few levels on a band.
-    """
+    """Return an excitation of a flat spectrum over the band, or raise `SpecError` (`not-supported`)."""
     nominal, band = plan.nominal, plan.nominal.band
     everywhere = plan.units.sampled and band == (0.0, np.pi)
     if kind_of(kind).few_levels and not everywhere:
-        raise bad_spec(
-            "not-supported",
-            f"a {kind} signal has power at all frequencies of discrete time, the excitation only on a band",
-            hint="compare with multisine or white",
-            key="simulation.compare",
-        )
+        what = f"compare a {kind} signal, which has power at all frequencies, with an excitation on a band"
+        raise refuse("simulation.compare", what, "compare with multisine or white")
     powers = np.full(nominal.inputs, power / nominal.inputs)
     return Redrawn.flat(name, kind, powers, band, samples, plan.units.step)
 
 
 def _predicted(
-    plan: Simulation, foretold: Mapping[str, Curves], alpha: float, information: Array
+    plan: Simulation, foretold: Mapping[str, plots.Curves], alpha: float, information: Array
 ) -> PredictedError:
     """What the curve `bound` says; where there is none, the r_u that the `information` gives."""
     bound = foretold.get("bound")
-    if not isinstance(bound, BoundCurves):
+    if not isinstance(bound, plots.BoundCurves):
         _, bound = Informed(plan.units, plan.entries, information, stated=False).bound()
     panels = bound.panels
     admissible = [panel.r_adm for panel in panels if panel.r_adm is not None]

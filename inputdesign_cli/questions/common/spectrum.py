@@ -69,11 +69,7 @@ def spectrum_curves(
     *,
     white: float | None = None,
 ) -> tuple[Table, SpectrumCurves]:
-    """spectrum.csv and its plot: a density over the band, or sinusoids with their powers.
-
-    Args:
-        band: of the excitation, in the unit of the experiment.
-    """
+    """Return spectrum.csv and its plot: a density over the band, or sinusoids with their powers."""
     if basis.has_density:
         w = np.unique(np.concatenate([[band[0]], axis(*band, basis.knots)]))
         symbol, values = "phi", matrices(basis.density(x, w)).astype(complex)
@@ -96,15 +92,16 @@ def spectrum_curves(
 def with_periodogram(
     units: Units, table: Table, curves: SpectrumCurves, samples: Array
 ) -> tuple[Table, SpectrumCurves]:
-    """The spectrum with the smoothed periodogram of each channel of the record (n, r) over it.
-
-    A spectrum of lines is returned unchanged.
-    """
+    """Return the density with the smoothed periodogram of the record (n, r) over it; lines are unchanged."""
     if curves.lines:
         return table, curves
     shown, columns = [], {}
     for a, column in enumerate(samples.T):
-        w, smooth = _smoothed_periodogram(column, units.sample_time)
+        periodogram = np.abs(np.fft.rfft(column)) ** 2 / column.size
+        reach = int(column.size**0.4 / 4)
+        window = np.ones(2 * reach + 1) / (2 * reach + 1)
+        smooth = np.convolve(np.pad(periodogram, reach, mode="reflect"), window, mode="valid")
+        w = 2 * np.pi * np.arange(periodogram.size) / column.size / units.sample_time
         # Per rad/sample in discrete time, per rad per time unit in continuous time, as the design.
         density = smooth * (1.0 if units.sampled else units.sample_time)
         shown.append(np.interp(curves.frequency, w, density))
@@ -112,20 +109,10 @@ def with_periodogram(
     return Table({**table.columns, **columns}), replace(curves, record=np.stack(shown, axis=1))
 
 
-def _smoothed_periodogram(samples: Array, step: float) -> tuple[Array, Array]:
-    """Frequencies in rad per unit of the `step`, and the smoothed periodogram there of samples (n,)."""
-    periodogram = np.abs(np.fft.rfft(samples)) ** 2 / samples.size
-    reach = int(samples.size**0.4 / 4)
-    window = np.ones(2 * reach + 1) / (2 * reach + 1)
-    smooth = np.convolve(np.pad(periodogram, reach, mode="reflect"), window, mode="valid")
-    return 2 * np.pi * np.arange(periodogram.size) / samples.size / step, smooth
-
-
 def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCurves] | None:
-    """optimality.csv and its plot: the worth of the best direction at each frequency over its price.
+    """Return optimality.csv and its plot, the worth of the best direction over its price, or None.
 
-    By the bound over every spectrum: at most one everywhere, and one where power pays. None if there is no
-    bound over every spectrum.
+    By the bound over every spectrum it is at most one everywhere, and one where power pays.
     """
     anything = design.any_spectrum
     if anything is None:

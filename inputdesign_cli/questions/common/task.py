@@ -39,9 +39,7 @@ _FADED = float(np.log(100.0))
 class SpectrumTask(ABC):
     """A question about the spectrum of an experiment, with its record and its trial.
 
-    Attributes:
-        unstated: errors of the entries of G that have r_u if no requirement bounds it.
-        ellipses: pairs of parameters; None for a choice of them.
+    Without a requirement on them `unstated` are the errors that have r_u; `ellipses` are None for a choice.
     """
 
     header: Header
@@ -67,7 +65,7 @@ class SpectrumTask(ABC):
         return simulate(self.simulation, delivered, executor)
 
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
-        """Return the errors that are asked about, or else those of every entry of G; and which they are."""
+        """Return the errors that are asked about, or r_u of all entries of G, and whether they are."""
         stated = model_errors(asked)
         return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
 
@@ -95,8 +93,8 @@ class SpectrumTask(ABC):
         results = adding(results, results.outcome, found)
         if self.foresight is None:
             return results
-        foreseen = self.foresight.foreseen(samples, requirements)
-        return adding(results, replace(results.outcome, foreseen=foreseen.entry), foreseen.findings)
+        foreseen, rivals = self.foresight.foreseen(samples, requirements)
+        return adding(results, replace(results.outcome, foreseen=foreseen), rivals)
 
     def to_be_tried(
         self,
@@ -110,7 +108,7 @@ class SpectrumTask(ABC):
         *,
         flat: bool = True,
     ) -> Delivered:
-        """Return what a trial of a record (n, r) takes; the curves are those of the information."""
+        """Return what a trial of a record (n, r) takes; the curves show its information."""
         of_length = partial(informed.of_length, experiment, self.ellipses, flat=flat)
         search = None if self.foresight is None else partial(self.foresight.tried, record, requirements)
         return Delivered(results, record, renewed, alpha, of_length, search)
@@ -121,11 +119,7 @@ def growth_by_start(
 ) -> float:
     """Return how many times as large errors are if the start of a record (n, r) and its levels are unknown.
 
-    Infinite if one has no bound. What samples after the start has faded show, about their means, decides
-    where it is enough.
-
-    Args:
-        step: time between samples in the unit of the experiment's frequencies.
+    What samples after the start has faded show, about their means, decides where it is enough.
     """
     plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
     try:

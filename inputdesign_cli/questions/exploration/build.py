@@ -25,95 +25,96 @@ from inputdesign_cli.specification import Spec, parse_spec
 
 _MOST_SAMPLES = 100_000
 _DIGITS = 6
-# Before a title, in the quotes of a string.
-_DOUBTED = '"On a model that deserves no trust: '
+_DOUBTED = "On a model that deserves no trust: "
+_UNTRUSTED = "No model of this record deserves trust, and no design on this one: "
+_LOOP = (
+    "The inputs seem to answer the outputs, as in a loop. Then identify and assess need its controller, "
+    "experiment: {controller: {numerator: [..], denominator: [..]}}; solve then designs in the loop."
+)
 
 
-def spec_text(log: Record, found: Found, sources: Sequence[Path]) -> str:
-    """Return a spec that `idesign solve` accepts: the model, and the most informative input of that power."""
-    power = np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)
-    low, high = log.u.min(axis=0), log.u.max(axis=0)
-    half = 0.5 * (high - low)
-    power, half = (np.where(x > 0.0, x, x.max()) for x in (power, half))
-    # Six digits of the distance that the input moves: a level far from zero takes more.
-    places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in half]
-    levels, widths = (
-        [round(float(x), n) for x, n in zip(values, places, strict=True)]
-        for values in (0.5 * (low + high), half)
-    )
-    blocks = blocks_of(found.model)
-    blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
-    structures = ", ".join(
-        f"{signal_name('y', i, found.model.outputs)}: {c.orders.family}" for i, c in enumerate(found.taken)
-    )
-    kind = (
-        f"plants in s by their parameters (times in {log.time_unit}), their inputs held between samples"
-        if any(c.orders.physical for c in found.taken)
-        else "A y = (B/F) u + (C/D) e, polynomials in q^-1"
-    )
-    names = ", ".join(f"{x} is {' '.join(column.split())}" for x, column in log.names.items() if x != "time")
-    limit, amplitude = _numbers([float(f"{x:.6g}") for x in power]), _numbers(widths)
-    ranges = " and ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True))
-    # Power at frequency zero determines the gain of an integrator without end.
-    family = "{type: multisine, lines: 100}" if found.integrates else "{type: fir, order: 20}"
-    signal = "multisine" if found.integrates else "filtered_noise"
-    samples = min(len(log.y), _MOST_SAMPLES)
-    source = " ".join(" and ".join(path.name for path in sources).split())
-    text = f"""\
-# Written by `idesign explore` from {source}.
-# `idesign solve FILE` designs what it asks; every entry can be changed here or by --set key=value.
-title: {json.dumps(f"The next experiment after {source}")}
-
-sample_time: {log.step!r}          # in time_unit; frequencies are in rad per time_unit
-time_unit: {log.time_unit}
-
-# Known from the record: {kind} ({structures}).
-# {names}
-"""
-    for key, block in blocks.items():
-        if key == "noise" and drawn:
-            text += (
-                f"# Roots of {' and '.join(drawn)} on the circle, drawn into it by one in {len(log.y)}:\n"
-                "# so many samples tell no more, and noise that never fades would count for any experiment.\n"
-            )
-        text += "\n".join([f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())])
-        text += "\n"
-    text += f"""
-experiment:
-  samples: {samples}              # as long as the record; how long may the next one be?
-
-# What the next experiment is for. D: the most informative one within the limits. To ask for an accuracy at
-# the least cost instead, replace these lines by
-#   accuracy: {{model_error: {{relative: 0.05, confidence: 0.95}}}}  # add band: [..] if you like
-accuracy: {{criterion: D}}
-limits:
-  input_power: {limit}            # mean square about the mean, as in the record
-  # amplitude: {amplitude}         # with it every sample stays within the range of the log, {ranges}
-
-# The family of spectra to search, and the signal to apply: about the middle of the range of the log.
-spectrum: {family}
-signal: {{type: {signal}, seed: 1, offset: {json.dumps(levels[0] if len(levels) == 1 else levels)}}}
-"""
-    return text
-
-
-def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
-    """A spec that says at its head, and in its title, why its model deserves no trust, and of a loop.
+def spec_text(
+    log: Record, found: Found, sources: Sequence[Path], reasons: Sequence[str] = (), *, loop: bool = False
+) -> str:
+    """Return a spec that `idesign solve` accepts: the model, and the most informative input of that power.
 
     Args:
+        reasons: why the model deserves no trust.
         loop: whether inputs seem to answer the outputs.
     """
-    told = [f"No model of this record deserves trust, and no design on this one: {one}" for one in reasons]
-    if loop:
-        told.append(
-            "The inputs seem to answer the outputs, as in a loop. Then identify and assess need its "
-            "controller, experiment: {controller: {numerator: [..], denominator: [..]}}; solve then designs "
-            "in the loop."
-        )
-    lines = [textwrap.fill(one, 110, initial_indent="# ", subsequent_indent="#   ") for one in told]
-    head, title, rest = text.partition("\ntitle: ")
-    doubted = f"{title}{_DOUBTED}{rest[1:]}" if reasons else title + rest
-    return "\n".join([head, *lines]) + doubted
+    source = " ".join(" and ".join(path.name for path in sources).split())
+    families = ", ".join(
+        f"{signal_name('y', i, found.model.outputs)}: {c.orders.family}" for i, c in enumerate(found.taken)
+    )
+    kind = f"plants in s, times in {log.time_unit}, inputs held between samples"
+    if not any(c.orders.physical for c in found.taken):
+        kind = "A y = (B/F) u + (C/D) e, polynomials in q^-1"
+    blocks, (power, level, width) = blocks_of(found.model), _usual(log)
+    blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
+    comments = {
+        "title": [
+            f"Written by `idesign explore` from {source}. `idesign solve FILE` designs what it asks; every "
+            "entry can be changed here or by --set key=value.",
+            *(_UNTRUSTED + one for one in reasons),
+            *([_LOOP] if loop else []),
+        ],
+        "plant": [
+            f"Known from the record: {kind} ({families}).",
+            ", ".join(f"{x} is {' '.join(name.split())}" for x, name in log.names.items() if x != "time"),
+        ],
+        "noise": [
+            f"Roots of {one} on the circle were drawn into it by one in {len(log.y)}." for one in drawn
+        ],
+        "accuracy": [
+            "D: the most informative experiment within the limits. For an accuracy at the least cost write",
+            "  accuracy: {model_error: {relative: 0.05, confidence: 0.95}}",
+        ],
+        "limits": ["As in the record: mean squares about the mean, and amplitudes that keep to its range."],
+        "spectrum": [
+            "The family of spectra to search, and the signal to apply about the middle of the range."
+        ],
+    }
+    sections = {
+        "title": f"{_DOUBTED * bool(reasons)}The next experiment after {source}",
+        "sample_time": log.step,
+        "time_unit": log.time_unit,
+        **blocks,
+        "experiment": {"samples": min(len(log.y), _MOST_SAMPLES)},
+        "accuracy": {"criterion": "D"},
+        "limits": {"input_power": power, "# amplitude": width},  # the second is for the user to take in
+        "spectrum": {"type": "fir", "order": 20},
+        "signal": {"type": "filtered_noise", "seed": 1, "offset": level},
+    }
+    if found.integrates:  # power at frequency zero determines the gain of an integrator without end
+        sections["spectrum"] = {"type": "multisine", "lines": 100}
+        sections["signal"] = {"type": "multisine", "seed": 1, "offset": level}
+    return _commented(sections, comments)
+
+
+def _usual(log: Record) -> list[float | list[float]]:
+    """Return power, middle and half of the range of every input; one that rests has the largest of others."""
+    power, low, high = log.u.var(axis=0), log.u.min(axis=0), log.u.max(axis=0)
+    power, half = (np.where(x > 0.0, x, x.max()) for x in (power, 0.5 * (high - low)))
+    # Six digits of the distance that the input moves: a level far from zero takes more.
+    rows = []
+    for values, scale in ((power, power), (0.5 * (low + high), half), (half, half)):
+        places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in scale]
+        rows.append([round(float(x), n) for x, n in zip(values, places, strict=True)])
+    return [row[0] if len(row) == 1 else row for row in rows]
+
+
+def _commented(sections: Mapping[str, Any], comments: Mapping[str, Sequence[str]]) -> str:
+    """Return sections as YAML, the entries of each on lines of their own, under comments."""
+    lines = list[str]()
+    for key, value in sections.items():
+        lines += [""] if key in comments else []
+        for text in comments.get(key, ()):
+            lines += textwrap.wrap(text, 110, initial_indent="# ", subsequent_indent="#   ")
+        if isinstance(value, Mapping):
+            lines += [f"{key}:", *(f"  {name}: {json.dumps(entry)}" for name, entry in value.items())]
+        else:
+            lines.append(f"{key}: {json.dumps(value)}")
+    return "\n".join(lines[1:]) + "\n"
 
 
 def _inside(noise: Mapping[str, Any], samples: int) -> tuple[dict[str, Any], list[str]]:
@@ -125,20 +126,13 @@ def _inside(noise: Mapping[str, Any], samples: int) -> tuple[dict[str, Any], lis
     drawn = dict(noise)
     for letter in {"C", "D"} & noise.keys():
         several = isinstance(noise[letter][0], list)
-        rows = noise[letter] if several else [noise[letter]]
-        radii = [float(np.abs(np.roots(row)).max(initial=1e-9)) for row in rows]
-        shares = [min((1.0 - 1.0 / samples) / radius, 1.0) for radius in radii]
-        own = [
-            [float(c * share**k) for k, c in enumerate(row)] for row, share in zip(rows, shares, strict=True)
-        ]
+        own = []
+        for row in noise[letter] if several else [noise[letter]]:
+            radius = float(np.abs(np.roots(row)).max(initial=1e-9))
+            share = min((1.0 - 1.0 / samples) / radius, 1.0)
+            own.append([float(c * share**k) for k, c in enumerate(row)])
         drawn[letter] = own if several else own[0]
     return drawn, sorted(letter for letter in noise if drawn[letter] != noise[letter])
-
-
-def _numbers(values: Sequence[float]) -> str:
-    """One number as it is, or a list."""
-    listed = ", ".join(f"{x:.10g}" for x in values)
-    return listed if len(values) == 1 else f"[{listed}]"
 
 
 def build_explored(text: str) -> Identification:

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
+from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore import Family, Found, answers_output, explore_records, levelled
 from inputdesign_cli.findings.explored_inputs import DRIVE, doubtful_inputs, undriven
 from inputdesign_cli.findings.explored_models import doubtful_model
@@ -19,28 +18,21 @@ from inputdesign_cli.findings.frequency_responses import contradicted, response_
 from inputdesign_cli.findings.periods import silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
-from inputdesign_cli.identification import frequency_response, response_delays, silent_in
+from inputdesign_cli.identification import silent_in
 from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.outcome import MeasuredLines, Outcome
 from inputdesign_cli.outcome.curves import ResponseCurves
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.assessment.identify import (
-    Identification,
-    Identified,
-    blaming_columns,
-    identification_results,
-    told,
-)
-from inputdesign_cli.questions.assessment.outcome import response_of_data
-from inputdesign_cli.questions.exploration.build import build_explored, spec_text, warned
+from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
+from inputdesign_cli.questions.assessment.outcome import response_without_model
+from inputdesign_cli.questions.exploration.build import build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import (
     exploration_notes,
     exploration_of,
     structure_curves,
     validation_of,
 )
-from inputdesign_cli.questions.frequency_response.measured import silent_entry
+from inputdesign_cli.questions.frequency_response.measure import silent_entry
 from inputdesign_cli.records import Preparation, Record, read_logs
 
 # Where more shifts appear, once these are left out so often, the plant is none of the models tried.
@@ -77,13 +69,13 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
                 bad_spec("no-structure", idle[0].message, hint=DRIVE, key="u") if idle else error
             ) from error
     measured, log = log, replace(log, y=np.concatenate([y for _, y in levelled(log.parts, found.slopes)]))
-    text = spec_text(log, found, paths)
-    task, data = build_explored(text), _data(log, found)
-    units = task.header.units
-    response = _without_model(units, log, found, loop=bool(loops))
+    looped = bool(loops)
+    task, data = build_explored(spec_text(log, found, paths)), _data(log, found)
+    units, of_log = task.header.units, replace(log, r=log.r if looped else None)
+    response = response_without_model(units, found.model, of_log, inputs=found.moving, loop=looped)
     doubts = [
         *doubtful_model(found, measured.parts, log.step, log.time_unit, integrates=only == "integrator"),
-        *doubtful_inputs(found, measured.parts, loop=bool(loops)),
+        *doubtful_inputs(found, measured.parts, loop=looped),
         *late_inputs(measured.parts),
         *biasing(units, found.estimate, data, found.validation.simulation),
         *(() if response is None else contradicted(response[2])),
@@ -91,8 +83,8 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     reasons = tuple(one.message for one in doubts)
     remarks = (*log.remarks, *exploration_notes(log, found, loops))
     noted = replace(data, findings=log.findings, remarks=remarks)
-    identified = Identified(found.estimate, found.model, noted, preparation, None, loop_told=bool(loops))
-    results = identification_results(task, _asked(task, identified), started)
+    identified = Identified(found.estimate, found.model, noted, preparation, loop_told=looped)
+    results = identification_results(task, identified.asked_by(task, "the estimate"), started)
     names = " and ".join(path.name for path in paths)
     outcome = replace(
         results.outcome,
@@ -103,15 +95,17 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     results = replace(
         results,
         outcome=outcome,
-        resolved_spec=warned(text, reasons, loop=bool(loops)),
+        resolved_spec=spec_text(log, found, paths, reasons, loop=looped),
         curves={**results.curves, **structure_curves(found)},
     )
+    if response is not None:
+        silent = silent_in(log.u[:, found.moving], log.y) if len(log.lengths) == 1 else {}
+        results = _beside(results, *response, silent)
     speaking = (
         *shifted_levels(found.estimate, data, log.time_unit),
         *refutations(found.model, found.estimate),
     )
-    against = tuple(one.message for one in speaking)
-    return Exploration(results if response is None else _beside(results, *response), reasons, against)
+    return Exploration(results, reasons, tuple(one.message for one in speaking))
 
 
 def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = None) -> tuple[Record, Found]:
@@ -151,35 +145,6 @@ def _data(log: Record, found: Found) -> Record:
     return replace(own, u=u, y=y, r=None, findings=(), remarks=(), means=None, repeated=(), lined=False)
 
 
-def _without_model(
-    units: Units, log: Record, found: Found, *, loop: bool
-) -> tuple[Table, ResponseCurves, MeasuredLines, dict[str, SilentLines]] | None:
-    """Return the frequency response of the data alone, where it can be had, and lines without excitation.
-
-    Args:
-        loop: whether inputs answer the outputs.
-    """
-    moving = log.u[:, found.moving]
-
-    def delays(samples: int) -> NDArray[np.int64]:
-        return response_delays(found.model, samples, step=units.step)[:, found.moving]
-
-    outside = log.r[:, found.moving] if loop and log.r is not None else None
-    if outside is not None and np.any(np.all(outside == moving, axis=0)):
-        outside = None  # what is u itself is not from outside
-    response = frequency_response(moving, log.y, outside, lengths=log.lengths, delays=delays)
-    if response is None and outside is not None:  # a reference that rests excites nothing
-        outside = None
-        response = frequency_response(moving, log.y, lengths=log.lengths, delays=delays)
-    if response is None:
-        return None
-    silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
-    of_data = response_of_data(
-        units, found.model, response, by_reference=outside is not None, inputs=found.moving, loop=loop
-    )
-    return *of_data, silent
-
-
 def _beside(
     explored: Results,
     table: Table,
@@ -199,13 +164,3 @@ def _beside(
         tables={**explored.tables, "frequency_response": table},
         curves={**explored.curves, "frequency_response": curves},
     )
-
-
-def _asked(task: Identification, identified: Identified) -> Identified:
-    """Return it with what the spec asks at the estimate, where it can be asked."""
-    estimate = identified.estimate
-    try:
-        question = task.at(identified.model, len(identified.data.y), estimate.factor, "the estimate")
-    except IdesignError as error:
-        return replace(identified, unasked=told(error))
-    return replace(identified, question=question)

@@ -14,13 +14,14 @@ from inputdesign_cli.findings.explored_models import HALF, LEAST_FIT
 from inputdesign_cli.identification import cross_correlations
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import blaming_columns
+from inputdesign_cli.questions.assessment.outcome import fit_of
 from inputdesign_cli.questions.exploration.explore import Exploration
-from inputdesign_cli.questions.exploration.outcome import validation_curves, validation_of
+from inputdesign_cli.questions.exploration.outcome import validation_of
 from inputdesign_cli.records import Preparation, Record, read_data, read_sheet, with_channels
 
 # Probability that past inputs explain the residuals of a model by chance alone.
@@ -47,7 +48,11 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     with blaming_columns(paths[0], data):
         check_varying((), data.u[:, :0], data.y)
     found = fits(model, data.parts)
-    table, curves = validation_curves(header.units, data, found)
+    simulated = [
+        (fit if np.all(np.isfinite(curve)) else None, curve)
+        for fit, curve in zip(found.simulation, found.simulated.T, strict=True)
+    ]
+    columns, curves = fit_of(header.units, data, found.errors, simulated, data.time)
     reasons = tuple(_reasons(found, data))
     outcome = Outcome(
         title=header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
@@ -58,10 +63,8 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         notes=(*data.notes, *(f"no trust: {reason}" for reason in reasons)),
         timing_s={"validation": time.perf_counter() - started},
     )
-    return Exploration(
-        Results(outcome, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
-        reasons,
-    )
+    tables, unit = {"fit": Table(columns)}, header.units.time_unit
+    return Exploration(Results(outcome, header.resolved_spec, unit, tables, {"fit": curves}), reasons)
 
 
 def _reasons(found: Fits, data: Record) -> Iterator[str]:

@@ -11,7 +11,7 @@ from inputdesign_cli.explore import Candidate, Fits, Found
 from inputdesign_cli.findings.explored_inputs import open_parameters
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driving_nothing
-from inputdesign_cli.outcome.curves import Curves, FitCurves, FitPanel, OrderCurves
+from inputdesign_cli.outcome.curves import Curves, OrderCurves
 from inputdesign_cli.outcome.estimate import (
     Exploration,
     ExploredOutput,
@@ -20,9 +20,7 @@ from inputdesign_cli.outcome.estimate import (
     Structure,
     Validation,
 )
-from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.shares import chance
-from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records import Record
 
 
@@ -172,25 +170,3 @@ def structure_curves(found: Found) -> dict[str, Curves]:
         drawn = OrderCurves(fits, at, taken.orders.family, output, found.split != "none")
         curves["structures" if single else f"structures_{i + 1}"] = drawn
     return curves
-
-
-def validation_curves(units: Units, data: Record, found: Fits) -> tuple[Table, FitCurves]:
-    """Return fit.csv with its figure: a given model against data. In the figure files follow each other."""
-    u, y, lengths = data.u, data.y, data.lengths
-    columns = {units.time_header: data.time}
-    if len(lengths) > 1:
-        columns["record"] = np.repeat(np.arange(1.0, len(lengths) + 1), lengths)
-    columns |= {"u" if units.single else f"u{j + 1}": values for j, values in enumerate(u.T)}
-    panels = []
-    for i, values in enumerate(y.T):
-        name = "y" if units.single else f"y{i + 1}"
-        predicted, simulated = values - found.errors[:, i], found.simulated[:, i]
-        runs = bool(np.all(np.isfinite(simulated)))
-        columns |= {name: values, f"{name}_predicted": predicted}
-        columns |= {f"{name}_simulated": simulated} if runs else {}
-        fit = found.simulation[i] if runs else None
-        label = units.label(f"y{i + 1}")
-        panels.append(FitPanel(values, predicted, simulated if runs else None, fit, i, label))
-    one = bool(np.all(np.diff(data.time) > 0.0))
-    instants = data.time if one else units.sample_time * np.arange(len(y), dtype=np.float64)
-    return Table(columns), FitCurves(instants, tuple(panels), lengths)

@@ -10,7 +10,6 @@ from inputdesign_cli.design.convex.response_lines import Goal, ResponseLines
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.build import operating_point
 from inputdesign_cli.questions.building.header import build_header, build_units
@@ -22,22 +21,14 @@ from inputdesign_cli.questions.building.system import build_cost, build_model
 from inputdesign_cli.questions.building.tables import has_column
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.frequency_response.measure import Measurement
+from inputdesign_cli.questions.frequency_response.outcome import KEY, ResponseTerms
 from inputdesign_cli.questions.frequency_response.solve import ResponseTask
-from inputdesign_cli.questions.frequency_response.terms import KEY, ResponseTerms
-from inputdesign_cli.signal.harmonic_grid import (
-    HarmonicGrid,
-    TooFewHarmonicsError,
-    harmonics_between,
-    nearest_harmonics,
-    thinned,
-)
+from inputdesign_cli.signal import harmonic_grid
 from inputdesign_cli.specification import FrequencyResponse, Spec
 from inputdesign_cli.specification.models.sizes import most
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
-# The longest period that is tried, relative to the stated one, and the number of tries.
-_LONGEST, _TRIED = 1e3, 400
 _SIGNAL = (
     *("hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "scale", "order"),
     *("samples", "start"),
@@ -47,11 +38,7 @@ _COUNTED = 4
 
 
 def stated_response(spec: Spec) -> FrequencyResponse:
-    """Return `accuracy.frequency_response`.
-
-    Raises:
-        SpecError: `missing-key`.
-    """
+    """Return `accuracy.frequency_response`, or raise `SpecError` (`missing-key`)."""
     stated = spec.accuracy.frequency_response
     if stated is None:
         raise bad_spec(
@@ -64,11 +51,7 @@ def stated_response(spec: Spec) -> FrequencyResponse:
 
 
 def build_periods(spec: Spec) -> Periods:
-    """Return how the record repeats; it has whole periods, and is no longer than the experiment.
-
-    Raises:
-        SpecError: `bad-period`, `missing-key`.
-    """
+    """Return how the record repeats; raise `bad-period` unless whole periods fit into the experiment."""
     stated, blocks, samples = stated_response(spec), spec.plant.inputs, spec.experiment.samples
     skip, shortest = stated.transient, spec.designs and spec.goal == "shortest_experiment"
     if stated.period is not None:
@@ -118,48 +101,47 @@ def build_periods(spec: Spec) -> Periods:
     return Periods(period, blocks, skip)
 
 
-def build_grid(spec: Spec, period: int) -> HarmonicGrid:
-    """Return the lines, and the silent ones that show a nonlinearity.
-
-    Raises:
-        SpecError: `too-few-lines`, `out-of-range`.
-    """
-    stated, step = stated_response(spec), spec.sample_time
+def build_grid(spec: Spec, period: int) -> harmonic_grid.HarmonicGrid:
+    """Return the lines and the silent ones; raise `SpecError` (`too-few-lines`, `out-of-range`)."""
+    stated, step, unit = stated_response(spec), spec.sample_time, f"rad/{spec.time_unit}"
     odd = stated.detection is not None
-    if stated.frequencies is not None:
-        wanted = np.array(stated.frequencies)
-        _check_inside(spec, wanted, period)
-        chosen = nearest_harmonics(period, wanted * step, odd=odd)
-        same = np.flatnonzero(np.diff(chosen) == 0)
-        if same.size:
-            at = int(same[0])
-            apart = (2 if odd else 1) * 2.0 * np.pi / (period * step)
-            raise bad_spec(
-                "too-few-lines",
-                f"{wanted[at]:.6g} and {wanted[at + 1]:.6g} rad/{spec.time_unit} are the same line: with "
-                f"a period of {period} samples lines are {apart:.3g} rad/{spec.time_unit} apart",
-                hint="take a longer period, or drop one of the two",
-                key=f"{KEY}.frequencies[{at + 1}]",
-            )
-    else:
-        chosen = _in_band(spec, stated, period)
-    return HarmonicGrid.of(period, chosen, watched=odd)
+    if stated.frequencies is None:
+        return harmonic_grid.HarmonicGrid.of(period, _in_band(spec, stated, period), watched=odd)
+    wanted, half = np.array(stated.frequencies), np.pi / (period * step)
+    lowest, highest = half * (1 - 1e-9), spec.nyquist - half * (1 - 1e-9)
+    for at in np.flatnonzero((wanted < lowest) | (wanted > highest)).tolist():
+        raise bad_spec(
+            "out-of-range",
+            f"{wanted[at]:.6g} {unit} is nearest to no harmonic of a period of {period} samples between 0 "
+            "and the Nyquist frequency",
+            hint=f"lines lie between {2 * half:.4g} and {spec.nyquist - half:.4g} {unit}; a longer period "
+            "begins lower",
+            key=f"{KEY}.frequencies[{at}]",
+        )
+    chosen = harmonic_grid.nearest_harmonics(period, wanted * step, odd=odd)
+    for at in np.flatnonzero(np.diff(chosen) == 0).tolist():
+        apart = (2 if odd else 1) * 2.0 * np.pi / (period * step)
+        raise bad_spec(
+            "too-few-lines",
+            f"{wanted[at]:.6g} and {wanted[at + 1]:.6g} {unit} are the same line: with a period of {period} "
+            f"samples lines are {apart:.3g} {unit} apart",
+            hint="take a longer period, or drop one of the two",
+            key=f"{KEY}.frequencies[{at + 1}]",
+        )
+    return harmonic_grid.HarmonicGrid.of(period, chosen, watched=odd)
 
 
 def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.int_]:
-    """Return the lines that are asked for, or all harmonics but the silent ones that show a nonlinearity.
-
-    Raises:
-        SpecError: `too-few-lines`.
-    """
+    """Return the lines that are asked for, or all harmonics but the silent ones; raise `too-few-lines`."""
     (lo, hi), step, group = spec.clip_band(stated.band), spec.sample_time, stated.detection
     candidates = stated.lines
     if group is not None and candidates is not None:
         candidates += (candidates - 1) // (group - 1)
-    band, odd = (lo * step, hi * step), group is not None
     try:
-        found = harmonics_between(period, band, candidates, odd=odd)
-    except TooFewHarmonicsError as error:
+        found = harmonic_grid.harmonics_between(
+            period, (lo * step, hi * step), candidates, odd=group is not None
+        )
+    except harmonic_grid.TooFewHarmonicsError as error:
         kind = "odd harmonics" if group is not None else "harmonics"
         asked = "at least one is" if candidates is None else f"{candidates} are"
         left_out = ", with the silent lines that show a nonlinearity" if candidates != stated.lines else ""
@@ -167,51 +149,17 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
             "too-few-lines",
             f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
             f"asked for{left_out}",
-            hint="take a longer period (more samples, or fewer periods"
-            f"{_longer(spec, period, band, candidates, odd=odd)}), fewer lines, or a higher end of the band",
+            hint="take a longer period (more samples, or fewer periods), fewer lines, or a higher end of the "
+            "band",
             key=f"{KEY}.lines" if candidates is not None else f"{KEY}.band",
         ) from None
     if group is None:
         return found
-    return thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
-
-
-def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
-    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
-    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
-        try:
-            harmonics_between(longer, band, lines, odd=odd)
-        except TooFewHarmonicsError:
-            continue
-        whole = longer * max(spec.experiment.samples // period, 1)
-        lasts = whole * spec.sample_time
-        return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
-    return ""
-
-
-def _check_inside(spec: Spec, wanted: Array, period: int) -> None:
-    """Raise `SpecError` (`out-of-range`) for lines at 0 or at the Nyquist frequency, and beyond."""
-    half = np.pi / (period * spec.sample_time)
-    outside = np.flatnonzero((wanted < half * (1 - 1e-9)) | (wanted > spec.nyquist - half * (1 - 1e-9)))
-    if outside.size:
-        at = int(outside[0])
-        raise bad_spec(
-            "out-of-range",
-            f"{wanted[at]:.6g} rad/{spec.time_unit} is nearest to no harmonic of a period of {period} "
-            "samples between 0 and the Nyquist frequency",
-            hint=f"lines lie between {2 * half:.4g} and {spec.nyquist - half:.4g} rad/{spec.time_unit}; a "
-            "longer period begins lower",
-            key=f"{KEY}.frequencies[{at}]",
-        )
+    return harmonic_grid.thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
 
 
 def build_response_task(spec: Spec) -> ResponseTask:
-    """Return the task; everything that can be wrong with its spec is reported here.
-
-    Raises:
-        SpecError: what this version does not design; lines that the period does not have.
-        DataError: a table cannot be used.
-    """
+    """Return the task; everything that can be wrong with its spec or a table is reported here."""
     stated = stated_response(spec)
     _check_supported(spec)
     goal: Goal = "given" if not spec.designs else _GOALS[spec.goal]
@@ -223,7 +171,11 @@ def build_response_task(spec: Spec) -> ResponseTask:
         1 if goal == "samples" else periods.blocks * periods.kept(spec.experiment.samples) * periods.period
     )
     G = model.plant_at(grid.frequencies)
-    lines = ResponseLines(G, _noise(spec, model, grid), _admitted(spec, grid, G), stated.relative)
+    if stated.noise is None:
+        noise: NDArray[np.float64] = NoiseSpectrum.of(model).at(grid.period, grid.excited)
+    else:
+        noise = _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
+    lines = ResponseLines(G, noise, _admitted(spec, grid, G), stated.relative)
     experiment = Experiment(model, counted)
     terms = ResponseTerms(
         header=build_header(spec),
@@ -245,11 +197,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
 
 
 def build_measurement(spec: Spec) -> Measurement:
-    """Return how data measure a frequency response: at the lines of the spec, or where they excite it.
-
-    Raises:
-        SpecError, DataError: see `build_response_task`.
-    """
+    """Return how data measure a frequency response: at the lines of the spec, or where they excite it."""
     asked = spec.accuracy.frequency_response is not None
     return Measurement(
         header=build_header(spec),
@@ -259,12 +207,8 @@ def build_measurement(spec: Spec) -> Measurement:
     )
 
 
-def _admitted(spec: Spec, grid: HarmonicGrid, response: ComplexArray) -> NDArray[np.float64]:
-    """Return r_adm (L, p, r); of a share of |G| it is infinite for entries of G that are zero.
-
-    Raises:
-        SpecError: `admissible-not-positive`.
-    """
+def _admitted(spec: Spec, grid: harmonic_grid.HarmonicGrid, response: ComplexArray) -> NDArray[np.float64]:
+    """Return r_adm (L, p, r), infinite where G is zero; raise `SpecError` (`admissible-not-positive`)."""
     stated, w, G = stated_response(spec), grid.frequencies, np.abs(response)
     if stated.absolute is not None:
         return np.full(G.shape, stated.absolute)
@@ -273,18 +217,14 @@ def _admitted(spec: Spec, grid: HarmonicGrid, response: ComplexArray) -> NDArray
     assert stated.relative is not None
     units, found = build_units(spec), stated.relative * G
     largest = G.max(axis=0)
-    for i, j in np.ndindex(G.shape[1:]):
-        if largest[i, j] <= _ZERO * largest.max():
-            found[:, i, j] = np.inf
-            continue
-        low = np.flatnonzero(G[:, i, j] <= _ZERO * largest[i, j])
-        if low.size:
-            raise bad_spec(
-                "admissible-not-positive",
-                f"G{units.entry(i, j)} vanishes at {units.named(w[low[0]])}: no share of it can be met",
-                hint=f"leave the line out, or write {KEY}.absolute",
-                key=f"{KEY}.relative",
-            )
+    found[:, largest <= _ZERO * largest.max()] = np.inf
+    for n, i, j in np.argwhere((_ZERO * largest >= G) & np.isfinite(found)).tolist():
+        raise bad_spec(
+            "admissible-not-positive",
+            f"G{units.entry(i, j)} vanishes at {units.named(w[n])}: no share of it can be met",
+            hint=f"leave the line out, or write {KEY}.absolute",
+            key=f"{KEY}.relative",
+        )
     if np.any(np.all(np.isinf(found), axis=(0, 1))):
         raise bad_spec(
             "admissible-not-positive",
@@ -293,14 +233,6 @@ def _admitted(spec: Spec, grid: HarmonicGrid, response: ComplexArray) -> NDArray
             key=f"{KEY}.relative",
         )
     return found
-
-
-def _noise(spec: Spec, model: Model, grid: HarmonicGrid) -> Array:
-    """Return Phi_v (L, p), by the model or by a table."""
-    stated = stated_response(spec)
-    if stated.noise is not None:
-        return _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
-    return NoiseSpectrum.of(model).at(grid.period, grid.excited)
 
 
 def _tabulated(spec: Spec, name: str, w: Array, column: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -315,12 +247,8 @@ def _tabulated(spec: Spec, name: str, w: Array, column: str, shape: tuple[int, .
     return np.stack([positive_table(spec, name, band, f"{column}{s}", key).at(w) for s in suffixes], axis=1)
 
 
-def _given(spec: Spec, grid: HarmonicGrid) -> Array | None:
-    """Return the powers (L, 1) of a given multisine at the lines; None if powers are designed.
-
-    Raises:
-        SpecError: `not-supported`, `not-exciting`, `bad-period`.
-    """
+def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
+    """Return the powers (L, 1) of a given multisine at the lines, or None; raise `SpecError`."""
     given = spec.given
     if given is None:
         return None

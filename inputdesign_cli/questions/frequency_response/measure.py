@@ -1,11 +1,11 @@
-"""Measure the frequency response without a model, and whether it meets what the spec asks."""
+"""Compare a measured frequency response with what is admitted, and write its outcome."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -13,19 +13,21 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.frequency_responses import (
-    REMEDY,
-    UNLIKE,
-    inputs_do_not_repeat,
-    periods_between_gaps,
-    samples_before_periods,
-    unexcited_lines,
+from inputdesign_cli.finding import Finding, reasons, trusted, verdict
+from inputdesign_cli.findings import frequency_responses as responses
+from inputdesign_cli.findings.periods import (
+    Distorted,
+    distorted,
+    drifting_periods,
+    nonlinear_response,
+    silent_lines_answer,
+    spiked_periods,
+    within_chance,
 )
-from inputdesign_cli.findings.periods import Distorted, distorted, drifting_periods, spiked_periods
 from inputdesign_cli.findings.places import places
-from inputdesign_cli.identification import frequency_response, response_delays
+from inputdesign_cli.identification import FrequencyResponse, frequency_response, response_delays
 from inputdesign_cli.identification.faults import period_spikes
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.nonlinearity import SilentLines, cubes, response_error, silent_lines
@@ -37,18 +39,202 @@ from inputdesign_cli.identification.periodic_response import (
     period_drift,
     periodic_response,
 )
-from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
+from inputdesign_cli.outcome.curves import Curves, ResponseCurves
+from inputdesign_cli.outcome.estimate import SilentLine
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.outcome import response_of_data
-from inputdesign_cli.questions.frequency_response.measured import Judged, Measured, measured_results
-from inputdesign_cli.questions.frequency_response.terms import ResponseTerms
+from inputdesign_cli.questions.common.delivery import results_of
+from inputdesign_cli.questions.frequency_response.outcome import ResponseTerms, deviation_curves
 from inputdesign_cli.records import Preparation, Record, read_data
+from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.specification.models.sizes import most
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
 _SURE = 0.95
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The deviations (L, p, r) of data by the noise of the spec (`expected`) and of the data (`found`).
+
+    The true ratios are between `least` and `largest` (L,) with 95 %. Of the `asked` lines these are excited.
+    Of the power of the inputs the share `differing` differs from period to period; `noise` (L, p) is averaged
+    along the lines. With `times` the periods a verdict would be met. The response is `moved` (L,) by a drift,
+    over what is admitted, and `distorted` by a nonlinearity. Spikes and drifts are `scattered`.
+    """
+
+    grid: HarmonicGrid
+    periods: Periods
+    lines: ResponseLines
+    expected: NDArray[np.float64]
+    found: NDArray[np.float64]
+    least: Array
+    largest: Array
+    counted: int
+    asked: int
+    differing: float
+    times: float
+    noise: NDArray[np.float64]
+    moved: Array
+    distorted: Distorted | None = None
+    scattered: tuple[Finding, ...] = ()
+    silent: Mapping[str, SilentLines] = field(default_factory=dict)
+
+    @cached_property
+    def ratios(self) -> Array:
+        """The largest deviation (L,) of an entry by the noise of the data, over r_adm."""
+        return self.lines.ratios(self.found)
+
+    @property
+    def worst(self) -> int:
+        """The line of the largest ratio."""
+        return int(np.argmax(self.ratios))
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Limits of the largest ratio, with 95 %."""
+        return float(self.least.max()), float(self.largest.max())
+
+    @property
+    def missed(self) -> bool:
+        """Whether noise alone misses what is admitted, which may be a share of |G|, beyond chance."""
+        bent = self.distorted.shares if self.distorted is not None and self.distorted.matters else 0.0
+        sure = self.least / (1.0 + (self.lines.share or 0.0) * (self.moved + bent))
+        return not self.scattered and bool(np.any(sure > 1.0))
+
+    def doubts(self, units: Units) -> list[Finding]:
+        """Return findings on spikes, drifts and a nonlinearity."""
+        w = self.grid.frequencies / units.frequency
+        bent = nonlinear_response(units, self.distorted, w, decided=self.missed)
+        return [*self.scattered, *bent]
+
+    @property
+    def periods_needed(self) -> int | None:
+        """The periods (of each block) that would have to count; None if more are no remedy."""
+        samples = self.times * self.counted
+        # Of inputs that do not repeat the mean of the periods falls as the noise does.
+        if self.differing > responses.UNLIKE or samples > most("signal.samples"):
+            return None
+        return int(np.ceil(samples / (self.periods.blocks * self.grid.period)))
+
+    @property
+    def remedy(self) -> str:
+        """How many periods would do, or what to do where more of them would not."""
+        if self.periods_needed is not None:
+            blocks = "" if self.periods.blocks == 1 else f" in each of {self.periods.blocks} blocks"
+            return f"about {self.periods_needed} periods that count{blocks} would do"
+        why = "do not repeat" if self.differing > responses.UNLIKE else "are too weak at some lines"
+        return f"more periods of this signal are no remedy, as the inputs {why}: {responses.REMEDY}"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A response with the data that count for it; with lines of a spec also how it compares."""
+
+    data: Record
+    response: FrequencyResponse
+    judged: Judged | None = None
+    findings: tuple[Finding, ...] = ()
+
+
+def measured_results(
+    header: Header,
+    measured: Measured,
+    shown: tuple[Table, ResponseCurves, MeasuredLines],
+    seconds: float,
+    *,
+    assess: bool,
+) -> Results:
+    """Return the outcome, frequency_response.csv and its figure; with lines also their deviations."""
+    table, curve, response = shown
+    data, judged, found = measured.data, measured.judged, list(measured.findings)
+    tables, curves = {"frequency_response": table}, dict[str, Curves](frequency_response=curve)
+    assessment, blocks = None, 1
+    if judged is not None:
+        w, blocks = judged.grid.frequencies / header.units.frequency, judged.periods.blocks
+        listed = {"deviation": judged.expected, "deviation_data": judged.found}
+        drawn = ("deviation_data", "these data")
+        columns, curves["deviations"] = deviation_curves(header.units, w, judged.lines, listed, drawn)
+        tables["deviations"] = Table(columns)
+        silent, bent = silent_entry(judged.silent), judged.distorted
+        if bent is not None:
+            at, cubed = float(w[bent.line]), bent.cubed or None
+            silent["odd"] = replace(silent["odd"], worst_ratio=bent.share, frequency=at, cubed=cubed)
+        response = replace(
+            response,
+            lines=int(w.size),
+            asked=judged.asked,
+            period=judged.periods.period,
+            periods=judged.periods.each(data.lengths[0]),
+            records=len(data.lengths),
+            transient=judged.periods.skip,
+            counted=judged.counted,
+            worst_ratio=float(judged.ratios[judged.worst]),
+            worst_frequency=float(w[judged.worst]),
+            worst_ratio_limits=judged.limits,
+            nonlinearity=silent or None,
+        )
+        doubts = judged.doubts(header.units)
+        if assess:
+            assessment, doubts = _assessment(header.units, judged, w, doubts)
+        found += [*silent_lines_answer(judged.silent), *doubts]
+    outcome = Outcome(
+        title=header.title,
+        status="measured" if assessment is None else assessment.verdict,
+        samples=len(data.y),
+        identification=Identification(method=response.method),
+        frequency_response=replace(response, blocks=blocks),
+        assessment=assessment,
+        findings=data.findings or None,
+        notes=data.notes or None,
+        timing_s={"measurement": seconds},
+    )
+    return results_of(header, outcome.saying(found), tables, curves)
+
+
+def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
+    """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
+    return {
+        kind: SilentLine(
+            one.lines,
+            tuple(one.over_noise.tolist()),
+            tuple(one.probability.tolist()),
+            tuple(one.rms.tolist()),
+        )
+        for kind, one in silent.items()
+    }
+
+
+def _assessment(
+    units: Units, judged: Judged, w: Array, doubts: list[Finding]
+) -> tuple[Assessment, list[Finding]]:
+    """Return the verdict with the periods that would settle it, and the findings that it rests on."""
+    ratio, at = float(judged.ratios[judged.worst]), float(w[judged.worst])
+    met, periods, no_top_up = judged.limits[1] <= 1.0, None, None
+    doubted = not trusted(doubts)
+    if judged.missed and doubted:
+        no_top_up = "more periods alone are no remedy: the notes say why"
+    elif not met and not doubted:
+        periods = judged.periods_needed
+        if judged.missed:
+            no_top_up = judged.remedy if periods is None else f"repeat the record: {judged.remedy}"
+        else:
+            doubts = [*doubts, within_chance(units, ratio, judged.limits, at, judged.remedy)]
+    answer, why = verdict(doubts, met=met), reasons(doubts)
+    return Assessment(
+        verdict=answer,
+        met=answer == "met",
+        requirements=(RequirementMet("frequency_response", ratio, at),),
+        undecided=tuple(one.message for those in why.values() for one in those) or None,
+        causes=tuple(why) or None,
+        no_top_up=no_top_up,
+        periods=periods,
+    ), doubts
 
 
 @dataclass(frozen=True)
@@ -72,25 +258,20 @@ class Counted:
 
 
 def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Counted:
-    """Return the data that count.
+    """Return the data that count, or raise `DataError` (`bad-period`, `too-few-samples`).
 
     Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
     periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
-    the one with the most periods.
-
-    Args:
-        name: of the file that messages name.
-        step: the sample time, in the unit of the times of the data.
-
-    Raises:
-        DataError: `bad-period`, `too-few-samples`.
+    the one with the most periods. The sample time `step` is in the unit of the times of the data.
     """
     lengths, length = set(data.lengths), data.lengths[0]
     whole = stated.blocks * stated.period
     if len(lengths) == 1 and len(data.files) == len(data.lengths):
         if stated.blocks == 1 or length % whole == 0:
             _check(stated.kept(length), stated.kept(length) * len(data.lengths), stated, name)
-            return Counted(data, stated, len(data.lengths), tuple(samples_before_periods(length, stated)))
+            return Counted(
+                data, stated, len(data.lengths), tuple(responses.samples_before_periods(length, stated))
+            )
     elif stated.blocks == 1:
         return _from_pieces(stated, data, name, step)
     what = " and ".join(str(one) for one in sorted(lengths))
@@ -104,7 +285,10 @@ def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Coun
 
 def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> Counted:
     """Return one record of the periods without a gap."""
-    period, places = stated.period, _places(data, step)
+    period = stated.period
+    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
+    # The number of samples between the begin of a file and each of its samples.
+    places = np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
     transient = stated.skip * period
     follow = np.ones(len(places), dtype=bool)
     follow[np.cumsum(data.lengths)[:-1]] = False
@@ -112,29 +296,17 @@ def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> Count
     last = np.arange(len(places)) + period - 1
     begins = np.flatnonzero((last < len(places)) & (places >= transient))
     begins = begins[gaps[last[begins]] == gaps[begins]]
-    taken: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    if begins.size:
-        phase = int(np.argmax(np.bincount(places[begins] % period)))
-        taken = begins[places[begins] % period == phase]
+    phases = places[begins] % period
+    taken = begins[phases == np.argmax(np.bincount(phases, minlength=1))]
     _check(taken.size, taken.size, stated, name)
     samples = (taken[:, None] + np.arange(period)).ravel()
     kept = data.at(samples, (len(samples),))
-    left_out = periods_between_gaps(len(data.lengths), taken.size, period)
+    left_out = responses.periods_between_gaps(len(data.lengths), taken.size, period)
     return Counted(kept, replace(stated, skip=0), 1, (left_out,))
 
 
-def _places(data: Record, step: float) -> NDArray[np.int64]:
-    """Return the number (N,) of samples between the begin of a file and each of its samples."""
-    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
-    return np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
-
-
 def _check(each: int, together: int, stated: Periods, name: str) -> None:
-    """Check that enough periods count, in a block and in all records.
-
-    Raises:
-        DataError: `too-few-samples`.
-    """
+    """Raise `DataError` (`too-few-samples`) unless enough periods count, in a block and in all records."""
     if each < 1 or together < 2:
         raise DataError.because(
             "too-few-samples",
@@ -146,11 +318,9 @@ def _check(each: int, together: int, stated: Periods, name: str) -> None:
 
 @dataclass(frozen=True)
 class Measurement:
-    """How a frequency response is measured: at the lines of `terms`, or without them where data excite.
+    """How a response is measured: at the lines of `terms`, or without them where data excite.
 
-    Attributes:
-        model: the nominal plant, which the response is drawn beside.
-        operating_point: by channel, the values of the spec that signals vary about.
+    The nominal `model` is drawn, too; signals vary about the `operating_point`, by channel.
     """
 
     header: Header
@@ -162,17 +332,21 @@ class Measurement:
 def measure(
     question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
 ) -> Results:
-    """Return the response with its confidence; with lines of a spec also how it compares with what is asked.
-
-    Raises:
-        DataError: a file cannot be used, or does not repeat as the spec says.
-    """
+    """Return the response with its confidence, compared with what a spec asks of its lines."""
     started = time.perf_counter()
     units, terms, name = question.header.units, question.terms, paths[0].name
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
     if terms is None:
-        found = _without_lines(question, data, name)
+        delays = partial(response_delays, question.model, step=units.step)
+        response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
+        if response is None:
+            raise DataError.because(
+                "too-few-samples",
+                f"{name} excites no frequency enough for a response without a model",
+                hint="record longer, or excite more frequencies",
+            )
+        found = Measured(data, response)
     else:
         counted = whole_periods(terms.periods, data, name, units.sample_time)
         found = _at_lines(question, terms, counted, name, assess=assess)
@@ -181,34 +355,21 @@ def measure(
     return measured_results(question.header, found, shown, time.perf_counter() - started, assess=assess)
 
 
-def _without_lines(question: Measurement, data: Record, name: str) -> Measured:
-    """Return the response where the data excite it."""
-    delays = partial(response_delays, question.model, step=question.header.units.step)
-    found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
-    if found is None:
-        raise DataError.because(
-            "too-few-samples",
-            f"{name} excites no frequency enough for a response without a model",
-            hint="record longer, or excite more frequencies",
-        )
-    return Measured(data, found)
-
-
 def _at_lines(
     question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
 ) -> Measured:
     """Return the response at the lines of the spec that the data excite."""
     data, periods = counted.data, counted.periods
     excited = excited_lines(data.u, periods, terms.grid.excited, repeats=counted.repeats)
-    missing = unexcited_lines(question.header.units, terms.grid.frequencies, excited)
+    missing = responses.unexcited_lines(question.header.units, terms.grid.frequencies, excited)
     found = counted.response(terms.grid.excited[excited])
     if found is None or (assess and missing):
         why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
-        raise DataError.because("not-exciting", f"{name}: {why}", hint=REMEDY)
+        raise DataError.because("not-exciting", f"{name}: {why}", hint=responses.REMEDY)
     judged = judge_lines(terms, found, counted, excited)
-    seen = [*missing, *counted.findings, *inputs_do_not_repeat(judged.differing, periods.period)]
+    seen = [*missing, *counted.findings, *responses.inputs_do_not_repeat(judged.differing, periods.period)]
     # Periods of outputs differ if the inputs do not repeat.
-    if judged.differing <= UNLIKE:
+    if judged.differing <= responses.UNLIKE:
         judged = _doubted(question, terms, found, counted, judged)
     return Measured(data, of_periods(found, periods.period), judged, tuple(seen))
 
@@ -216,17 +377,19 @@ def _at_lines(
 def _doubted(
     question: Measurement, terms: ResponseTerms, found: PeriodicResponse, counted: Counted, judged: Judged
 ) -> Judged:
-    """Return the comparison with spikes, drifts, and a nonlinearity by the silent lines without drifts.
-
-    Spikes are in every line, so that silent lines show nothing then.
-    """
+    """Return the comparison with spikes, drifts, and, without spikes, a nonlinearity by the silent lines."""
     units, data, periods, repeats = question.header.units, counted.data, counted.periods, counted.repeats
     spikes = period_spikes(data.y, periods, repeats=repeats)
     if spikes:
         where = [places(units, data, one.samples) for one in spikes]
         spiked = list(spiked_periods(units, spikes, where, len(data.y), counted.kept))
         return replace(judged, scattered=tuple(spiked))
-    noise = _noise_at_rest(question.model, terms, judged)
+    # The noise of the data near frequency zero; noise of the spec may go on rising below the lowest line.
+    lowest = int(np.argmin(judged.grid.frequencies))
+    noise = judged.noise[lowest]
+    if not terms.tabulated:
+        known = NoiseSpectrum.of(question.model).at(periods.period, np.array([0]))[0]
+        noise = np.maximum(noise, noise / judged.lines.noise[lowest] * known)
     drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)
     if drift is not None:
         counted = replace(counted, data=replace(data, y=data.y - drift.curve))
@@ -238,34 +401,28 @@ def _doubted(
             drifting = drifting_periods(units, drift, moved, w, lined=data.lined)
             found, judged = without, replace(judged, scattered=tuple(drifting))
             judged = replace(judged, moved=moved) if drifting else judged
-    silent = silent_of(terms, counted)
-    bent = _distorted(question.model, terms, found, counted, judged, silent) if "odd" in silent else None
-    return replace(judged, silent=silent, distorted=bent)
+    judged = replace(judged, silent=silent_of(terms, counted))
+    if "odd" not in judged.silent:
+        return judged
+    # The change of the response by a nonlinearity, by power at silent lines and by cubes.
+    odd, data = terms.grid.odd, counted.data
+    error = response_error(found, periods.period, counted.kept, judged.silent["odd"], odd)
+    nominal = [question.model.plant_at(terms.grid.at(lines)) for lines in (found.harmonics, odd)]
+    shape = _between(terms.grid.at(odd), terms.grid.frequencies, terms.lines.noise)
+    cube = cubes(found, data.u, data.y, periods, odd, (nominal[0], nominal[1]), shape, repeats=repeats)
 
+    def moved_by(outputs: Array) -> Array:
+        return judged.lines.ratios(cube.error * outputs[:, None])
 
-def _noise_at_rest(model: Model, terms: ResponseTerms, judged: Judged) -> Array:
-    """Return the spectrum (p,) of the noise of the data near frequency zero, by the one at their lowest line.
-
-    Noise of the spec may go on rising below that line.
-    """
-    lowest = int(np.argmin(judged.grid.frequencies))
-    there = judged.noise[lowest]
-    if terms.tabulated:
-        return there
-    known = NoiseSpectrum.of(model).at(judged.periods.period, np.array([0]))[0]
-    return np.maximum(there, there / judged.lines.noise[lowest] * known)
+    return replace(judged, distorted=distorted(judged.silent, judged.lines.ratios(error), cube, moved_by))
 
 
 def judge_lines(
     terms: ResponseTerms, found: PeriodicResponse, counted: Counted, excited: NDArray[np.bool_]
 ) -> Judged:
-    """Return the deviations of the data against r_adm at the measured G, with noise averaged along the lines.
+    """Return the deviations of the data against r_adm at the measured G, at the `excited` lines (L,).
 
-    The scatter of a few periods gives the noise of one line badly. Its ratio to the noise of the spec is
-    therefore averaged over neighbouring lines.
-
-    Args:
-        excited: (L,) lines of the spec that were found.
+    Few periods give the noise of one line badly: its ratio to that of the spec is averaged along the lines.
     """
     if np.any(found.noise <= 0.0):
         raise DataError.because(
@@ -277,7 +434,10 @@ def judge_lines(
     lines = terms.lines.where(excited).at(found.G)
     expected = found.deviation * np.sqrt(lines.noise / found.noise)[:, :, None]
     window = min(max(-(-_FREEDOM // found.freedom), 1), len(found.harmonics))
-    excess = _averaged(found.noise / lines.noise, window)
+    # Means over neighbours, at the ends over the nearest ones.
+    first = np.clip(np.arange(len(lines.noise)) - window // 2, 0, len(lines.noise) - window)
+    sums = np.cumsum(np.pad(found.noise / lines.noise, ((1, 0), (0, 0))), axis=0)
+    excess = (sums[first + window] - sums[first]) / window
     smooth = expected * np.sqrt(excess)[:, :, None]
     freedom = 2 * found.freedom * window
     tests = max(len(found.harmonics) // window, 1) * found.noise.shape[1]
@@ -309,13 +469,6 @@ def judge_lines(
     )
 
 
-def _averaged(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Return means (L, p) over `window` neighbours, at the ends over the nearest ones."""
-    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-    first = np.clip(np.arange(len(values)) - window // 2, 0, len(values) - window)
-    return np.asarray((sums[first + window] - sums[first]) / window)
-
-
 def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
     """Return what the outputs have at lines of the design that are not excited, odd and even."""
     found = {}
@@ -327,28 +480,6 @@ def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
         if lines is not None:
             found[kind] = lines
     return found
-
-
-def _distorted(
-    model: Model,
-    terms: ResponseTerms,
-    found: PeriodicResponse,
-    counted: Counted,
-    judged: Judged,
-    silent: Mapping[str, SilentLines],
-) -> Distorted | None:
-    """Return the change of the response by a nonlinearity, by power at silent lines and by cubes."""
-    odd, periods, data = terms.grid.odd, counted.periods, counted.data
-    error = response_error(found, periods.period, counted.kept, silent["odd"], odd)
-    nominal = (model.plant_at(terms.grid.at(found.harmonics)), model.plant_at(terms.grid.at(odd)))
-    shape = _between(terms.grid.at(odd), terms.grid.frequencies, terms.lines.noise)
-    cube = cubes(found, data.u, data.y, periods, odd, nominal, shape, repeats=counted.repeats)
-    return distorted(
-        silent,
-        judged.lines.ratios(error),
-        cube,
-        lambda outputs: judged.lines.ratios(cube.error * outputs[:, None]),
-    )
 
 
 def _between(w: Array, lines: Array, values: Array) -> Array:

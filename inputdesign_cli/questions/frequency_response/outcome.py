@@ -1,48 +1,163 @@
-"""Write the outcome, tables and figures of a frequency response that is designed or tried."""
+"""State how a frequency response is asked for; write the outcome of its design, and evaluate it once more."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.response_lines import Goal
-from inputdesign_cli.finding import Finding
+from inputdesign_cli import outcome as out
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
 from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts
+from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.monte_carlo.response import ResponseStudy
-from inputdesign_cli.outcome import (
-    Baseline,
-    MeasuredLines,
-    Objective,
-    Outcome,
-    Powers,
-    Solver,
-    Spectrum,
-    White,
-)
-from inputdesign_cli.outcome.curves import Curves, DeviationCurves, SpectrumCurves
+from inputdesign_cli.outcome.curves import Curves, DeviationCurves, DeviationPanel, SpectrumCurves
 from inputdesign_cli.outcome.estimate import DetectionLines
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
-from inputdesign_cli.questions.common.delivery import proof_status, results_of
+from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
+from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.common.delivery import (
+    APART,
+    KINDS,
+    check_claims,
+    of_bounds,
+    of_cost,
+    of_limit,
+    proof_status,
+    results_of,
+)
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.signal_outcome import signal_of, with_record
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
-from inputdesign_cli.questions.frequency_response.terms import Planned, ResponseTerms, deviation_curves
+from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.signal.selection import Record
 
-_KINDS: dict[Goal, str] = {
-    "cost": "least_cost",
-    "factor": "accuracy_factor",
-    "samples": "shortest_experiment",
-}
+KEY = "accuracy.frequency_response"
+
+
 _ROUNDING = 1e-9
 _CHANCE = 0.05
 
 
-def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, float]) -> Outcome:
+@dataclass(frozen=True)
+class ResponseTerms:
+    """The lines and their accuracy, limits and cost.
+
+    The experiment has the samples that count (one where the shortest is asked for), `asked` are stated in the
+    spec. Of noise that is `tabulated` there is no model.
+    """
+
+    header: Header
+    experiment: Experiment
+    grid: HarmonicGrid
+    lines: ResponseLines
+    periods: Periods
+    goal: Goal
+    cost: Mapping[PowerKind, Weight]
+    limits: tuple[PowerLimit, ...]
+    tolerance: float
+    asked: int
+    most_samples: int | None
+    tabulated: bool
+
+    @property
+    def frequency(self) -> Array:
+        """Return the frequencies (L,) of the lines in the unit of the spec."""
+        return self.grid.frequencies / self.header.units.frequency
+
+    def gains(self, kind: PowerKind) -> Array:
+        """Return what a unit of power of each line adds to each power, (L, channels, r)."""
+        return np.asarray(np.abs(self.experiment.response(kind, self.grid.frequencies)) ** 2)
+
+    def problem(self, samples: int) -> ResponseProblem:
+        """Return the prices and limits of the lines, and the powers that meet the accuracy in `samples`."""
+
+        def added(kind: PowerKind, channel: int | None) -> NDArray[np.float64]:
+            gains = self.gains(kind)
+            return np.asarray(gains.sum(axis=1) if channel is None else gains[:, channel]).ravel()
+
+        needed = self.lines.needed(samples).ravel()
+        paid = (w * added(kind, channel) for kind, channel, w in weights_of(self.cost))
+        rows = [added(limit.kind, limit.channel) for limit in self.limits]
+        return ResponseProblem(
+            needed, sum(paid, np.zeros(needed.size)), self.limits, np.array(rows).reshape(-1, needed.size)
+        )
+
+    def powers(self, lines: NDArray[np.float64]) -> tuple[out.Powers, float]:
+        """Return mean squares by channel, and the cost, of lines with powers (L, r)."""
+        found = {kind: np.einsum("lar,lr->a", self.gains(kind), lines).tolist() for kind in POWER_KINDS}
+        return out.Powers(**{kind: tuple(power) for kind, power in found.items()}), weighted_sum(
+            self.cost, found
+        )
+
+
+@dataclass(frozen=True)
+class Planned:
+    """The experiment to be applied: powers (L, r), samples that count, the record, its deviations (L, p, r).
+
+    The largest `shift` of G by the start is in these deviations.
+    """
+
+    design: ResponseDesign
+    problem: ResponseProblem
+    powers: NDArray[np.float64]
+    counted: int
+    record: Record
+    deviations: NDArray[np.float64]
+    shift: float
+
+    @property
+    def length(self) -> int:
+        """The number of samples of the record, transient included."""
+        return len(self.record.samples)
+
+    @property
+    def applied(self) -> NDArray[np.float64]:
+        """Return the powers (L, r) of the record."""
+        return self.powers * (1.0 + self.record.extra_power)
+
+    @property
+    def flat(self) -> NDArray[np.float64]:
+        """Return equal lines (L, r) with the power of the record in each input."""
+        return np.broadcast_to(self.applied.mean(axis=0), self.powers.shape)
+
+
+def deviation_curves(
+    units: Units,
+    w: Array,
+    lines: ResponseLines,
+    listed: Mapping[str, NDArray[np.float64]],
+    found: tuple[str, str] | None = None,
+) -> tuple[dict[str, Array], DeviationCurves]:
+    """Return the columns of deviations.csv and its figure, for the entries of G that are bounded.
+
+    At lines w (L,) columns (L, p, r) are `listed`, one of them `found` with a label.
+    """
+    columns: dict[str, Array] = {units.frequency_header: w}
+    panels = []
+    for i, j in np.ndindex(lines.admitted.shape[1:]):
+        admitted, size = lines.admitted[:, i, j], np.abs(lines.G[:, i, j])
+        if not np.all(np.isfinite(admitted)):
+            continue
+        of_entry = {"G_abs": size, "r_adm": admitted, **{name: x[:, i, j] for name, x in listed.items()}}
+        columns |= {f"{name}{units.suffix(i, j)}": values for name, values in of_entry.items()}
+        entry = None if units.single else (i, j)
+        drawn, label = (None, "") if found is None else (of_entry[found[0]], found[1])
+        shown = (w, size, admitted, of_entry["deviation"], drawn, label)
+        panels.append(DeviationPanel(*shown, entry, units.passage(entry)))
+    return columns, DeviationCurves(tuple(panels))
+
+
+def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, float]) -> out.Outcome:
     """Return what result.json says of a design or of given lines."""
     units, lines, designed = terms.header.units, terms.lines, terms.goal != "given"
     ratios = lines.ratios(lines.deviations(plan.powers, plan.counted))
@@ -51,16 +166,26 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
     met = "met" if ratios[worst] <= 1.0 + _ROUNDING else "missed"
     objective, baseline = _objective(terms, plan) if designed else (None, None)
     powers = _matrices(plan.powers) if units.inputs > 1 else plan.powers[:, 0]
-    return Outcome(
+    # What a user should know before applying the record.
+    found = start_shifts(plan.shift)
+    if terms.goal in ("cost", "samples"):
+        found += noise_leaks(plan.record.worst_ratio)
+    if terms.goal != "samples":
+        times = terms.periods.blocks * terms.periods.each(plan.length)
+        found += record_of_whole_periods(plan.length, terms.asked, times, terms.grid.period)
+    if terms.goal == "given":
+        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
+        found += limits_not_kept(stated, plan.length, power, None)
+    return out.Outcome(
         title=terms.header.title,
         status=proof_status(plan.design.gap, terms.tolerance) if designed else met,
         objective=objective,
         cost=cost,
         samples=plan.length,
         power=power,
-        spectrum=Spectrum("multisine", {"frequencies": terms.frequency, "powers": powers}),
+        spectrum=out.Spectrum("multisine", {"frequencies": terms.frequency, "powers": powers}),
         baseline=baseline,
-        frequency_response=MeasuredLines(
+        frequency_response=out.MeasuredLines(
             lines=int(ratios.size),
             period=terms.grid.period,
             periods=terms.periods.each(plan.length),
@@ -71,12 +196,12 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
             worst_frequency=float(terms.frequency[worst]),
             detection=DetectionLines(odd, even) if even.size else None,
         ),
-        solver=Solver("lines", terms.tolerance) if designed else None,
+        solver=out.Solver("lines", terms.tolerance) if designed else None,
         timing_s=timing,
-    ).saying(_findings(terms, plan, power))
+    ).saying(found)
 
 
-def _objective(terms: ResponseTerms, plan: Planned) -> tuple[Objective, Baseline]:
+def _objective(terms: ResponseTerms, plan: Planned) -> tuple[out.Objective, out.Baseline]:
     """Return the value with its bound, and what lines of equal power need."""
     problem, value, bound = plan.problem, plan.design.value, plan.design.bound
     flat = float(np.max(problem.needed)) * np.ones(problem.needed.size)
@@ -85,30 +210,16 @@ def _objective(terms: ResponseTerms, plan: Planned) -> tuple[Objective, Baseline
         flat = flat * float(np.max(floors / (rows @ (flat / problem.needed)), initial=1.0))
         cost = float(problem.price @ flat)
         power, _ = terms.powers(flat.reshape(plan.powers.shape))
-        white = White(cost=cost, ratio=cost / value, power=power)
+        white = out.White(cost=cost, ratio=cost / value, power=power)
     else:
         within = problem.alike(flat / problem.needed)
         if terms.goal == "samples":
-            value, bound, white = 1.0 / value, 1.0 / bound, White(samples=plan.counted / within)
+            value, bound, white = 1.0 / value, 1.0 / bound, out.White(samples=plan.counted / within)
         else:
-            value, bound, white = value**-0.5, bound**-0.5, White(value=float(within**-0.5))
+            value, bound, white = value**-0.5, bound**-0.5, out.White(value=float(within**-0.5))
     gap = abs(value - bound) / value
-    kind = _KINDS[terms.goal]
-    return Objective(kind, value, lower_bound=min(bound, value), relative_gap=gap), Baseline(white)
-
-
-def _findings(terms: ResponseTerms, plan: Planned, power: Powers) -> list[Finding]:
-    """Return what a user should know before applying the record."""
-    found = start_shifts(plan.shift)
-    if terms.goal in ("cost", "samples"):
-        found += noise_leaks(plan.record.worst_ratio)
-    if terms.goal != "samples":
-        times = terms.periods.blocks * terms.periods.each(plan.length)
-        found += record_of_whole_periods(plan.length, terms.asked, times, terms.grid.period)
-    if terms.goal == "given":
-        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
-        found += limits_not_kept(stated, plan.length, power, None)
-    return found
+    kind = KINDS[terms.goal]
+    return out.Objective(kind, value, lower_bound=min(bound, value), relative_gap=gap), out.Baseline(white)
 
 
 def response_results(
@@ -171,3 +282,64 @@ def tried_lines(
 def _matrices(powers: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the powers of uncorrelated inputs as matrices (L, r, r)."""
     return np.einsum("lr,rs->lrs", powers, np.eye(powers.shape[1]))
+
+
+def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> None:
+    """Raise `internal-disagreement` if the written lines or the written record do not bear out the claims."""
+    written = out.read_plain(out.Outcome, results.result)
+    _, *samples = csv_columns(csv_text(results.tables["signal"]).encode()).values()
+    wrong = (*_of_lines(terms, written), *_of_record(terms, plan, written, np.stack(samples, axis=1)))
+    check_claims(wrong, "rescale the signals, or leave out lines where |G| is very small")
+
+
+def _of_lines(terms: ResponseTerms, written: out.Outcome) -> Iterator[str]:
+    """Say which claims the written powers contradict, one sentence each."""
+    spectrum, claimed = written.spectrum, written.frequency_response
+    assert spectrum is not None
+    assert claimed is not None
+    w = np.array(spectrum.details["frequencies"]) * terms.header.units.frequency
+    listed = np.array(spectrum.details["powers"], dtype=float)
+    powers = listed[:, None] if listed.ndim == 1 else np.einsum("laa->la", listed)
+    G = terms.experiment.model.plant_at(w)
+    counted, ratio = claimed.counted or 0, claimed.worst_ratio or 0.0
+    variances = 2.0 * terms.lines.noise[:, :, None] / (counted * powers[:, None, :])
+    worst = float(np.max(np.sqrt(variances) / terms.lines.admitted))
+    if not abs(worst - ratio) <= APART * worst:
+        yield f"the lines leave {worst:.10g} times the deviation admitted, not {ratio:.10g}"
+    if terms.goal in ("cost", "samples") and not worst <= 1.0 + APART:
+        yield f"the lines leave {worst:.10g} times the deviation that is admitted"
+    found = {
+        "input": powers,
+        "excitation": powers,
+        "output": np.einsum("lpr,lr->lp", np.abs(G) ** 2, powers),
+        "moves": (2.0 - 2.0 * np.cos(w))[:, None] * powers,
+    }
+
+    def power(kind: str, channel: int | None) -> float:
+        total = found[kind].sum(axis=0)
+        return float(total.sum() if channel is None else total[channel])
+
+    paid = sum(weight * power(kind, channel) for kind, channel, weight in weights_of(terms.cost))
+    yield from of_cost(paid, written.cost or 0.0)
+    for limit in terms.limits if terms.goal != "given" else ():
+        yield from of_limit(limit, power(limit.kind, limit.channel))
+    if written.objective is not None:
+        yield from of_bounds(written.objective)
+
+
+def _of_record(terms: ResponseTerms, plan: Planned, written: out.Outcome, record: Array) -> Iterator[str]:
+    """Say which claims the samples contradict: errors are noise over the transforms of the inputs."""
+    signal = written.signal
+    assert signal is not None
+    u = record - (0.0 if signal.operating_point is None else np.array(signal.operating_point))
+    inputs = terms.periods.means(u, terms.grid.excited)
+    spread = np.sum(np.abs(np.linalg.inv(inputs)) ** 2, axis=1)
+    noise = plan.deviations**2 * plan.counted * plan.powers[:, None, :] * 0.5
+    noise *= 1.0 + (signal.extra_power or 0.0)
+    found = np.sqrt(noise * spread[:, None, :] * terms.periods.blocks / plan.counted)
+    apart = float(np.max(np.abs(found / plan.deviations - 1.0)))
+    if not apart <= APART:
+        yield f"the samples of the record leave deviations that are off those claimed by {apart:.3g}"
+    worst, claimed = float(np.max(found / terms.lines.admitted)), signal.worst_ratio or 0.0
+    if not abs(worst - claimed) <= APART * worst:
+        yield f"the record leaves {worst:.10g} times what is admitted, not {claimed:.10g}"

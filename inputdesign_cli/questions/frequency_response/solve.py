@@ -19,7 +19,6 @@ from inputdesign_cli.design.convex.response_lines import (
 )
 from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
-from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
 from inputdesign_cli.outcome.results import Results
@@ -30,61 +29,16 @@ from inputdesign_cli.questions.common.infeasible import contradictory, named, no
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.simulation import Simulation
 from inputdesign_cli.questions.frequency_response import outcome
-from inputdesign_cli.questions.frequency_response.audit import audit_response
-from inputdesign_cli.questions.frequency_response.terms import KEY, Planned, ResponseTerms
-from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.questions.frequency_response.outcome import KEY, Planned, ResponseTerms, audit_response
 from inputdesign_cli.signal.kind import Draft
-from inputdesign_cli.signal.limits import Bounds, limited_responses
+from inputdesign_cli.signal.limits import limited_responses
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.multisine import Multisine
 from inputdesign_cli.signal.selection import Record
-from inputdesign_cli.signal.settings import Phases, SignalSettings
+from inputdesign_cli.signal.settings import Phases
 
 _ROUNDING = 1e-9
 _STREAM = 0x5EED
-
-
-@dataclass(frozen=True)
-class LineRecords:
-    """Periodic records with lines on a grid of harmonics, and the limits on their samples."""
-
-    experiment: Experiment
-    grid: HarmonicGrid
-    settings: SignalSettings
-    bounds: Bounds
-
-    def best(self, powers: NDArray[np.float64], length: int) -> Array:
-        """Return the record (length, r) of the lowest peak among several choices of phases.
-
-        Args:
-            powers: (L, r) of the lines.
-        """
-        r, period, settings = powers.shape[1], self.grid.period, self.settings
-        diagonal = np.einsum("lr,rs->lrs", powers, np.eye(r)).astype(complex)
-        limited = partial(limited_responses, self.experiment, self.bounds, 1.0, 1)
-        lines = Lines(self.grid.frequencies, diagonal, period)
-
-        def drawn(number: int) -> Array:
-            rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(_STREAM, number)))
-            phases: Phases = "orthogonal" if settings.phases == "random" else settings.phases
-            phases = "even" if (phases, number) == ("optimised", 0) else phases
-            draft = Draft(lines, r * period, replace(settings, phases=phases), limited=limited)
-            blocks = np.split(Multisine().draw(draft, rng), r)  # each in as many periods
-            return np.concatenate([np.tile(block, (length // (r * period), 1)) for block in blocks])
-
-        height = self.beyond if self.bounds.hard else lambda u: float(np.max(np.abs(u)))
-        number = 1 if settings.phases == "schroeder" else settings.candidates
-        return min(map(drawn, range(number)), key=height)
-
-    def beyond(self, u: Array) -> float:
-        """Return the largest share of their limits that samples of u (n, r), its moves and outputs take."""
-        y = None if self.bounds.output is None else self.answer(u)
-        return max(self.bounds.shares(u, y).values(), default=0.0)
-
-    def answer(self, u: Array) -> Array:
-        """Return the outputs (n, p) to inputs u (n, r) from rest, without noise."""
-        model = self.experiment.model
-        return np.asarray(model.simulate(u[None], np.zeros((1, 1, model.outputs)), 1.0)[0][0])
 
 
 @dataclass(frozen=True)
@@ -118,7 +72,7 @@ class ResponseTask:
         begun = time.perf_counter()
         records = {"design": (plan.applied, plan.record.samples)}
         if study.compare:
-            records["white"] = (plan.flat, self._records.best(plan.flat, plan.length))
+            records["white"] = (plan.flat, self._best(plan.flat, plan.length))
         nominal, power = terms.experiment, results.outcome.power
         if study.truth is not None and power is not None:
             nominal = study.truth.experiment(nominal, power.output or ())
@@ -164,15 +118,15 @@ class ResponseTask:
 
     def _planned(self, design: ResponseDesign, counted: int) -> Planned:
         """Return the record of a design, scaled so that it meets the accuracy or keeps to the limits."""
-        terms, records = self.terms, self._records
+        terms = self.terms
         powers = design.powers.reshape(-1, terms.experiment.inputs)
-        samples = records.best(powers, self._length(counted))
-        beyond = records.beyond(samples)
+        samples = self._best(powers, self._length(counted))
+        beyond = self._beyond(samples)
         if terms.goal == "samples" and beyond > 1.0:
             # The lines are scaled into the limits, and more periods make up for it.
             counted = self._whole(beyond**2 / design.value)
-            samples = records.best(powers, self._length(counted))
-            beyond = records.beyond(samples)
+            samples = self._best(powers, self._length(counted))
+            beyond = self._beyond(samples)
         problem, noise, periods = terms.problem(counted), terms.lines.noise, terms.periods
         if not terms.tabulated:
             times = counted // (periods.blocks * periods.period)
@@ -183,13 +137,20 @@ class ResponseTask:
         if terms.goal == "cost" and self.record.meets:
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
-                raise self._too_tight(scale * beyond, len(samples))
+                length, factor = len(samples), rounded_up(scale * beyond, 4)
+                more = int(np.ceil(length * (scale * beyond) ** 2))
+                best = (
+                    f"meets the accuracy: that of the lowest peaks would have to be {factor} times as large"
+                )
+                hint = f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
+                hint += f"{factor} times as much, or write objective: shortest_experiment"
+                raise no_record(self.record, length, f"{best} as they allow", hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
         # The largest shift of G by the start, in standard deviations.
-        U, Y = (periods.means(x, terms.grid.excited) for x in (samples, records.answer(samples)))
+        U, Y = (periods.means(x, terms.grid.excited) for x in (samples, self._answer(samples)))
         shift = float(np.max(np.abs(response_at(U, Y) - terms.lines.G) / exact))
         return Planned(design, problem, powers, counted, record, exact, shift)
 
@@ -211,13 +172,6 @@ class ResponseTask:
         )
         details = {"factor": factor}
         return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
-
-    def _too_tight(self, beyond: float, length: int) -> InfeasibleError:
-        more, times = int(np.ceil(length * beyond**2)), rounded_up(beyond, 4)
-        best = f"meets the accuracy: the one of the lowest peaks would have to be {times} times as large"
-        enough = f"about {more} samples do ({self.record.units.length(more)}); raise the limits"
-        hint = f"{enough}, admit {times} times as much, or write objective: shortest_experiment"
-        return no_record(self.record, length, f"{best} as they allow", hint)
 
     def _length(self, counted: int) -> int:
         """Return the length of a record, transient included.
@@ -246,7 +200,32 @@ class ResponseTask:
             )
         return length
 
-    @property
-    def _records(self) -> LineRecords:
-        settings, bounds = self.record.settings, self.record.bounds
-        return LineRecords(self.terms.experiment, self.terms.grid, settings, bounds)
+    def _best(self, powers: NDArray[np.float64], length: int) -> Array:
+        """Return the record (length, r), with powers (L, r) of the lines, of the lowest peak of several."""
+        grid, settings, bounds = self.terms.grid, self.record.settings, self.record.bounds
+        r, period = powers.shape[1], grid.period
+        diagonal = np.einsum("lr,rs->lrs", powers, np.eye(r)).astype(complex)
+        limited = partial(limited_responses, self.terms.experiment, bounds, 1.0, 1)
+        lines = Lines(grid.frequencies, diagonal, period)
+
+        def drawn(number: int) -> Array:
+            rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(_STREAM, number)))
+            phases: Phases = "orthogonal" if settings.phases == "random" else settings.phases
+            phases = "even" if (phases, number) == ("optimised", 0) else phases
+            draft = Draft(lines, r * period, replace(settings, phases=phases), limited=limited)
+            blocks = np.split(Multisine().draw(draft, rng), r)  # each in as many periods
+            return np.concatenate([np.tile(block, (length // (r * period), 1)) for block in blocks])
+
+        height = self._beyond if bounds.hard else lambda u: float(np.max(np.abs(u)))
+        number = 1 if settings.phases == "schroeder" else settings.candidates
+        return min(map(drawn, range(number)), key=height)
+
+    def _beyond(self, u: Array) -> float:
+        """Return the largest share of their limits that samples of u (n, r), its moves and outputs take."""
+        y = None if self.record.bounds.output is None else self._answer(u)
+        return max(self.record.bounds.shares(u, y).values(), default=0.0)
+
+    def _answer(self, u: Array) -> Array:
+        """Return the outputs (n, p) to inputs u (n, r) from rest, without noise."""
+        model = self.terms.experiment.model
+        return np.asarray(model.simulate(u[None], np.zeros((1, 1, model.outputs)), 1.0)[0][0])

@@ -10,7 +10,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.findings.designs import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.questions.building.foresight import build_foresight
+from inputdesign_cli.monte_carlo.excitations import InPhase
 from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits
 from inputdesign_cli.questions.building.model_error import (
@@ -28,19 +28,13 @@ from inputdesign_cli.questions.building.system import (
     read_excitation_record,
     record_step,
 )
-from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.common.robust import Plants
-from inputdesign_cli.questions.given.solve import GivenAsked, GivenExcitation, GivenTask
+from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.spectrum import (
-    GivenMultisine,
-    GivenSignal,
-    GivenSpectrum,
-    GivenTable,
-    GivenWhite,
-)
+from inputdesign_cli.specification.models import spectrum as stated_spectrum
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
 _OF_DESIGNS = ("limits.spectrum", "objective", "campaign")
@@ -49,11 +43,7 @@ _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quan
 
 
 def build_given(spec: Spec) -> GivenTask:
-    """The task of a given excitation: its requirements, if any, are checked, not met.
-
-    Raises:
-        SpecError, DataError: `nothing-given` when there is no excitation; see the builders of the parts.
-    """
+    """Return the task of a given excitation; `SpecError` (`nothing-given`) where there is none."""
     if spec.spectrum is None or spec.spectrum.type != "given":
         raise bad_spec(
             "nothing-given",
@@ -69,20 +59,24 @@ def build_given(spec: Spec) -> GivenTask:
     requirements = build_requirements(spec, experiment)
     experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
     check_pairs(spec, experiment.model.names)
-    asked = GivenAsked(
-        requirements,
-        build_criterion(spec, experiment),
-        build_cost(spec),
-        model_error_alpha(spec, experiment.model),
-        build_calibration(spec),
-        build_simulator(spec, experiment),
-        _limits(spec),
-        _build_plants(spec, experiment),
-    )
+    amplitude = spec.limits.amplitude
     return GivenTask(
         experiment=experiment,
         excitation=_excitation(spec, spec.spectrum, experiment),
-        asked=asked,
+        requirements=requirements,
+        criterion=build_criterion(spec, experiment),
+        cost=build_cost(spec),
+        alpha=model_error_alpha(spec, experiment.model),
+        calibration=build_calibration(spec),
+        simulator=build_simulator(spec, experiment),
+        limits=StatedLimits(
+            powers=tuple(build_power_limits(spec)),
+            input=None if amplitude is None else amplitude.input,
+            output=None if amplitude is None else amplitude.output,
+            rate=spec.limits.rate,
+            samples=spec.limits.samples,
+        ),
+        plants=_build_plants(spec, experiment),
         header=build_header(spec),
         record=build_record_request(spec, experiment.size),
         unstated=unstated_errors(spec, experiment),
@@ -93,12 +87,7 @@ def build_given(spec: Spec) -> GivenTask:
 
 
 def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
-    """Return the plants of `uncertainty`, at which the requirements are looked at.
-
-    Raises:
-        SpecError: `not-supported` where there is no requirement, and for what is known of the plant of the
-            spec alone: a criterion, costs, limits that depend on the plant.
-    """
+    """Return the plants of `uncertainty`; raise `not-supported` for what the nominal plant alone has."""
     stated, limits = spec.uncertainty, spec.limits
     if stated is None:
         return None
@@ -117,14 +106,8 @@ def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
     raise refuse(key, what, hint)
 
 
-def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
-    """Refuse settings of the signal where the excitation leaves nothing to choose.
-
-    That is a record, and sinusoids in phase over several inputs.
-
-    Raises:
-        SpecError: `not-supported`.
-    """
+def _check_signal_is_open(spec: Spec, stated: stated_spectrum.GivenSpectrum) -> None:
+    """Refuse settings of the signal of a record, and of sinusoids in phase over several inputs."""
     kind = stated.given.type
     fixed = kind == "signal" or (kind == "multisine" and spec.plant.inputs > 1)
     for name in spec.signal.stated(*_MADE) if fixed else ():
@@ -138,49 +121,44 @@ def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
         )
 
 
-def _limits(spec: Spec) -> StatedLimits:
-    amplitude = spec.limits.amplitude
-    return StatedLimits(
-        powers=tuple(build_power_limits(spec)),
-        input=None if amplitude is None else amplitude.input,
-        output=None if amplitude is None else amplitude.output,
-        rate=spec.limits.rate,
-        samples=spec.limits.samples,
-    )
-
-
-def _excitation(spec: Spec, stated: GivenSpectrum, experiment: Experiment) -> GivenExcitation:
-    """The excitation that stands under `spectrum.given`.
+def _excitation(spec: Spec, stated: stated_spectrum.GivenSpectrum, experiment: Experiment) -> GivenExcitation:
+    """Return the excitation that stands under `spectrum.given`.
 
     A power of white excitation is spread evenly over the channels unless there is one for each. The
     sinusoids of one frequency are in phase over the channels; a negative amplitude is in counterphase.
-
-    Raises:
-        DataError: its file cannot be used.
     """
     r = experiment.inputs
     match stated.given:
-        case GivenSignal() as given:
-            return _recorded(spec, experiment, given)
-        case GivenWhite(power=power):
+        case stated_spectrum.GivenSignal() as given:
+            samples = read_excitation_record(spec, given.signal, "spectrum.given.signal")
+            plant = FiniteRecord(experiment, len(samples), record_step(spec))
+            power_of: dict[PowerKind, list[float]] = {
+                kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS
+            }
+
+            def information(coordinates: Experiment) -> Array:
+                return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
+
+            return GivenExcitation("signal", power_of, information, samples=samples)
+        case stated_spectrum.GivenWhite(power=power):
             powers = np.array(power if isinstance(power, tuple) else [power / r] * r, dtype=float)
             white = TabulatedSpectrum.white(powers, experiment.band)
             return GivenExcitation.spectral("white", white, np.ones(1), experiment)
-        case GivenMultisine() as given:
+        case stated_spectrum.GivenMultisine() as given:
             frequencies, amplitudes = _sinusoids(spec, given)
             constant = (frequencies <= 0.0) | (spec.plant.sampled & (frequencies >= np.pi))
             size = np.linalg.norm(amplitudes, axis=1)
             lines = LinesBasis(frequencies, amplitudes / size[:, None] + 0j, frequencies, np.ones(r))
             x = np.where(constant, 1.0, 0.5) * size**2
-            return GivenExcitation.spectral(
-                "multisine", lines, x, experiment, sinusoids=(frequencies, amplitudes)
-            )
-        case GivenTable() as given:
+            w = frequencies * record_step(spec)
+            in_phase = None if r == 1 else InPhase("design", w, amplitudes, lines, x)
+            return GivenExcitation.spectral("multisine", lines, x, experiment, in_phase=in_phase)
+        case stated_spectrum.GivenTable() as given:
             basis, x = read_given_spectrum(spec, given.file, r)
             return GivenExcitation.spectral("table", basis, x, experiment)
 
 
-def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
+def _sinusoids(spec: Spec, given: stated_spectrum.GivenMultisine) -> tuple[Array, Array]:
     """Return frequencies (L,) in the unit of the experiment and amplitudes (L, r) that are not zero."""
     frequencies = np.array(given.frequencies) * build_units(spec).frequency
     if spec.plant.sampled:
@@ -195,16 +173,3 @@ def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
             key="spectrum.given.amplitudes",
         )
     return frequencies[there], amplitudes[there]
-
-
-def _recorded(spec: Spec, experiment: Experiment, given: GivenSignal) -> GivenExcitation:
-    samples = read_excitation_record(spec, given.signal, "spectrum.given.signal")
-    plant = FiniteRecord(experiment, len(samples), record_step(spec))
-    power: dict[PowerKind, list[float]] = {
-        kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS
-    }
-
-    def information(coordinates: Experiment) -> Array:
-        return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
-
-    return GivenExcitation("signal", power, information, samples=samples)

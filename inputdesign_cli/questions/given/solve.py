@@ -47,11 +47,10 @@ _TABLE_SHARE, _TABLE_ERROR = 0.5, 1e-4
 
 @dataclass(frozen=True)
 class GivenExcitation:
-    """What it is called, its powers by kind and channel, and the information matrix that it gives.
+    """An excitation by kind, its powers by channel, and M (k, k) in the coordinates of an experiment.
 
-    `information` maps an experiment to M (k, k) in its coordinates. A recorded signal has `samples` (n, r),
-    the others a `basis` and the coefficients `x` on it; `sinusoids` are the frequencies (L,) and amplitudes
-    (L, r) of a multisine, in phase over the channels.
+    A recorded signal has `samples` (n, r), the others a `basis` with coefficients `x`. Sinusoids `in_phase`
+    over several inputs have power matrices of rank one, in every period.
     """
 
     kind: str
@@ -59,8 +58,14 @@ class GivenExcitation:
     information: Callable[[Experiment], Array]
     basis: TabulatedSpectrum | LinesBasis | None = None
     x: Array | None = None
-    sinusoids: tuple[Array, Array] | None = None
+    in_phase: InPhase | None = None
     samples: Array | None = None
+
+    def drawn(self, step: float) -> DesignedSpectrum:
+        """Return the spectrum for samples that are a step apart."""
+        assert self.basis is not None
+        assert self.x is not None
+        return DesignedSpectrum.of(self.basis, self.x, inputs=len(self.power["excitation"]), step=step)
 
     @property
     def scale(self) -> float:
@@ -75,7 +80,7 @@ class GivenExcitation:
         x: Array,
         experiment: Experiment,
         *,
-        sinusoids: tuple[Array, Array] | None = None,
+        in_phase: InPhase | None = None,
     ) -> GivenExcitation:
         """An excitation that is known by its spectrum."""
 
@@ -91,7 +96,7 @@ class GivenExcitation:
             for of in POWER_KINDS
         }
         information = partial(spectral_information, basis, x)
-        return cls(kind, found, information, basis, x, sinusoids)
+        return cls(kind, found, information, basis, x, in_phase)
 
     def described(self, units: Units) -> Spectrum:
         """Return what the outcome says of it."""
@@ -113,18 +118,16 @@ class GivenExcitation:
         return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
 
 
-@dataclass(frozen=True)
-class GivenAsked:
-    """What is looked at of a given excitation.
+@dataclass(frozen=True, kw_only=True)
+class GivenTask(SpectrumTask):
+    """The analysis of an excitation: requirements are checked, a criterion is computed.
 
-    Attributes:
-        requirements: are checked, not met.
-        criterion: its value is computed, not bounded.
-        alpha: of r_u; `calibration` and `simulator` size it anew, see `Confidence`.
-        limits: that the excitation is compared with.
-        plants: others that the true one might be.
+    `calibration` and `simulator` size `alpha` anew, see `Confidence`; `plants` are others than the nominal
+    one.
     """
 
+    experiment: Experiment
+    excitation: GivenExcitation
     requirements: Sequence[RequirementFactory]
     criterion: Callable[[Experiment], Criterion] | None
     cost: dict[PowerKind, Weight]
@@ -134,27 +137,26 @@ class GivenAsked:
     limits: StatedLimits
     plants: Plants | None
 
-
-@dataclass(frozen=True, kw_only=True)
-class GivenTask(SpectrumTask):
-    """The analysis of an excitation: what is looked at, what is done with its record, what is reported."""
-
-    experiment: Experiment
-    excitation: GivenExcitation
-    asked: GivenAsked
-
     def delivered(self) -> Delivered:
         """Return r_u, information, predicted standard deviations and powers of the excitation."""
         started = time.perf_counter()
-        excitation, asked = self.excitation, self.asked
+        excitation = self.excitation
         experiment = self.experiment.whitened(excitation.scale)
         if excitation.samples is not None:
             experiment = replace(experiment, samples=len(excitation.samples))
         information = excitation.information(experiment)
-        _check_excites(experiment, information)
-        requirements = [make(experiment) for make in asked.requirements]
+        eigenvalues, vectors = np.linalg.eigh(information)
+        if eigenvalues[0] <= _TOO_FAINT * eigenvalues[-1]:
+            raise bad_spec(
+                "not-exciting",
+                f"this excitation has no information on {experiment.unexcited(vectors[:, 0])}: infinite "
+                "variance",
+                hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
+                key="spectrum.given",
+            )
+        requirements = [make(experiment) for make in self.requirements]
         simulated = self._simulated(experiment)
-        confidence = Confidence.of(asked.calibration, requirements, information, asked.alpha, simulated)
+        confidence = Confidence.of(self.calibration, requirements, information, self.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
         informed, white = self._informed(experiment, requirements, information)
         results = self._report(experiment, informed, white, requirements, confidence)
@@ -164,7 +166,7 @@ class GivenTask(SpectrumTask):
         else:
             signal, found = signal_of(self.record, informed.units, experiment, record, requirements), []
         power = Powers.of(excitation.power)
-        found += limits_not_kept(asked.limits, experiment.samples, power, signal)
+        found += limits_not_kept(self.limits, experiment.samples, power, signal)
         if record is None or signal is None:
             results = adding(results, results.outcome, found)
         else:
@@ -182,12 +184,12 @@ class GivenTask(SpectrumTask):
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[Informed, White]:
         """Return what curves show of the excitation, and white excitation at the same cost."""
-        cost = weighted_sum(self.asked.cost, self.excitation.power)
-        level = cost / weighted_sum(self.asked.cost, GivenExcitation.even(self.experiment, 1.0).power)
+        cost = weighted_sum(self.cost, self.excitation.power)
+        level = cost / weighted_sum(self.cost, GivenExcitation.even(self.experiment, 1.0).power)
         white = GivenExcitation.even(self.experiment, level).information(experiment)
         errors, stated = self.errors(experiment, requirements)
         found = White(cost=cost, excitation_power=level)
-        kind = None if self.asked.criterion is None else self.asked.criterion(experiment).letter
+        kind = None if self.criterion is None else self.criterion(experiment).letter
         labels, known = white_labels(kind, found, experiment.samples), (errors, information, stated)
         return Informed(self.header.units, *known, white=white, white_labels=labels, label="given"), found
 
@@ -205,8 +207,8 @@ class GivenTask(SpectrumTask):
         met = beyond <= max(_ROUNDING, of_table)
         error, listed = accuracy_of(units, confidence, requirements, informed.information, np.zeros(0))
         objective = None
-        if self.asked.criterion is not None:
-            criterion = self.asked.criterion(experiment)
+        if self.criterion is not None:
+            criterion = self.criterion(experiment)
             objective = Objective(criterion.letter, criterion.value(criterion.level(informed.information)))
         outcome = Outcome(
             title=self.header.title,
@@ -230,7 +232,7 @@ class GivenTask(SpectrumTask):
                 units, excitation.basis, excitation.x, experiment.band, white=level
             )
             curves["spectrum"] = replace(drawn, label="given")
-        plants = self.asked.plants
+        plants = self.plants
         if plants is not None:
             excited = AtPlants(excitation.information, excitation.scale, experiment.samples)
             nominal, centre = kept_of(requirements, informed.information), experiment.model.theta
@@ -243,10 +245,7 @@ class GivenTask(SpectrumTask):
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[float, float]:
-        """Return how far the largest ratio is above one, and how far off it may be by the rows of a table.
-
-        The second is 0 if it does not decide.
-        """
+        """Return how far the largest ratio is above one, and its error by a table if that decides."""
 
         def largest(M: Array) -> float:
             return max((worst(r.violations(M)).ratio for r in requirements), default=0.0)
@@ -263,56 +262,28 @@ class GivenTask(SpectrumTask):
         excitation, request = self.excitation, self.record
         if excitation.samples is not None:
             return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
-        samples = request.length(experiment.samples)
-        if self._in_phase is None or not request.feasible(experiment.samples, least_period(1)):
-            return given_record(request, experiment, self._spectrum, ratio)
-        rng = np.random.default_rng(request.settings.seed)
-        record = self._in_phase.draw(1, samples, rng)[0]
+        if excitation.in_phase is None or not request.feasible(experiment.samples, least_period(1)):
+            return given_record(request, experiment, excitation.drawn(request.step), ratio)
+        samples, rng = request.length(experiment.samples), np.random.default_rng(request.settings.seed)
+        record = excitation.in_phase.draw(1, samples, rng)[0]
         plant = FiniteRecord(experiment, samples, request.step)
         return Record(record, "multisine", ratio_at(plant, ratio, record))
 
     def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
         """Estimates of such experiments, for an exact confidence."""
-        if self.asked.simulator is None:
+        if self.simulator is None:
             return None
         if self.excitation.samples is not None:
-            return self.asked.simulator.of_record(self.excitation.samples)
+            return self.simulator.of_record(self.excitation.samples)
         samples = as_long(self.record, experiment)
         renewed = None if samples is None else self._renewed(samples)
-        return None if samples is None or renewed is None else self.asked.simulator.of(renewed, samples)
+        return None if samples is None or renewed is None else self.simulator.of(renewed, samples)
 
     def _renewed(self, samples: int) -> Excitation | None:
         """What realises the spectrum anew; None for a record that was given."""
-        basis, x, request = self.excitation.basis, self.excitation.x, self.record
-        if basis is None or x is None:
+        excitation, request = self.excitation, self.record
+        if excitation.basis is None or excitation.x is None:
             return None
-        generator = SignalGenerator(self._spectrum, request.settings, samples, request.band)
-        return self._in_phase or Redrawn("design", generator, basis, x)
-
-    @property
-    def _in_phase(self) -> InPhase | None:
-        """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
-        basis, x, sinusoids = self.excitation.basis, self.excitation.x, self.excitation.sinusoids
-        if sinusoids is None or x is None or not isinstance(basis, LinesBasis) or self.experiment.inputs == 1:
-            return None
-        return InPhase("design", sinusoids[0] * self.record.step, sinusoids[1], basis, x)
-
-    @property
-    def _spectrum(self) -> DesignedSpectrum:
-        basis, x = self.excitation.basis, self.excitation.x
-        assert basis is not None
-        assert x is not None
-        return DesignedSpectrum.of(basis, x, inputs=self.experiment.inputs, step=self.record.step)
-
-
-def _check_excites(experiment: Experiment, information: Array) -> None:
-    """Raise `SpecError` (`not-exciting`) when the information matrix is singular to working precision."""
-    eigenvalues, vectors = np.linalg.eigh(information)
-    if eigenvalues[0] > _TOO_FAINT * eigenvalues[-1]:
-        return
-    raise bad_spec(
-        "not-exciting",
-        f"this excitation has no information on {experiment.unexcited(vectors[:, 0])}: infinite variance",
-        hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
-        key="spectrum.given",
-    )
+        spectrum = excitation.drawn(request.step)
+        generator = SignalGenerator(spectrum, request.settings, samples, request.band)
+        return excitation.in_phase or Redrawn("design", generator, excitation.basis, excitation.x)

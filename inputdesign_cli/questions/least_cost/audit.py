@@ -23,7 +23,7 @@ from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import Objective, Outcome, plain, read_plain
 from inputdesign_cli.plant import graded_grid
-from inputdesign_cli.questions.common.audit import APART, check_claims, of_bounds, of_cost, of_limit
+from inputdesign_cli.questions.common.delivery import APART, check_claims, of_bounds, of_cost, of_limit
 from inputdesign_cli.questions.common.robust import kept_by
 from inputdesign_cli.questions.least_cost.outcome import Designed
 
@@ -39,23 +39,6 @@ _FAST = 200
 _PEAKS, _ZOOMS, _INSIDE = 8, 8, 17
 _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
-
-
-def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0) -> None:
-    """Compare what the outcome claims with what its own spectrum gives, at the nominal plant and all others.
-
-    Args:
-        outcome: what is about to be written.
-        on_grid: the requirements hold on the grid of the papers' program only, and are not claimed between.
-        loose: what the value and its bounds may differ by if more than rounding parts them, as a share.
-
-    Raises:
-        InaccurateError: `internal-disagreement`.
-    """
-    apart = max(APART, loose)
-    reread = read_plain(_Written, plain(outcome))
-    remedy = "rescale the signals, restrict the band, or look for poles near the unit circle"
-    check_claims(_Audit(done, reread, apart).disagreements(on_grid), remedy)
 
 
 @dataclass(frozen=True)
@@ -82,52 +65,46 @@ class _Written:
     spectrum: _WrittenSpectrum
 
 
-@dataclass(frozen=True)
-class _Audit:
-    done: Designed
-    written: _Written
-    apart: float
+def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0) -> None:
+    """Raise `InaccurateError` (`internal-disagreement`) if the written spectrum does not bear out the claims.
 
-    def disagreements(self, on_grid: bool) -> Iterator[str]:
-        """Yield a sentence for each claim that the spectrum does not bear out."""
-        claimed = self.written.objective
-        size = float(self.done.experiment.size) if claimed.kind == "D" else 0.0
-        yield from of_bounds(claimed, self.apart, size)
-        if self.written.status == "nothing_needed":
-            return
-        goal, value = self.done.question.goal, claimed.value
-        problem = self.done.design.problem
-        plants = [_Reread(self.done, self.written.spectrum, scenario) for scenario in problem.scenarios]
-        for reread in self._doubtful(plants) if not on_grid else ():
-            yield from reread.missed(goal)
-        if goal == "factor":
-            yield from self._reached(plants, value)
-        weights = weights_of(self.done.cost)
-        costs = [
-            sum(w * plants[number].power(kind, channel) for kind, channel, w in weights)
-            for number in problem.paying
-        ]
-        yield from of_cost(paid_for(problem.paid, costs), self.written.cost)
-        for limit in self.done.question.limits:
-            for number in (problem.limits[index].scenario for index in limit.everywhere(problem.limits)):
-                yield from of_limit(limit, plants[number].power(limit.kind, limit.channel))
+    Requirements that hold `on_grid` only are not claimed between its points. Of a `loose` proof the value and
+    its bounds may differ by this share.
+    """
+    written = read_plain(_Written, plain(outcome))
+    remedy = "rescale the signals, restrict the band, or look for poles near the unit circle"
+    check_claims(_disagreements(done, written, max(APART, loose), on_grid=on_grid), remedy)
 
-    def _doubtful(self, plants: list[_Reread]) -> list[_Reread]:
-        """Return the nominal plant, and others that keep nearly all that is admitted."""
-        kept = kept_by(self.done.problem, self.done.design, self.done.experiment.samples)
-        pairs = list(zip(plants, kept, strict=True))
-        return [reread for n, (reread, one) in enumerate(pairs) if n == 0 or one.share > _DOUBTFUL]
 
-    def _reached(self, plants: list[_Reread], value: float) -> Iterator[str]:
-        """The value of the best accuracy is that of the plant at which it is worst."""
-        criterion = self.done.problem.demands.criterion
-        if criterion is not None:
-            found = min(reread.criterion for reread in self._doubtful(plants))
-            size = float(self.done.experiment.size) if criterion.letter == "D" else abs(value)
+def _disagreements(done: Designed, written: _Written, apart: float, *, on_grid: bool) -> Iterator[str]:
+    """Yield a sentence for each claim that the spectrum does not bear out."""
+    claimed, problem, goal = written.objective, done.problem, done.question.goal
+    value, size = claimed.value, float(done.experiment.size) if claimed.kind == "D" else 0.0
+    yield from of_bounds(claimed, apart, size)
+    if written.status == "nothing_needed":
+        return
+    plants = [_Reread(done, written.spectrum, scenario) for scenario in problem.scenarios]
+    # The nominal plant, and others that keep nearly all that is admitted.
+    kept = kept_by(problem, done.design, done.experiment.samples)
+    doubtful = [one for n, one in enumerate(plants) if n == 0 or kept[n].share > _DOUBTFUL]
+    for reread in doubtful if not on_grid else ():
+        yield from reread.missed(goal)
+    if goal == "factor":  # the value is that of the plant at which it is worst
+        if problem.demands.criterion is None:
+            found, size = max(one.worst_of_all for one in doubtful), value
         else:
-            found, size = max(reread.worst_of_all for reread in self._doubtful(plants)), value
-        if not abs(found - value) <= self.apart * size:
+            found, size = min(one.criterion for one in doubtful), size or abs(value)
+        if not abs(found - value) <= apart * size:
             yield f"the spectrum reaches {found:.10g}, not {value:.10g}"
+    weights = weights_of(done.cost)
+    costs = [
+        sum(w * plants[number].power(kind, channel) for kind, channel, w in weights)
+        for number in problem.paying
+    ]
+    yield from of_cost(paid_for(problem.paid, costs), written.cost)
+    for limit in done.question.limits:
+        for number in (problem.limits[index].scenario for index in limit.everywhere(problem.limits)):
+            yield from of_limit(limit, plants[number].power(limit.kind, limit.channel))
 
 
 @dataclass(frozen=True)
@@ -213,7 +190,7 @@ class _Reread:
     @cached_property
     def _excitation(self) -> list[tuple[Array, ComplexArray]]:
         """Frequencies (n,) and roots (n, r, r) of the power at each; their powers add up."""
-        entry, unit = self.written, self.done.units.frequency
+        entry, unit = self.written, self.done.header.units.frequency
         r = self._experiment.inputs
         if entry.frequencies is not None and entry.powers is not None:
             return [(entry.frequencies * unit, _root(entry.powers.reshape(-1, r, r)))]

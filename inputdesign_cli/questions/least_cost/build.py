@@ -7,9 +7,8 @@ from dataclasses import replace
 
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.errors import bad_spec, refuse
+from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design
-from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.questions.building.model_error import (
@@ -24,14 +23,13 @@ from inputdesign_cli.questions.building.simulation import build_simulation, buil
 from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
-from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.questions.least_cost.sought import FewColumns, GridMethod, Sought
 from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
@@ -120,15 +118,17 @@ _UNHANDLED = {
 def check_supported(spec: Spec, question: str = "a design of the input spectrum") -> None:
     """Raise `SpecError` (`not-supported`) for what is not designed here, rather than ignore it."""
     refuse_unhandled(spec, question, _UNHANDLED, {"solver.method": ("exchange", "lmi")})
+    signal, spectrum, error, uncertainty = spec.signal, spec.spectrum, spec.accuracy.error, spec.uncertainty
     if not spec.plant.sampled:
-        _check_interpolated(spec)
-    if spec.uncertainty is not None:
-        _check_robust(spec, spec.uncertainty)
-
-
-def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
-    """What is not designed for several plants at once."""
-    spectrum, error = spec.spectrum, spec.accuracy.error
+        # In continuous time samples are interpolated within their band: between them there are no levels.
+        levels = signal.type is not None and kind_of(signal.type).of_levels
+        stated = {"hold": signal.hold is not None, "bits": signal.bits is not None, "type": levels}
+        for key in (name for name, there in stated.items() if there):
+            hint = "write plant.sample: zoh for a signal that is held between samples, or use a multisine"
+            what = "hold levels: between samples a plant in s is driven by their band-limited interpolation"
+            raise refuse(f"signal.{key}", what, hint)
+    if uncertainty is None:
+        return
     columns = spectrum is not None and spectrum.type == "polynomial" and spectrum.factor_columns is not None
     if columns:
         what, hint = "hold a robust design to few factor columns", "remove spectrum.factor_columns"
@@ -150,27 +150,8 @@ def check_pairs(spec: Spec, known: Sequence[str]) -> None:
             check_known(spec, known, name, f"report.ellipses[{n}][{m}]")
 
 
-def _check_interpolated(spec: Spec) -> None:
-    """In continuous time samples are interpolated within their band: between them there are no levels."""
-    signal = spec.signal
-    levels = signal.type is not None and kind_of(signal.type).of_levels
-    if levels or signal.hold is not None or signal.bits is not None:
-        key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
-        raise bad_spec(
-            "not-supported",
-            "a plant in s is driven by the band-limited interpolation of the samples, which has no levels "
-            "and holds nothing between them",
-            hint="write plant.sample: zoh for a signal that is held between samples, or use a multisine",
-            key=f"signal.{key}",
-        )
-
-
 def _grid_method(spec: Spec) -> GridMethod | None:
-    """The papers' own program is for one requirement, a bound on the model error to first order.
-
-    Raises:
-        SpecError: `not-supported` for any other question.
-    """
+    """Return the papers' own program; raise `not-supported` unless model_error alone is asked."""
     if spec.solver.method != "lmi":
         return None
     error, stated = spec.accuracy.error, spec.limits
@@ -187,13 +168,11 @@ def _grid_method(spec: Spec) -> GridMethod | None:
         and not limited
     )
     if not plain:
-        raise bad_spec(
-            "not-supported",
-            "solver.method lmi is the papers' program: the least cost of a FIR spectrum of one input for "
-            "model_error alone, without limits",
-            hint="use method: exchange, which does the rest, at every frequency",
-            key="solver.method",
+        what = (
+            "design more than the least cost of a FIR spectrum of one input for model_error, without limits"
         )
+        hint = "use method: exchange, which does the rest, at every frequency"
+        raise refuse("solver.method", what, hint, who="the papers' program (lmi)")
     return GridMethod(int(spec.solver.grid), spec.solver.positivity)
 
 
@@ -205,10 +184,7 @@ def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
     plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
     floors = any(not limit.upper for limit in build_power_limits(spec))
     if not isinstance(basis, PolynomialBasis) or not plain or floors or spec.limits.spectrum is not None:
-        raise bad_spec(
-            "not-supported",
-            "factor_columns is for a criterion under upper limits on powers",
-            hint="remove factor_columns: the default, a factor of full rank, is the true optimum",
-            key="spectrum.factor_columns",
-        )
+        hint = "remove factor_columns: the default, a factor of full rank, is the true optimum"
+        what = "take few columns but for a criterion under upper limits on powers"
+        raise refuse("spectrum.factor_columns", what, hint)
     return FewColumns(spectrum.factor_columns, spec.signal.seed or 0)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage, with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
@@ -18,10 +17,9 @@ from inputdesign_cli.questions.common.confidence import (
     Confidence,
     SimulatedEstimates,
     Simulator,
+    beyond_chance,
     bounded_errors,
     settled_alpha,
-    too_few,
-    too_many,
 )
 from inputdesign_cli.questions.common.record import Made, RecordRequest, as_long, redrawn, worst_ratio
 from inputdesign_cli.questions.least_cost.outcome import Designed
@@ -42,10 +40,7 @@ Known = Callable[[Record | None], Array | None]
 
 @dataclass(frozen=True)
 class ExactConfidence:
-    """The confidence that is asked of the answer to a question; `usual` is the chi-squared alpha.
-
-    Without a `simulator`, asymptotic theory says how estimates scatter.
-    """
+    """The confidence that is asked, with the `usual` chi-squared alpha; asymptotic without a `simulator`."""
 
     calibration: Calibration
     usual: float
@@ -66,7 +61,7 @@ class ExactConfidence:
             corrected = simulated.corrected(calibration, errors, done.information)
             if abs(corrected.excess / before - 1.0) <= _CORRECTED:
                 coverage, asked = self._coverage(done, done.information, simulated), calibration.probability
-                if sets > 1 or not (too_few(coverage, asked) or too_many(coverage, asked)):
+                if sets > 1 or not beyond_chance(coverage, asked):
                     break
                 sets = _SETS
                 corrected = replace(simulated, sets=sets).corrected(calibration, errors, done.information)
@@ -95,10 +90,7 @@ class ExactConfidence:
         return found[settled_alpha(needed, start)], len(found)
 
     def recorded(self, done: Designed, made: Made, request: RecordRequest, known: Known) -> Made:
-        """Return the record `made`, or one that keeps the confidence by its own samples.
-
-        A record distributes its information otherwise than the design, so that it may need a larger alpha.
-        """
+        """Return the record `made`, or one that keeps the confidence: samples may need a larger alpha."""
         design, alpha, sets = done.design, done.confidence.alpha, 1
         for _ in range(_RECORDS):
             information = known(made.record)
@@ -107,7 +99,7 @@ class ExactConfidence:
             needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED) and sets == 1:
                 coverage = self.of_record(done, made.record, information)
-                if too_few(coverage, self.calibration.probability):
+                if beyond_chance(coverage, self.calibration.probability) < 0:
                     sets = _SETS
                     needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED):
@@ -135,8 +127,9 @@ class ExactConfidence:
         return self._coverage(done, information, self._of_samples(record))
 
     def _coverage(self, done: Designed, information: Array, simulated: SimulatedEstimates | None) -> Coverage:
-        errors = bounded_errors(done.problem.requirements)
-        within = self._reached(errors, done.information)
+        errors, within = bounded_errors(done.problem.requirements), 1.0
+        if self.question.goal == "factor":  # r_adm is multiplied by the ratio that was reached
+            within = max(error.worst(done.information).ratio for error in errors)
         coverage = self.calibration.coverage(errors, information, within)
         return coverage if simulated is None else simulated.checked(coverage, errors, within)
 
@@ -145,20 +138,11 @@ class ExactConfidence:
         samples = as_long(request, done.experiment)
         if self.simulator is None or samples is None or not done.excites:
             return None
-        drawn = redrawn(request, done.design, done.experiment.inputs, samples)
-        found = self.simulator.of(drawn, samples)
+        found = self.simulator.of(redrawn(request, done.design, done.experiment.inputs, samples), samples)
         return found and replace(found, sets=sets)
 
     def _of_samples(self, record: Record) -> SimulatedEstimates | None:
-        if self.simulator is None:
-            return None
-        return self.simulator.of_record(record.samples)
-
-    def _reached(self, errors: Sequence[ModelError], information: Array) -> float:
-        """What r_adm is multiplied by: where the best accuracy is sought, the ratio that was reached."""
-        if self.question.goal != "factor":
-            return 1.0
-        return max(error.worst(information).ratio for error in errors)
+        return None if self.simulator is None else self.simulator.of_record(record.samples)
 
     def _first_alpha(self) -> float:
         """Return alpha of white excitation for the least cost, lest the first design be out of reach."""

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from inputdesign_cli import outcome as out
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, paid_for, weighted_sum
@@ -15,37 +16,18 @@ from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.designs import (
-    almost_free,
-    inputs_without_power,
-    nothing_needed,
-    short_experiment,
-    sign_open,
-)
+from inputdesign_cli.findings import designs
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
-from inputdesign_cli.outcome import (
-    Baseline,
-    Information,
-    LimitUse,
-    Loop,
-    ModelError,
-    Objective,
-    Outcome,
-    Powers,
-    RequirementMet,
-    Solver,
-    White,
-    read_plain,
-)
+from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.questions.common.delivery import KINDS
 from inputdesign_cli.questions.common.robust import Plants, delivered
 from inputdesign_cli.questions.common.spectrum import described_spectrum, distinct
-from inputdesign_cli.spectrum import Basis, flat_basis
+from inputdesign_cli.spectrum import Basis, flat_basis, matrices
 
 # A limit binds when the design uses all but this share of it.
 _BINDS = 1e-6
-_KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "accuracy_factor"}
 
 
 @dataclass(frozen=True)
@@ -54,7 +36,7 @@ class Answer:
 
     design: Design
     status: str
-    solver: Solver
+    solver: out.Solver
 
 
 @dataclass(frozen=True)
@@ -78,12 +60,7 @@ class Designed:
         """The design of the answer."""
         return self.answer.design
 
-    @property
-    def units(self) -> Units:
-        """The units of the spec."""
-        return self.header.units
-
-    @property
+    @cached_property
     def problem(self) -> Problem:
         """The problem on the basis of the answer, which may have grown."""
         return self.design.problem.on(self.design.result.basis)
@@ -117,21 +94,21 @@ def design_outcome(done: Designed) -> Outcome:
         power=powers(problem, found.basis, found.x),
         limits=(*_power_limits(done), *_density_limits(done)) or None,
         information=information_of(done.experiment, done.information),
-        spectrum=described_spectrum(done.units, found.basis, found.x),
-        baseline=Baseline(_white(done, cost)),
+        spectrum=described_spectrum(done.header.units, found.basis, found.x),
+        baseline=out.Baseline(_white(done, cost)),
         solver=answer.solver,
     )
     if answer.status != "nothing_needed":
         error, listed = accuracy_of(
-            done.units, done.confidence, done.asked, done.information, found.active_frequencies
+            done.header.units, done.confidence, done.asked, done.information, found.active_frequencies
         )
         outcome = replace(outcome, model_error=error, requirements=listed)
     return outcome.saying(_findings(done))
 
 
-def information_of(experiment: Experiment, information: Array) -> Information:
+def information_of(experiment: Experiment, information: Array) -> out.Information:
     """Return the information matrix in raw parameters, its inverse and the predicted standard deviations."""
-    found = Information(tuple(experiment.model.names), experiment.to_raw(information))
+    found = out.Information(tuple(experiment.model.names), experiment.to_raw(information))
     try:
         covariance = experiment.raw_covariance(information)
     except np.linalg.LinAlgError:  # some parameter is not excited at all
@@ -148,11 +125,7 @@ def accuracy_of(
     information: Array,
     active: Array,
 ) -> tuple[ModelError, tuple[RequirementMet, ...] | None]:
-    """Return the largest ratio of the model error, and each requirement with its own.
-
-    Args:
-        information: M (k, k) in their coordinates.
-    """
+    """Return the largest ratio of the model error, and each requirement with its own, by M (k, k)."""
     listed: list[RequirementMet] = []
     error = ModelError(confidence.alpha, confidence=confidence.reported)
     for requirement in requirements:
@@ -176,7 +149,7 @@ def requirement_met(units: Units, requirement: Requirement, information: Array) 
     for error in model_errors([requirement]):
         kept = error.admissible.kept
         if kept is not None and kept.settings is not None:
-            loop = read_plain(Loop, {**kept.settings, **kept.margins(error.grid)})
+            loop = out.read_plain(out.Loop, {**kept.settings, **kept.margins(error.grid)})
     return RequirementMet(
         requirement.name,
         violation.ratio,
@@ -200,9 +173,9 @@ def powers_by_kind(
     }
 
 
-def powers(problem: Problem, basis: Basis, x: Array) -> Powers:
+def powers(problem: Problem, basis: Basis, x: Array) -> out.Powers:
     """Return the same at the plant of the spec."""
-    return Powers.of(powers_by_kind(problem, basis, x))
+    return out.Powers.of(powers_by_kind(problem, basis, x))
 
 
 def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
@@ -211,7 +184,7 @@ def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
     return [weighted_sum(done.cost, powers_by_kind(problem, basis, x, at)) for at in problem.paying]
 
 
-def _objective(design: Design) -> Objective:
+def _objective(design: Design) -> out.Objective:
     """Return the value with the bounds that are proved."""
     found, anything = design.result, design.any_spectrum
     value, bound = found.objective, found.certificate.bound
@@ -224,7 +197,7 @@ def _objective(design: Design) -> Objective:
         reached = criterion.value(1.0 / value)
         upper = criterion.value(1.0 / max(bound, 1e-300)) if proved else None
         size = design.problem.experiment.size if criterion.letter == "D" else abs(reached)
-        return Objective(
+        return out.Objective(
             criterion.letter,
             reached,
             upper_bound=upper,
@@ -234,8 +207,8 @@ def _objective(design: Design) -> Objective:
         )
     if goal == "factor":
         value, bound, any_bound = (float(np.sqrt(v)) for v in (value, bound, any_bound))
-    return Objective(
-        _KINDS[goal],
+    return out.Objective(
+        KINDS[goal],
         value,
         lower_bound=bound,
         relative_gap=abs(value - bound) / value if value > 0 else 0.0,
@@ -244,7 +217,7 @@ def _objective(design: Design) -> Objective:
     )
 
 
-def _white(done: Designed, cost: float) -> White:
+def _white(done: Designed, cost: float) -> out.White:
     """Return flat excitation that meets the same requirements, or exhausts the same limits."""
     design, problem = done.design, done.design.problem
     basis, x = flat_basis(problem.experiment), np.array([design.white_power])
@@ -256,7 +229,7 @@ def _white(done: Designed, cost: float) -> White:
         value = problem.demands.criterion.value(1.0 / design.white.objective)
     elif problem.goal == "factor":
         value = float(np.sqrt(design.white.objective))
-    return White(
+    return out.White(
         cost=white_cost,
         power=powers(problem, basis, x),
         ratio=white_cost / cost if cost > 0 else 1.0,
@@ -295,7 +268,7 @@ def _density_limits(done: Designed) -> Iterator[LimitUse]:
             tightest.ratio >= 1.0 - _BINDS,
             kind="max" if density.upper else "min",
             worst_ratio=tightest.ratio,
-            frequency=tightest.place.frequency / done.units.frequency,
+            frequency=tightest.place.frequency / done.header.units.frequency,
         )
 
 
@@ -303,18 +276,15 @@ def _findings(done: Designed) -> list[Finding]:
     """Return what a user should know before trusting a number."""
     found, problem = done.design.result, done.problem
     if not done.excites:
-        return [nothing_needed(done.experiment, at_every_plant=bool(done.kept))]
+        return [designs.nothing_needed(done.experiment, at_every_plant=bool(done.kept))]
     excited = powers(problem, found.basis, found.x).excitation or ()
-    findings = [*inputs_without_power(excited), *short_experiment(done.experiment)]
-    findings += sign_open(problem.requirements)
-    if done.units.closed_loop and not found.basis.has_density:
-        lines, matrices = found.basis.lines(found.x)
-        costs, all_costs = (_unit_price(problem.price.density(w)) for w in (lines, problem.gradients.grid))
-        power = np.einsum("naa->n", matrices).real
-        findings += almost_free(done.units, lines, power, costs, float(all_costs.max()))
+    findings = [*designs.inputs_without_power(excited), *designs.short_experiment(done.experiment)]
+    findings += designs.sign_open(problem.requirements)
+    if done.header.units.closed_loop and not found.basis.has_density:
+        lines, powers_of_lines = found.basis.lines(found.x)
+        # The price of power one, even over the channels.
+        prices = [matrices(problem.price.density(w)) for w in (lines, problem.gradients.grid)]
+        costs, all_costs = (np.einsum("naa->n", price).real / price.shape[1] for price in prices)
+        power = np.einsum("naa->n", powers_of_lines).real
+        findings += designs.almost_free(done.header.units, lines, power, costs, float(all_costs.max()))
     return findings
-
-
-def _unit_price(density: Array) -> Array:
-    """Return the price (n,) of power one, even over the channels."""
-    return density if density.ndim == 1 else np.einsum("naa->n", density).real / density.shape[1]

@@ -1,4 +1,4 @@
-"""Where no record of the cheapest spectrum fits within limits on samples: other signals, other spectra.
+"""Where no record of the cheapest spectrum fits within limits on samples: other signals, spectra, lengths.
 
 What costs least need not fit: where outputs are dear the inputs may be strong, and noise has high peaks.
 """
@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
+import scipy
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
@@ -27,14 +30,32 @@ from inputdesign_cli.questions.common.record import (
     make_record,
     ratio_before,
 )
-from inputdesign_cli.questions.least_cost.shortest_record import (
-    ShortestRecord,
-    Way,
-    longest_search,
-    pilot_length,
-    reach,
-)
 from inputdesign_cli.signal.selection import LONG, Record
+
+# Lengths that are looked into: times the one that was asked for, or that many samples.
+_LONGEST, _AT_LEAST = 64, 20_000
+_LEAP, _DOUBLE = 8.0, 2.0
+# The ratio of so few samples predicts nothing for more of them: they may be less than a dead time.
+_FEW = 100
+_GROWTH, _MOST_GROWTHS = 1.03, 100.0
+_FAR = 1.5
+_FINE, _STEP = 0.01, 0.009
+_LENGTHS = 24
+_FALLS = 0.9  # of the length that seemed to be needed before
+_BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
+# A way that missed nearby, and by so much, is not tried: other phases change a ratio by less as a rule.
+_NEARBY, _HOPELESS, _HOPELESS_LONG = 1.2, 1.15, 1.01
+# A long record takes seconds to make. Its ratio follows from that of a pilot, a record of a share of its
+# samples with at least the fewest: information grows with the length, and luck averages out.
+_PILOT, _FEWEST = 16, 1000
+_MARGIN = 1.005
+# Whether a record meets is a matter of luck near the shortest: so far below one that does all are tried.
+_BELOW = (0.96, 0.9)
+
+
+Way = Callable[[int, int], Made | None]
+"""Makes the first record of a length that meets the accuracy, or the best, of the spectrum for a length."""
+
 
 # From the design towards the least input power that meets the accuracy, with a little room there.
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
@@ -53,14 +74,150 @@ _WORDS = {
 }
 
 
+def reach(record: Record, before: float = np.inf) -> float:
+    """Return the length that a record needs if its information grows with it, from the ratio `before`."""
+    if not np.isfinite(record.worst_ratio):
+        return _DOUBLE * len(record.samples)
+    known = before**-2.0
+    gain = record.worst_ratio**-2.0 - known
+    return len(record.samples) * (1.0 - known) / gain if gain > 0.0 else np.inf
+
+
+def pilot_length(samples: int, block: int) -> int:
+    """Return the length of the short record that predicts the ratio of one of `samples` samples."""
+    return -(-max(samples // _PILOT, _FEWEST) // block) * block
+
+
+@dataclass
+class ShortestRecord:
+    """Search the shortest record by trying lengths, multiples of `block` up to `longest`, in several `ways`.
+
+    Of a long record only the most promising way is tried at a length. `before` is the ratio without a record.
+    """
+
+    ways: Sequence[Way]
+    block: int
+    longest: int
+    before: float = np.inf
+    inputs: int = 1  # each has as long a part of a period
+    needed: float = 0.0  # samples that would do, by the records that missed
+    _missed: dict[int, Record] = field(default_factory=dict)  # by way, its latest
+    _tried: set[tuple[int, int]] = field(default_factory=set)  # ways and lengths
+    _found: Made | None = None
+    _low: int = 0
+    _high: int = 0
+    _hopeless: float = _HOPELESS
+
+    def search(self, misses: Sequence[Record], low: int | None = None) -> Made | None:
+        """Return the shortest record that meets the accuracy, to one per cent; out of time that so far.
+
+        The `misses` missed; longer records than `low` are looked for. It raises `OutOfTimeError` before one
+        is found.
+        """
+        self._low = low or len(misses[0].samples)
+        self.needed = min(map(self._reach, misses))
+        if self._low > LONG:
+            self._try_pilots(misses[0])
+        try:
+            for length in islice(self._proposed(), _LENGTHS):
+                made = self._met(length)
+                if made is not None:
+                    self._high, self._found = length, made
+                else:
+                    self._low = length
+                    self.needed = min(map(self._reach, self._missed.values()), default=length)
+        except OutOfTimeError:
+            if self._found is None:
+                raise
+        return self._found
+
+    def _try_pilots(self, first: Record) -> None:
+        """Make a short record in each way (`first` in the first), which shows the most promising one."""
+        length = pilot_length(self._low, self.block)
+        for number, way in enumerate(self.ways):
+            if number == 0 and len(first.samples) == length:
+                self._missed[number] = first
+                continue
+            made = way(length, max(self._low, self._rounded(min(self.needed, self.longest))))
+            if made is not None and made.record is not None:
+                self._missed[number] = made.record
+                self.needed = min(self.needed, self._reach(made.record))
+
+    def _proposed(self) -> Iterator[int]:
+        """Yield lengths: ever longer ones, then between a miss and the one found, then shorter ones."""
+        growths, step, below, before = 0, _STEP, [*_BELOW], np.inf
+        while self._found is None:
+            low = self._low
+            # An estimate of the needed length that was repeatedly too low is no guide.
+            least, margin = (_MARGIN, _MARGIN) if low > LONG else (_GROWTH, 1.0)
+            growth = min(least ** min(2.0**growths, _MOST_GROWTHS), _LEAP)
+            length = self._rounded(min(max(margin * self.needed, growth * low), _LEAP * low, self.longest))
+            # Records shorter than what the plant remembers promise far less than longer ones keep.
+            far = self.needed > max(_BEYOND * self.longest, _FALLS * before)
+            if length <= low or (growths > 0 and low >= _FEW and far):
+                return
+            before, growths = self.needed if growths > 0 else np.inf, growths + 1
+            yield length
+        while self._high - self._low > max(_FINE * self._high, self.block):
+            low, high = self._low, self._high
+            middle = np.sqrt(low * high) if high > _FAR * low else 0.5 * (low + high)
+            if high > LONG:  # the first length was chosen by what is needed: it is hardly too long
+                middle, step = max(middle, (1.0 - step) * high), min(2.0 * step, 1.0)
+            whole = int(np.ceil(middle / self.block)) * self.block
+            length = self._rounded(middle) if self._rounded(middle) < high else whole
+            if length in (low, high):
+                break
+            yield length
+        self._hopeless = np.inf  # short records may meet by luck
+        while self._high <= LONG and below:
+            high, shorter = self._high, int(below.pop(0) * self._high / self.block) * self.block
+            if 0 < shorter < high:
+                yield shorter
+                below = [*_BELOW] if self._high < high else below
+
+    def _met(self, samples: int) -> Made | None:
+        """Return a record of this length that meets the accuracy, the most promising way tried first."""
+
+        def promise(number: int) -> float:
+            """Return the length that its latest miss predicts; a way without a miss comes first."""
+            return self._reach(self._missed[number]) if number in self._missed else 0.0
+
+        long = samples > LONG
+        hopeless = _HOPELESS_LONG if long else self._hopeless
+        for number in sorted(range(len(self.ways)), key=promise):
+            missed = self._missed.get(number)
+            near = missed is not None and samples < _NEARBY * len(missed.samples)
+            if (number, samples) in self._tried or (near and samples * hopeless < promise(number)):
+                if long:
+                    return None
+                continue
+            self._tried.add((number, samples))
+            made = self.ways[number](samples, samples)
+            if made is None or made.record is None:
+                continue
+            if made.record.met:
+                return made
+            self._missed[number] = made.record
+            if long:
+                return None
+        return None
+
+    def _reach(self, record: Record) -> float:
+        return reach(record, self.before)
+
+    def _rounded(self, length: float) -> int:
+        """The next length of whole blocks; of a long record one with a fast transform if it is near."""
+        whole = int(np.ceil(length / self.block)) * self.block
+        unit = self.block * self.inputs
+        fast = unit * int(scipy.fft.next_fast_len(int(np.ceil(length / unit))))
+        return whole if whole <= LONG or fast > min(_MARGIN * whole, self.longest) else fast
+
+
 def fitting_record(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:
-    """The record of the design; where none is found that meets the accuracy, one that does.
+    """Return the record of the design; where none is found that meets the accuracy, one that does.
 
     Tried are spectra of less input power, and other kinds of signals; for a shortest experiment longer
     records. A kind that the spec states is not replaced: the error names the one that would do.
-
-    Args:
-        samples: of the experiment.
 
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
@@ -152,13 +309,9 @@ def _longer(
     tried: Counter[str] | None = None,
     remedy: str = "",
 ) -> Made:
-    """The longer record of a shortest experiment, or the error with what was tried besides.
-
-    Raises:
-        InfeasibleError: `limits-too-tight`.
-    """
+    """Return the longer record of a shortest experiment, or raise `limits-too-tight` with what was tried."""
     block, allowed = request.settings.block, request.most_samples
-    longest = longest_search(samples, allowed, request.longest)
+    longest = min(max(_LONGEST * samples, _AT_LEAST, allowed or 0), request.longest)
     search = ShortestRecord(
         _ways(request, question, design),
         block,
@@ -210,8 +363,8 @@ def _ways(request: RecordRequest, question: Question, design: Design) -> list[Wa
         few = min(kind.settings.candidates, _ENOUGH)
         quick = replace(kind.settings, candidates=few, most_candidates=few)
 
-        def made(samples: int, spectrum_of: int | None = None) -> Made | None:
-            of = spectrum(spectrum_of or samples)
+        def made(samples: int, spectrum_of: int) -> Made | None:
+            of = spectrum(spectrum_of)
             wanted = of_any_length if samples <= LONG else replace(of_any_length, settings=quick)
             record = None if of is None else make_record(wanted, of, samples, first=True)
             return None if of is None else Made(record, kind, of)

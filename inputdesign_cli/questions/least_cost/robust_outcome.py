@@ -1,39 +1,34 @@
-"""`robust` of the outcome: what the design keeps at the plants that were drawn, and at others like them."""
+"""What a design keeps at the plants that were drawn, at others like them, and at the worst that are found.
+
+The worst plant of a region is looked for by ascent from several starts, as [frank-wolfe-1956] does: from a
+point towards the farthest one of the region in the direction of the gradient. It is added to the design until
+none is found to be missed; that there is no worse one is not proved.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import cycle, islice
 
 import numpy as np
 
-from inputdesign_cli.accuracy import OnModelError, Requirement, model_errors, worst
+from inputdesign_cli.accuracy import Requirement, model_errors, worst
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.design.convex.question import Alternative
+from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.unfinished import fewer_plants, floor_findings, unstable_draws
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
-from inputdesign_cli.outcome import Robust
+from inputdesign_cli.outcome import robust as parts
 from inputdesign_cli.outcome.curves import Curves, FanCurves
 from inputdesign_cli.outcome.results import Table
-from inputdesign_cli.outcome.robust import (
-    ActivePlant,
-    BeyondLimits,
-    DearestPlant,
-    DrawnEstimates,
-    FloorUse,
-    FreshPlants,
-    LostPlant,
-    Risk,
-    SearchedPlant,
-)
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.robust import (
     CONFIDENCE,
@@ -41,16 +36,28 @@ from inputdesign_cli.questions.common.robust import (
     Batch,
     Kept,
     Plants,
+    Region,
     Searched,
     Tried,
     delivered,
+    delivered_samples,
     estimate_from,
     kept_by,
     tried_on,
 )
 from inputdesign_cli.questions.common.spectrum import axis
-from inputdesign_cli.questions.least_cost.outcome import Designed, costs_of
-from inputdesign_cli.questions.least_cost.worst_case import worst_plant
+from inputdesign_cli.questions.least_cost.outcome import Answer, Designed, costs_of
+
+# Steps towards the farthest point, of a difference, and of an ascent at most.
+_LENGTHS, _DIFFERENCE, _STEPS = (1.0, 0.5, 0.25, 0.1, 0.03), 0.01, 15
+_GAIN = 1e-5
+_STARTS = 3  # beside the plant of the spec
+# Plants are added until the worst one is missed by no more than this, and no more than this number.
+_NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
+
+
+Keeps = Callable[[Array, Alternative], Kept]
+
 
 # A plant binds when it is within this share of its limit.
 _BINDS = 1e-5
@@ -60,15 +67,84 @@ _ESTIMATES, _MOST_OF_THEM = 100, 0.95
 _GRID_POINTS = 300
 
 
+def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> tuple[Searched, Alternative]:
+    """Return the worst plant of the region that ascents from parameters (k,) find, the worst known first."""
+    tried, worst = 0, list[tuple[Array, Alternative, Kept]]()
+
+    def share(z: Array) -> float:
+        """How near the plant at z comes to being missed, 0 where there is none."""
+        nonlocal tried, worst
+        seconds_left()
+        theta = region.theta(z)
+        plant = region.at(theta)
+        if plant is None:
+            return 0.0
+        kept, tried = keeps(theta, plant), tried + 1
+        if not worst or kept.share > worst[0][2].share:
+            worst = [(theta, plant, kept)]
+        return kept.share
+
+    def slope(z: Array, axis: int, here: float) -> float:
+        """The derivative along an axis, by a difference within the region; 0 where there is no plant."""
+        step = np.zeros(z.size)
+        step[axis] = -_DIFFERENCE if z[axis] > 0.0 else _DIFFERENCE
+        there = share(z + step)
+        return (there - here) / step[axis] if there > 0.0 and np.isfinite(there) else 0.0
+
+    def ascend(z: Array) -> None:
+        """Steps as long as they lead to a worse plant."""
+        found = share(z)
+        for _ in range(_STEPS):
+            ahead = np.array([slope(z, axis, found) for axis in range(z.size)])
+            if not (np.isfinite(found) and np.any(ahead)):
+                return
+            target, before = region.farthest(ahead), found
+            for length in _LENGTHS:
+                step = z + length * (target - z)
+                reached = share(step)
+                if reached > (1.0 + _GAIN) * before:
+                    z, found = step, reached
+                    break
+            if found == before:
+                return
+
+    for theta in starts[: 1 + _STARTS]:
+        ascend(region.nearest(theta))
+    ((theta, plant, kept),) = worst
+    return Searched(region.name, theta, kept, tried, added=0), plant
+
+
+def with_worst_plants(
+    plants: Plants, region: Region, question: Question, first: Answer, solve: Callable[[Question], Answer]
+) -> tuple[Plants, Question, Answer]:
+    """Return the design for the worst plants of the region too, added until none is found to be missed."""
+    answer, added = first, 0
+    while True:
+        design = answer.design
+        samples = delivered_samples(design)
+        kept = kept_by(design.problem.on(design.result.basis), design, samples)
+        nominal = question.experiment.model.theta
+        shares = np.array([one.share for one in kept[1:]])
+        thetas = [nominal, *plants.batch.thetas[np.argsort(-shares, kind="stable")]]
+
+        def keeps(theta: Array, plant: Alternative, design: Design = design, samples: int = samples) -> Kept:
+            return tried_on(design, samples, Batch(theta[None], (plant,), 1))[0].kept
+
+        found, plant = worst_plant(region, keeps, thetas)
+        if found.kept.share <= _NEARLY or added == _MOST_ADDED:
+            return replace(plants, searched=replace(found, added=added)), question, answer
+        batch, added = plants.batch, added + 1
+        thetas_now = np.concatenate([batch.thetas, found.theta[None]])
+        plants = replace(plants, batch=Batch(thetas_now, (*batch.plants, plant), batch.drawn + 1))
+        question = replace(question, others=[*question.others, plant])
+        answer = solve(question)
+
+
 @dataclass(frozen=True)
 class Floor:
-    """How a plant stands to its own r_adm.
+    """How a plant stands to its own r_adm, where the floor, a `share` of that of the spec, may count.
 
-    Attributes:
-        raised: whether the floor counts at some frequency.
-        lost: whether nothing keeps what is asked there, since its own r_adm vanishes.
-        peak: of |S| with that plant if all is lost; None if no loop is asked about.
-        share: of r_adm of the plant of the spec, which is the floor.
+    It is `raised` at some frequency, or `lost`: its own r_adm vanishes. Then `peak` is that of |S|, if any.
     """
 
     raised: bool
@@ -76,45 +152,37 @@ class Floor:
     peak: float | None
     share: float
 
-
-def floor_at(requirements: Iterable[Requirement]) -> Floor:
-    """Return how a plant stands to its own r_adm, by what is required there."""
-    errors = model_errors(requirements)
-    floors = [(floor, error.grid) for error in errors if (floor := error.admissible.floored) is not None]
-    lost = any(floor.lost(grid) for floor, grid in floors)
-    raised = lost or any(floor.raised(grid) for floor, grid in floors)
-    share = max((floor.share for floor, _ in floors), default=0.0)
-    loops = [(kept, error.grid) for error in errors if (kept := error.admissible.kept) is not None]
-    peak = max((float(np.max(kept.nominal(grid))) for kept, grid in loops), default=None)
-    return Floor(raised, lost, peak if lost else None, share)
-
-
-def floor_of(plant: Alternative) -> Floor:
-    """Return how a plant that the design was not made for stands to its own r_adm."""
-    return floor_at(make(plant.experiment) for make in (*plant.requirements, *plant.side))
+    @classmethod
+    def at(cls, requirements: Sequence[Requirement]) -> Floor:
+        """Return how a plant stands to its own r_adm, by what is required there."""
+        errors = model_errors(requirements)
+        floors = [(floor, error.grid) for error in errors if (floor := error.admissible.floored) is not None]
+        lost = any(floor.lost(grid) for floor, grid in floors)
+        raised = lost or any(floor.raised(grid) for floor, grid in floors)
+        loops = [(kept, error.grid) for error in errors if (kept := error.admissible.kept) is not None]
+        peak = max((float(np.max(kept.nominal(grid))) for kept, grid in loops), default=None)
+        share = max((floor.share for floor, _ in floors), default=0.0)
+        return cls(raised, lost, peak if lost else None, share)
 
 
-def floor_use(plants: Plants, kept: Sequence[int], floors: Sequence[Floor]) -> FloorUse | None:
+def floor_use(plants: Plants, kept: Sequence[int], floors: Sequence[Floor]) -> parts.FloorUse | None:
     """Return which of the plants that count are held to the floor; None if each has an r_adm of its own."""
     raised = [place for place, one in enumerate(floors) if one.raised]
     if not raised:
         return None
     lost = sorted((p for p in raised if floors[p].lost), key=lambda p: -(floors[p].peak or 0.0))
-    worst = [
-        LostPlant(kept[p] + 1, _named(plants, plants.batch.thetas[kept[p]]), floors[p].peak)
-        for p in lost[:_LISTED]
-    ]
-    share, numbers = floors[raised[0]].share, np.array(kept) + 1
-    return FloorUse(
-        share, tuple(numbers[raised].tolist()), tuple(numbers[sorted(lost)].tolist()), tuple(worst) or None
-    )
+    named = (_named(plants, plants.batch.thetas[kept[p]]) for p in lost[:_LISTED])
+    worst = [parts.LostPlant(kept[p] + 1, name, floors[p].peak) for p, name in zip(lost, named, strict=False)]
+    numbers = np.array(kept) + 1
+    among = (tuple(numbers[raised].tolist()), tuple(numbers[sorted(lost)].tolist()))
+    return parts.FloorUse(floors[raised[0]].share, *among, tuple(worst) or None)
 
 
 @dataclass(frozen=True)
 class RobustResult:
     """`robust` of the outcome, with its tables and curves by the names of their files, and findings."""
 
-    entry: Robust
+    entry: parts.Robust
     tables: dict[str, Table]
     curves: dict[str, Curves] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
@@ -125,37 +193,35 @@ Peak = Callable[[Experiment], float]
 
 
 def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> RobustResult:
-    """Return what a design keeps at the plants that it is for.
-
-    Args:
-        peak: None if no limit on single samples depends on the plant.
-    """
-    kept, units = done.kept, done.units
-    at_each = kept_by(done.problem, done.design, done.experiment.samples)
+    """Return what a design keeps at its plants; `peak` is None if limits do not depend on the plant."""
+    kept, problem, samples = done.kept, done.problem, done.experiment.samples
+    at_each = kept_by(problem, done.design, samples)
     numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
-    binding = _binding(done, np.array([one.share for one in at_each]))
+    # The plants that bind, the largest multipliers first.
+    shares, weight = np.array([one.share for one in at_each]), done.design.result.certificate.shares
+    taking_part = (weight > _BINDS) | (shares >= 1.0 - _BINDS)
+    binding = [place for place in np.lexsort((-shares, -weight)).tolist() if taking_part[place]]
     support = sum(place > 0 for place in binding)
-    floors = [floor_at((*one.requirements, *one.side)) for one in done.problem.scenarios[1:]]
-    found = plants_kept(units, plants, kept, at_each, binding, floors)
-    entry = replace(found.entry, support=support)
-    dearest_counts = plants.paid == "worst" and done.problem.goal == "cost"
-    if dearest_counts:
-        costs = costs_of(done, done.design.result.basis, done.design.result.x)
+    floors = [Floor.at((*one.requirements, *one.side)) for one in problem.scenarios[1:]]
+    found = plants_kept(done.header.units, plants, kept, at_each, binding, floors)
+    entry, promised = replace(found.entry, support=support), None
+    if plants.paid == "worst" and problem.goal == "cost":
+        costs, promised = costs_of(done, problem.basis, done.design.result.x), done.design.result.objective
         dearest = int(np.argmax(costs))
-        entry = replace(entry, dearest=DearestPlant(numbers[dearest], costs[dearest]))
-    promised = done.design.result.objective if dearest_counts else None
-    tried = partial(tried_on, done.design, done.experiment.samples)
-    fresh, fewer = fresh_plants(plants, tried, peak, promised)
+        entry = replace(entry, dearest=parts.DearestPlant(numbers[dearest], costs[dearest]))
+    fresh, fewer = fresh_plants(plants, partial(tried_on, done.design, samples), peak, promised)
     if plants.afresh is not None:
-        risk, estimates = _risk(plants, support, len(kept)), _estimates(done, plants, binding)
-        entry = replace(entry, risk=risk, fresh=fresh, estimates=estimates)
+        entry = replace(entry, fresh=fresh, estimates=_estimates(done, plants, binding))
+        drawn, beta = len(plants.batch.plants), 1.0 - CONFIDENCE
+        searched = plants.searched is not None and plants.searched.added
+        # If some were left out, or searched, the theory is silent, and fresh draws count.
+        if len(kept) == drawn and not searched:
+            before = None if plants.unknowns is None else risk_before(drawn, beta, plants.unknowns)
+            risk = parts.Risk(CONFIDENCE, risk_after(drawn, beta, support), before)
+            entry = replace(entry, risk=risk)
     fan = fan_curves(done, numbers, binding) if done.excites else None
-    return RobustResult(
-        entry,
-        found.tables if fan is None else found.tables | {"fan": fan[0]},
-        {} if fan is None else {"fan": fan[1]},
-        (*found.findings, *fewer),
-    )
+    tables, curves = ({}, {}) if fan is None else ({"fan": fan[0]}, {"fan": fan[1]})
+    return RobustResult(entry, found.tables | tables, {**curves}, (*found.findings, *fewer))
 
 
 def plants_kept(
@@ -168,15 +234,21 @@ def plants_kept(
 ) -> RobustResult:
     """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
 
-    Args:
-        at_each: what these keep, the plant of the spec first.
-        binding: places among them.
+    The plant of the spec comes first in `at_each`; `binding` are places there.
     """
-    numbers = [0, *(number + 1 for number in kept)]
-    worst = int(np.argmax([one.share for one in at_each]))
-    floor = floor_use(plants, kept, floors)
-    batch = plants.batch
-    entry = Robust(
+    numbers, batch = [0, *(number + 1 for number in kept)], plants.batch
+    shares = np.array([one.share for one in at_each])
+    worst, floor = int(np.argmax(shares)), floor_use(plants, kept, floors)
+    active = (
+        parts.ActivePlant(
+            numbers[place],
+            at_each[place].share,
+            _at(units, at_each[place]),
+            _named(plants, batch.thetas[numbers[place] - 1]) if place > 0 else None,
+        )
+        for place in binding[:_LISTED]
+    )
+    entry = parts.Robust(
         source=plants.source,
         scenarios=len(batch.plants),
         rejected=batch.rejected,
@@ -185,22 +257,18 @@ def plants_kept(
         cost=plants.paid,
         worst_share=at_each[worst].share,
         worst_scenario=numbers[worst],
-        active=tuple(_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]),
+        active=tuple(active),
         floor=floor,
         searched=_searched(units, plants),
     )
     findings = unstable_draws(batch.rejected, len(batch.plants) + batch.rejected)
     findings += floor_findings(floor, len(kept))
-    table = _scenario_table(units, plants, numbers, at_each)
-    return RobustResult(entry, {"scenarios": table}, findings=tuple(findings))
-
-
-def _binding(done: Designed, shares: Array) -> list[int]:
-    """Return the plants that bind, the largest multipliers first."""
-    weight = done.design.result.certificate.shares
-    order = np.lexsort((-shares, -weight))
-    taking_part = (weight > _BINDS) | (shares >= 1.0 - _BINDS)
-    return [place for place in order.tolist() if taking_part[place]]
+    columns: dict[str, Array] = {"scenario": np.array(numbers[1:], dtype=float), "share": shares[1:]}
+    where = np.array([_at(units, one) for one in at_each[1:]], dtype=float)
+    if not np.any(np.isnan(where)):
+        columns[units.frequency_header] = where
+    columns |= dict(zip(plants.names, batch.thetas[list(kept)].T, strict=True))
+    return RobustResult(entry, {"scenarios": Table(columns)}, findings=tuple(findings))
 
 
 def _named(plants: Plants, theta: Array) -> dict[str, float]:
@@ -211,20 +279,15 @@ def _at(units: Units, kept: Kept) -> float | None:
     return None if kept.frequency is None else kept.frequency / units.frequency
 
 
-def _active(units: Units, plants: Plants, number: int, kept: Kept) -> ActivePlant:
-    named = _named(plants, plants.batch.thetas[number - 1]) if number > 0 else None
-    return ActivePlant(number, kept.share, _at(units, kept), named)
-
-
-def _searched(units: Units, plants: Plants) -> SearchedPlant | None:
+def _searched(units: Units, plants: Plants) -> parts.SearchedPlant | None:
     """Return the worst plant that was found, which is no proof that there is no worse one."""
     found = plants.searched
     if found is None:
         return None
-    plant = None if plants.at is None else plants.at(found.theta)
-    floor = None if plant is None else floor_of(plant)
-    lost = floor is not None and floor.lost
-    return SearchedPlant(
+    plant, floor = None if plants.at is None else plants.at(found.theta), None
+    if plant is not None:
+        floor = Floor.at([make(plant.experiment) for make in (*plant.requirements, *plant.side)])
+    return parts.SearchedPlant(
         proved=False,
         region=found.region,
         share=found.kept.share,
@@ -232,22 +295,9 @@ def _searched(units: Units, plants: Plants) -> SearchedPlant | None:
         added=found.added,
         tried=found.tried,
         frequency=_at(units, found.kept),
-        lost=lost or None,
-        peak=floor.peak if lost and floor is not None else None,
+        lost=None if floor is None else floor.lost or None,
+        peak=None if floor is None else floor.peak,
     )
-
-
-def _risk(plants: Plants, support: int, kept: int) -> Risk | None:
-    """Return shares of plants that may be missed.
-
-    If some were left out, or searched, the theory is silent, and fresh draws count.
-    """
-    drawn = len(plants.batch.plants)
-    if kept < drawn or (plants.searched is not None and plants.searched.added):
-        return None
-    beta = 1.0 - CONFIDENCE
-    before = None if plants.unknowns is None else risk_before(drawn, beta, plants.unknowns)
-    return Risk(CONFIDENCE, risk_after(drawn, beta, support), before)
 
 
 def fresh_plants(
@@ -255,12 +305,10 @@ def fresh_plants(
     try_on: Callable[[Batch, float], Sequence[Tried]],
     peak: Peak | None = None,
     promised: float | None = None,
-) -> tuple[FreshPlants | None, list[Finding]]:
+) -> tuple[parts.FreshPlants | None, list[Finding]]:
     """Return how many of other plants from the same distribution are missed, as far as there is time.
 
-    Args:
-        try_on: what they keep; a share up to the number may be returned as 0.
-        promised: the cost that a design promises at every plant.
+    In `try_on` a share up to the number may come out as 0; `promised` is a cost at every plant.
     """
     if plants.afresh is None:
         return None, []
@@ -272,7 +320,7 @@ def fresh_plants(
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
         tried += (one.kept for one in at_each)
-        floors += (floor_at(one.asked) for one in at_each)
+        floors += (Floor.at(one.asked) for one in at_each)
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
@@ -282,7 +330,7 @@ def fresh_plants(
     less = np.array([one.share for one in tried]) > MET
     dearer = np.array([promised is not None and one.cost > MET * promised for one in tried])
     missed = int(np.sum(less | dearer))
-    found = FreshPlants(
+    found = parts.FreshPlants(
         draws=len(tried),
         rejected=rejected,
         missed=missed,
@@ -291,18 +339,15 @@ def fresh_plants(
         largest=largest,
         raised=sum(floor.raised for floor in floors) or None,
         lost=sum(floor.lost for floor in floors) or None,
-        beyond_limits=BeyondLimits(sum(one > MET for one in peaks), max(peaks)) if peaks else None,
+        beyond_limits=parts.BeyondLimits(sum(one > MET for one in peaks), max(peaks)) if peaks else None,
         less=None if promised is None else int(np.sum(less)),
         dearer=None if promised is None else int(np.sum(dearer)),
     )
     return found, fewer
 
 
-def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnEstimates | None:
-    """Return how near the best accuracy comes to being missed at estimates of the plants that bind.
-
-    Data are judged at their estimate, so that some are drawn.
-    """
+def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.DrawnEstimates | None:
+    """Return how near estimates from data of the plants that bind come to missing the best accuracy."""
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
         return None
@@ -319,31 +364,14 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnE
     except IdesignError:  # no time is left, or what is asked cannot be asked of this plant
         return None
     highest = float(np.quantile(shares, _MOST_OF_THEM, method="higher"))
-    return DrawnEstimates(len(shares), _MOST_OF_THEM, highest) if np.isfinite(highest) else None
-
-
-def _scenario_table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
-    """Return scenarios.csv: the plants that count, with their parameters."""
-    listed = [place for place, number in enumerate(numbers) if number > 0]
-    columns: dict[str, Array] = {
-        "scenario": np.array([numbers[place] for place in listed], dtype=float),
-        "share": np.array([at_each[place].share for place in listed]),
-    }
-    where = np.array([_at(units, at_each[place]) for place in listed], dtype=float)
-    if not np.any(np.isnan(where)):
-        columns[units.frequency_header] = where
-    chosen = plants.batch.thetas[[numbers[place] - 1 for place in listed]]
-    return Table(columns | dict(zip(plants.names, chosen.T, strict=True)))
+    return parts.DrawnEstimates(len(shares), _MOST_OF_THEM, highest) if np.isfinite(highest) else None
 
 
 def fan_curves(
     done: Designed, numbers: Sequence[int], active: Sequence[int]
 ) -> tuple[Table, FanCurves] | None:
-    """Return fan.csv and its figure: r_u / r_adm at the plant of the spec, the largest, and at active ones.
-
-    None if no model error is bounded.
-    """
-    problem, units = done.problem, done.units
+    """Return fan.csv and its figure, r_u / r_adm over the plants; None if no model error is bounded."""
+    problem, units = done.problem, done.header.units
     bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]
     if not bounded[0]:
         return None
@@ -352,17 +380,13 @@ def fan_curves(
     lo, hi = bounded[0][0].band
     w = axis(lo, hi, np.concatenate([np.clip(peaks, lo, hi), grid[:: max(grid.size // _GRID_POINTS, 1)]]))
     informations = delivered(problem, done.design, done.experiment.samples)
-    ratios = np.array([_largest(errors, M, w) for errors, M in zip(bounded, informations, strict=True)])
+    at_each = zip(bounded, informations, strict=True)
+    ratios = np.array([np.max([error.ratios(M, w) for error in errors], axis=0) for errors, M in at_each])
     named = {f"plant {numbers[place]}": ratios[place] for place in active if place > 0}
     frequency = w / units.frequency
     columns = {units.frequency_header: frequency, "nominal": ratios[0], "largest": ratios.max(axis=0)}
     columns |= {name.replace(" ", "_"): values for name, values in named.items()}
     return Table(columns), FanCurves(frequency, ratios[1:], ratios[0], named)
-
-
-def _largest(errors: Sequence[OnModelError], information: Array, w: Array) -> Array:
-    """Return (n,): the largest ratio of several entries of G."""
-    return np.max([error.ratios(information, w) for error in errors], axis=0)
 
 
 @dataclass(frozen=True)
@@ -399,14 +423,10 @@ def kept_of(requirements: Sequence[Requirement], information: Array) -> Kept:
 
 
 def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, units: Units) -> RobustResult:
-    """Return what the excitation keeps at the plants of `uncertainty`.
+    """Return what the excitation keeps at the plants of `uncertainty`, the worst left out as far as allowed.
 
-    Args:
-        plants: all but the plant of the spec. The worst are left out, as many as may be discarded.
-        nominal: what it keeps at the plant of the spec, whose parameters are `centre` (k,).
-
-    Raises:
-        SpecError: `not-exciting` if parameters of a plant are undetermined.
+    The plant of the spec has parameters `centre` (k,) and keeps `nominal`. It raises `SpecError` (`not-
+    exciting`).
     """
     batch = plants.batch
     tried = at.on_each(batch)
@@ -417,9 +437,8 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
     looked_at = list(at_each)
     if plants.region is not None:
         starts = [centre, *(batch.thetas[place] for place in reversed(rising))]
-        found = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
-        sought = Searched(plants.region.name, found.theta, found.kept, found.tried, added=0)
-        plants, looked_at = replace(plants, searched=sought), [*looked_at, found.kept]
+        found, _ = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
+        plants, looked_at = replace(plants, searched=found), [*looked_at, found.kept]
     if not all(np.isfinite(one.share) for one in looked_at):
         raise bad_spec(
             "not-exciting",
@@ -428,7 +447,7 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
             key="uncertainty",
         )
     binding = [int(np.argmax([one.share for one in at_each]))]
-    floors = [floor_at(tried[place].asked) for place in kept]
+    floors = [Floor.at(tried[place].asked) for place in kept]
     found_there = plants_kept(units, plants, kept, at_each, binding, floors)
     fresh, fewer = fresh_plants(plants, at.on_each)
     missed = sum(one.share > MET for one in looked_at)

@@ -236,10 +236,7 @@ class ConvexTask(SpectrumTask):
 
 
 def _known(done: Designed, record: Record | None, step: float, *, own_length: bool = True) -> Array | None:
-    """Return the information (k, k) of the record, or of its spectrum over the length of the design.
-
-    None if it leaves a parameter undetermined.
-    """
+    """Return the information (k, k) of the record, or of its spectrum over the designed length, if any."""
     if record is None or not np.isfinite(record.worst_ratio):
         return None
     plant = FiniteRecord(done.experiment, len(record.samples), step)

@@ -30,7 +30,7 @@ from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.robust import Plants, delivered_samples, without_dearest
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.outcome import Answer, Designed
-from inputdesign_cli.questions.least_cost.worst_case import with_worst_plants
+from inputdesign_cli.questions.least_cost.robust_outcome import with_worst_plants
 from inputdesign_cli.spectrum import PolynomialBasis, flat_basis, hvec, svec
 
 # The second frequency of a grid that begins at zero, as a share of the last.
@@ -116,17 +116,10 @@ class FewColumns:
 class Sought:
     """What is asked of a design, and how it is found.
 
-    Attributes:
-        question: in it the experiment has one sample if the length is sought.
-        alpha: sizes the confidence region of r_u; `exact` calibrates it.
-        exact: None for the alpha as stated.
-        most_samples: the longest experiment allowed.
-        plants: that the design is for, beside the plant of the spec.
-        tolerance: the relative gap that is proved.
-        any_spectrum_tolerance: of the bound over every spectrum; None leaves it out.
-        grid: the program of the papers in place of the exchange.
-        columns: a factor of few columns, see `FewColumns`.
-        windows: the longest windows of the bound over all records within an amplitude; 0 leaves it out.
+    The experiment of the question has one sample if the length is sought. `exact` calibrates `alpha`;
+    `plants` are those beside the plant of the spec. `tolerance` is the relative gap that is proved, and
+    `any_spectrum_tolerance` that of the bound over every spectrum (None: none). `grid` replaces the exchange.
+    `windows` are the longest of the bound over all records within an amplitude; 0 leaves it out.
     """
 
     header: Header
@@ -147,9 +140,7 @@ class Sought:
     def designed(self, request: RecordRequest) -> Designed:
         """Return the design with its experiment, its status and what the solver did.
 
-        Raises:
-            InfeasibleError: nothing within the limits meets the requirements.
-            InaccurateError: the proof did not close, or nothing that meets everything was found in time.
+        It raises `InfeasibleError`, or `InaccurateError` where the proof did not close in time.
         """
         if self.exact is not None:
             return self.exact.designed(self._designed, request)
@@ -221,11 +212,7 @@ class Sought:
         return Answer(design, "nothing_needed" if found.objective == 0.0 else status, solver)
 
     def check_length(self, done: Designed, *, of_record: bool) -> None:
-        """Raise `InfeasibleError` (`too-long`) if the shortest experiment is longer than limits.samples.
-
-        Args:
-            of_record: whether single samples are limited, so that a record may take more.
-        """
+        """Raise `InfeasibleError` (`too-long`) if the shortest experiment is longer than limits.samples."""
         most, takes = self.most_samples, done.experiment.samples
         if self.question.goal != "samples" or most is None or takes <= most:
             return

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Protocol, cast
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.loop_error import (
     ControlLaw,
     InternalModel,
@@ -15,29 +17,19 @@ from inputdesign_cli.design.loop_error import (
     MatrixPlant,
     MinimumVariance,
     ModelReference,
-    PowerLimit,
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries
-from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
+from inputdesign_cli.plant.polynomial import all_roots, roots_in_z
+from inputdesign_cli.questions.building import system
 from inputdesign_cli.questions.building.demand import check_effects, check_model, check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
 from inputdesign_cli.questions.building.signal_settings import build_bounds
-from inputdesign_cli.questions.building.system import (
-    bare_experiment,
-    build_cost,
-    build_model,
-    held_plant,
-    per_output,
-    polynomial_model,
-    state_space_model,
-)
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
-from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms
 from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorSignalSettings, LoopErrorTask, LossTrial
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant
@@ -45,6 +37,7 @@ from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.specification.plugins import added
 from inputdesign_cli.specification.transfer_of_states import transfer_functions
 
+_refuse = partial(refuse, who="a design for the closed-loop error")
 _GRID = 512
 _CANDIDATES = 20
 # A pole this near to z = 1, or this near to the unit circle.
@@ -52,13 +45,11 @@ _INTEGRATES = 1e-7
 
 
 def estimated_model(spec: Spec) -> Model | None:
-    """Return the model in the estimated parameters; None if they are all coefficients of a plant in q^-1.
+    """Return the model in the estimated parameters, or raise `SpecError` (`nothing-to-estimate`).
 
-    Raises:
-        SpecError: `nothing-to-estimate` where the plant is known; see `build_model`, `check_model` and
-            `check_effects`.
+    None if they are all coefficients of a plant in q^-1.
     """
-    model = build_model(spec)
+    model = system.build_model(spec)
     check_model(spec, model)
     if not np.any(model.in_plant):
         raise spec.complain(
@@ -67,7 +58,7 @@ def estimated_model(spec: Spec) -> Model | None:
             hint="take those out of known that the experiment is to find",
             key="plant.known",
         )
-    check_effects(spec, bare_experiment(spec, model))
+    check_effects(spec, system.bare_experiment(spec, model))
     match spec.plant:
         case PolynomialPlant(parameters=None, known=None) if not spec.noise.known:
             return None
@@ -75,50 +66,26 @@ def estimated_model(spec: Spec) -> Model | None:
 
 
 def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
-    """Return the matrix of polynomials of `plant` or of the true system `simulation.plant`.
-
-    Raises:
-        SpecError: `not-supported`; `inaccurate-conversion` of states.
-    """
+    """Return the polynomials of `plant` or of the true system, or raise `SpecError` (`not-supported`)."""
     if noise.variance is None:
-        raise bad_spec(
-            "not-supported",
-            "this version takes the noise of this simulation as a variance",
-            hint="write variance in place of relative_std",
-            key="simulation.noise",
-        )
-    drifting = [d for d in per_output(noise.D) if np.any(np.abs(roots_in_z(d)) > 1.0 - _INTEGRATES)]
+        raise _refuse("simulation.noise", "take relative noise", "write variance in place of relative_std")
+    drifting = [d for d in system.per_output(noise.D) if np.any(np.abs(roots_in_z(d)) > 1.0 - _INTEGRATES)]
     if any(noise.drifts) or drifting:
-        raise bad_spec(
-            "not-supported",
-            "closed_loop_error is the mean square of a loop whose noise is stationary, and noise that drifts "
-            "is not",
-            hint="write a root of D inside the unit circle, or state the accuracy as model_error",
-            key="noise.D" if drifting else "noise.drift",
-        )
+        hint = "write a root of D inside the unit circle, or state the accuracy as model_error"
+        raise _refuse("noise.D" if drifting else "noise.drift", "take noise that drifts", hint)
     if plant.kind == "continuous" and plant.sampled:
-        plant = held_plant(plant, spec.sample_time)
+        plant = system.held_plant(plant, spec.sample_time)
     if plant.kind == "state_space":
         channels = _of_states(spec, plant, noise, key)
     elif plant.kind == "polynomial":
-        channels = polynomial_model(plant, noise, noise.covariance(plant.outputs))
+        channels = system.polynomial_model(plant, noise, noise.covariance(plant.outputs))
     else:
-        raise bad_spec(
-            "not-supported",
-            "this version designs for the closed-loop error of sampled plants only",
-            hint="add sample: zoh to a continuous-time plant",
-            key=key,
-        )
+        raise _refuse(key, "take a plant that is not sampled", "add sample: zoh to a continuous-time plant")
     made = MatrixPlant.of(channels)
-    poles = join_roots(roots_in_z(part) for part in (*made.A, *(f for row in made.F for f in row)))
+    poles = all_roots([*made.A, *(f for row in made.F for f in row)])
     if np.any(np.abs(poles - 1.0) < _INTEGRATES):
-        raise bad_spec(
-            "not-supported",
-            "closed_loop_error takes an experiment in open loop with stationary outputs, and the outputs of "
-            "a plant that integrates are not",
-            hint="move the pole into the unit circle, or state the accuracy as model_error",
-            key=key,
-        )
+        hint = "move the pole into the unit circle, or state the accuracy as model_error"
+        raise _refuse(key, "take a plant that integrates, whose outputs are not stationary", hint)
     return made
 
 
@@ -126,8 +93,8 @@ def _of_states(
     spec: Spec, plant: StateSpacePlant, noise: Noise | SimulationNoise, key: str
 ) -> PolynomialModel:
     """Return a model with G entry by entry, and H by the gain K or by C and D."""
-    model = state_space_model(spec, plant, noise.covariance(plant.outputs))
-    C, D = per_output(noise.C), per_output(noise.D)
+    model = system.state_space_model(spec, plant, noise.covariance(plant.outputs))
+    C, D = system.per_output(noise.C), system.per_output(noise.D)
     step = model.sample_time or 0.0
     # Whole samples of the dead time need no states.
     late = model.matrices._replace(delay=model.matrices.delay - model.lag * step)
@@ -136,13 +103,11 @@ def _of_states(
         identity = np.eye(model.outputs)
         above, below = _in_delays(model.held[0], model.matrices.K, model.matrices.C, identity, lag=0)
         if any(np.any(entry) for i, row in enumerate(above) for j, entry in enumerate(row) if i != j):
-            raise bad_spec(
-                "not-supported",
-                "this version designs for the closed-loop error of outputs with noise of their own, and K "
-                "takes that of one to others",
-                hint="write C and D of the noise in place of K",
-                key=f"{key}.state_space.K",
+            what, hint = (
+                "take noise that K leads to other outputs",
+                "write C and D of the noise in place of K",
             )
+            raise _refuse(f"{key}.state_space.K", what, hint)
         C, D = (tuple(rows[i][i] for i in range(model.outputs)) for rows in (above, below))
     return PolynomialModel(B, (np.ones(1),), F, C, D, model.covariance)
 
@@ -165,13 +130,7 @@ class AddedLaw(Protocol):
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
-    """Build the task, and refuse what cannot be designed.
-
-    Faults of the simulation alone are reported by `simulate`.
-
-    Raises:
-        SpecError: what this version does not design, and the diagnostics of `ControlLaw.check`.
-    """
+    """Return the task and refuse what cannot be designed; `simulate` reports faults of its section alone."""
     error = spec.accuracy.closed_loop_error
     assert error is not None
     _check_supported(spec)
@@ -181,26 +140,36 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     law.check(plant, key=f"{KEY}.control.{name}")
     coloured = error.reference.filter
     lo, hi = spec.clip_band(spec.limits.band)
+    stated = sorted(build_power_limits(spec), key=lambda one: one.kind == "output")
     problem = LoopErrorProblem(
         plant=plant,
         estimated=estimated_model(spec),
         law=law,
-        limits=_limits(spec),
+        limits=tuple(
+            PowerLimit(
+                "input" if one.kind == "excitation" else one.kind,  # in open loop they are the same
+                one.bound,
+                channel=one.channel or 0 if one.implied else one.channel,
+            )
+            for one in (*stated, *implied_limits(spec))
+        ),
         reference_variance=np.asarray(error.reference.variance) * np.ones(plant.outputs),
         reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
     )
     spectrum = spec.spectrum
-    terms = LoopErrorTerms(
+    return LoopErrorTask(
+        problem=problem,
         header=build_header(spec),
         law=name,
         covariance=error.covariance,
         samples=spec.experiment.samples,
         tolerance=spec.solver.tolerance,
-        cost=build_cost(spec),
+        cost=system.build_cost(spec),
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
+        signal=_signal(spec, error, plant.inputs),
+        trial=_trial(spec, error, problem),
     )
-    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, error, problem))
 
 
 def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tuple[str, ControlLaw]:
@@ -234,30 +203,13 @@ def _transfer(spec: Spec, transfer: Transfer) -> Rational:
     return rational(transfer) if transfer.kind == "discrete" else held(transfer, spec.sample_time)
 
 
-def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
-    """Return the limits on powers; in open loop the excitation is the input."""
-    stated = sorted(build_power_limits(spec), key=lambda one: one.kind == "output")
-    return tuple(
-        PowerLimit(
-            "input" if one.kind == "excitation" else one.kind,
-            one.bound,
-            one.channel or 0 if one.implied else one.channel,
-        )
-        for one in (*stated, *implied_limits(spec))
-    )
-
-
 def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalSettings:
     check_record(spec, inputs**2)
     signal, samples = spec.signal, spec.signal_samples
     filtered = signal.type == "filtered_noise"
     if filtered and error.covariance == "parametric":
-        raise bad_spec(
-            "not-supported",
-            "this version makes multisines of a parametric design, which consists of lines",
-            hint="write type: multisine, or covariance: asymptotic",
-            key="signal.type",
-        )
+        what, hint = "filter noise to the lines of a parametric design", "write type: multisine"
+        raise _refuse("signal.type", what, f"{hint}, or covariance: asymptotic")
     if not filtered and signal.periods is not None and samples % signal.periods:
         raise bad_spec(
             "conflicting-keys",

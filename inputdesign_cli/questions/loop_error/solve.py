@@ -3,44 +3,240 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
+from inputdesign_cli import outcome as out
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
+from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of
+from inputdesign_cli.design.loop_error.parametric import LossTheory, ParametricCriterion, loss_theory
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.simulated_runs import unstable_runs
 from inputdesign_cli.identification.polynomial_rows import is_arx
-from inputdesign_cli.monte_carlo.loop_error import study_losses
+from inputdesign_cli.information import PowerKind
+from inputdesign_cli.monte_carlo.loop_error import LossStudy, study_losses
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.outcome import Signal, Simulation
-from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.questions.common.delivery import results_of, timing, with_study
-from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
-from inputdesign_cli.questions.loop_error.outcome import (
-    LoopErrorTerms,
-    design_outcome,
-    loss_results,
-    spectrum_results,
+from inputdesign_cli.outcome.curves import Curves, DirectionCurves, LossCurves, SpectrumCurves
+from inputdesign_cli.outcome.design import ActivePower, LossMoments, TheoreticalLoss
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
+from inputdesign_cli.questions.common.delivery import (
+    check_claims,
+    of_bounds,
+    proof_status,
+    results_of,
+    timing,
+    with_study,
 )
+from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
+from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.signal.limits import Bounds
 from inputdesign_cli.signal.lines import Lines, grid_lines
 from inputdesign_cli.signal.periodic import even_multisine, harmonics, periodogram
 from inputdesign_cli.signal.rational import rational_filter
 from inputdesign_cli.signal.spectral_factor import matrix_factor
 
+# Frequencies of the plots, and what share of the band they reach down to.
+_POINTS = 800
+_LOWEST = 1e-3
+
+
 KEY = "accuracy.closed_loop_error"
+
+
+def design_outcome(
+    task: LoopErrorTask, design: LoopErrorDesign, signal: out.Signal, timing: dict[str, float]
+) -> out.Outcome:
+    """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
+    samples, white = task.samples, design.white
+    lo, hi = (edge / task.header.units.sample_time for edge in design.problem.band)
+    informations = {"design": design.information, "white": white.information}
+    theories = {name: loss_theory(design.criterion, M) for name, M in informations.items()}
+    inputs, outputs = (np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance))
+    # White noise of the same total power; in open loop the excitation is the input.
+    G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
+    even = [white.level * float(weights.sum())] * design.problem.plant.inputs
+    caused = white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
+    details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
+    objective = out.Objective(
+        "closed_loop_error",
+        design.value,
+        lower_bound=design.lower_bound,
+        relative_gap=design.gap,
+        any_spectrum_bound=design.lower_bound,
+    )
+    check_claims(of_bounds(objective, task.tolerance), "rescale the signals, or restrict the band")
+    return out.Outcome(
+        title=task.header.title,
+        status=proof_status(design.gap, task.tolerance),
+        objective=objective,
+        cost=weighted_sum(task.cost, {"input": inputs, "output": outputs, "excitation": inputs}),
+        samples=samples,
+        power=out.Powers(tuple(inputs), tuple(outputs), tuple(inputs)),
+        closed_loop_error=out.ClosedLoopError(
+            law=task.law,
+            covariance=task.covariance,
+            expected=design.value / samples,
+            band=(lo, hi),
+            noise_model_part=design.noise_part,
+            parametric={name: theory_of(theory) for name, theory in theories.items()},
+            limits=_limits(design),
+        ),
+        information=out.Information(
+            design.problem.structure.names,
+            samples * design.information,
+            np.linalg.inv(design.information) / samples,
+        ),
+        spectrum=_spectrum(task, design),
+        baseline=out.Baseline(
+            out.White(
+                value=white.value,
+                ratio=white.value / design.value,
+                power=out.Powers(tuple(even), tuple(caused.tolist()), tuple(even)),
+            )
+        ),
+        signal=signal,
+        solver=out.Solver("exchange" if design.of_lines else "dual", task.tolerance, details=details),
+        timing_s=timing,
+    )
+
+
+def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
+    multipliers = [None] * len(design.powers) if design.multipliers is None else design.multipliers.tolist()
+    return tuple(
+        ActivePower(
+            limit.kind,
+            limit.bound,
+            float(power),
+            channel=None if limit.channel is None else limit.channel + 1,
+            multiplier=multiplier,
+        )
+        for limit, power, multiplier in zip(design.problem.limits, design.powers, multipliers, strict=True)
+    )
+
+
+def spectrum_results(
+    task: LoopErrorTask, design: LoopErrorDesign
+) -> tuple[dict[str, Table], dict[str, Curves]]:
+    """Return spectrum.csv on the grid that the spec asks for, and the figures."""
+    units, (lo, hi) = task.header.units, design.problem.band
+    if design.of_lines:
+        w, Phi, white = design.frequencies, design.spectrum, None
+        shown, drawn = w, Phi
+    else:
+        w, white = np.linspace(lo, hi, task.grid), design.white.level
+        Phi = design.density(w)
+        shown = np.geomspace(max(lo, _LOWEST * hi), hi, _POINTS)
+        drawn = design.density(shown)
+    table = Table({units.frequency_header: w / units.frequency, **hermitian_columns(Phi, "phi")})
+    _, gains, right = np.linalg.svd(design.problem.plant.plant_at(shown))
+    directions = adjoint(right)
+    power = np.einsum("kai,kab,kbi->ki", np.conj(directions), drawn, directions).real
+    frequency, lines = shown / units.frequency, design.of_lines
+    return {"spectrum": table}, {
+        "spectrum": SpectrumCurves(frequency, drawn, white=white, lines=lines),
+        "directions": DirectionCurves(frequency, gains, power, white=white, lines=lines),
+    }
+
+
+def theory_of(theory: LossTheory) -> TheoreticalLoss:
+    """Return N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
+    return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
+
+
+def _spectrum(task: LoopErrorTask, design: LoopErrorDesign) -> out.Spectrum:
+    unit, problem = task.header.units.frequency, design.problem
+    if design.of_lines:
+        lines = {"frequencies": design.frequencies / unit, "masses": design.spectrum}
+        return out.Spectrum("multisine", lines)
+
+    def trace(w: Array) -> Array:
+        return np.asarray(np.trace(design.density(w), axis1=1, axis2=2).real)
+
+    def at(w: float) -> dict[str, object]:
+        matrix = design.density(np.array([w]))[0]
+        return {
+            "frequency": w / unit,
+            "trace": float(np.trace(matrix).real),
+            "matrix": _tidy(matrix),
+            "eigenvalues": np.linalg.eigvalsh(matrix),
+        }
+
+    lo, hi = problem.band
+    grid = graded_grid(problem.plant.singularities, lo, hi)
+    peaks, heights = local_maxima(trace, grid, trace(grid))
+    shown = {"peak": float(peaks[np.argmax(heights)]), "lowest": lo, "highest": hi}
+    # C S Phi_r (C S)^* at the lowest frequency, the input of the loop there, and its matrix root.
+    w = np.array([lo])
+    applied = np.linalg.inv(problem.plant.plant_at(w)) @ problem.law.complementary(w)
+    matrix = applied @ (problem.entering(w) - problem.plant.disturbance_at(w)) @ adjoint(applied)
+    loop_input = {
+        "matrix": _tidy(matrix[0]),
+        "root": _tidy(power_of(matrix, 0.5)[0]),
+        "root_eigenvalues": np.sqrt(np.maximum(np.linalg.eigvalsh(matrix[0]), 0.0)),
+    }
+    details = {"grid": task.grid, **{name: at(w) for name, w in shown.items()}, "loop_input": loop_input}
+    return out.Spectrum("pointwise", details)
+
+
+def _tidy(matrix: ComplexArray) -> Array | ComplexArray:
+    """Return a matrix that is real up to rounding as a real one."""
+    return matrix.real if np.abs(matrix.imag).max() <= 1e-13 * np.abs(matrix).max() else matrix
+
+
+def loss_results(
+    criterion: ParametricCriterion,
+    studies: Mapping[str, LossStudy],
+    inputs: Mapping[str, Lines],
+    samples: int,
+) -> tuple[dict[str, TriedInput], Improvement | None, dict[str, Curves]]:
+    """Return what each input gave, the improvement over white noise, and the histogram where runs count."""
+    theory, entries = {}, {}
+    for name, lines in inputs.items():
+        information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
+        theory[name], study = loss_theory(criterion, information), studies[name]
+        several, counted = len(study.estimates) > 1, study.loss.size > 1
+        entries[name] = TriedInput(
+            theory=theory_of(theory[name]),
+            unstable=study.unstable,
+            mean_estimate=study.estimates.mean(axis=0),
+            power=tuple(np.ravel(study.power).tolist()),
+            covariance_eigenvalues=whitened_eigenvalues(study.estimates, samples * information)
+            if several
+            else None,
+            loss=_moments(study.loss) if counted else None,
+            squared=_moments(study.loss**2) if counted else None,
+            exact=ExactLoss(_moments(study.exact), _moments(study.exact**2)) if counted else None,
+        )
+    losses = {name: study.loss for name, study in studies.items() if study.loss.size > 1}
+    improvement = None
+    if {"design", "white"} <= losses.keys():
+        measured = 1 - float(losses["design"].mean() / losses["white"].mean())
+        improvement = Improvement(measured, 1 - theory["design"].mean / theory["white"].mean)
+    means = {name: theory[name].mean for name in losses}
+    return entries, improvement, {"loss": LossCurves(losses, means)} if losses else {}
+
+
+def _moments(values: Array) -> LossMoments:
+    sd = float(values.std(ddof=1))
+    return LossMoments(float(values.mean()), sd, sd / float(np.sqrt(values.size)))
 
 
 @dataclass(frozen=True)
 class LoopErrorSignalSettings:
-    """How the record is made.
+    """How the record is made: `filtered` from white noise, or a multisine of equal `periods`.
 
-    Attributes:
-        filtered: by a filter from white noise; otherwise it is a multisine of equal `periods`.
-        order: of a rational filter, states for each input; None: a filter of taps.
+    A rational filter has `order` states for each input; None: a filter of taps.
     """
 
     samples: int
@@ -54,8 +250,14 @@ class LoopErrorSignalSettings:
 
 def realise(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> tuple[Array, Signal]:
     """Return the best of several records (N, n) by the error that it gives, scaled into the limits."""
-    make, residual, details = (_by_filter if settings.filtered else _by_multisine)(design, settings)
-    w = harmonics(settings.samples)
+    samples, periods = settings.samples, settings.periods
+    if settings.filtered:
+        make, residual, details = _by_filter(design, settings)
+    else:
+        lines = design_lines(design, samples // periods)
+        make = partial(even_multisine, lines, samples, periods=periods)
+        residual, details = None, {"periods": periods}
+    w = harmonics(samples)
     metrics = design.problem.metrics(w)
     best, value = None, np.inf
     for stream in np.random.SeedSequence(settings.seed).spawn(settings.candidates):
@@ -91,17 +293,10 @@ def white_lines(design: LoopErrorDesign, samples: int) -> Lines:
     return grid_lines(design.white_density(harmonics(samples)), samples, 1.0)
 
 
-# How a record is drawn, the residual of its spectral factor, and what else is reported of it.
-_Made = tuple[Callable[[np.random.Generator], Array], float | None, dict[str, object]]
-
-
-def _by_multisine(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> _Made:
-    samples, periods = settings.samples, settings.periods
-    lines = design_lines(design, samples // periods)
-    return lambda rng: even_multisine(lines, samples, rng, periods=periods), None, {"periods": periods}
-
-
-def _by_filter(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> _Made:
+def _by_filter(
+    design: LoopErrorDesign, settings: LoopErrorSignalSettings
+) -> tuple[Callable[[np.random.Generator], Array], float | None, dict[str, object]]:
+    """Return how a record is drawn, the residual of its spectral factor, and what else is reported of it."""
     samples, factor = settings.samples, matrix_factor(design.density)
     if settings.order is None:
         details: dict[str, object] = {"floor": factor.floor, "taps": int(factor.taps.shape[0])}
@@ -110,12 +305,11 @@ def _by_filter(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> _M
     wanted = float(np.trace(design.input_covariance))
     filter_ = filter_.scaled(float(np.sqrt(wanted / filter_.power().sum())))
     w, weights = design.frequencies, design.weights
-    M = design.criterion.information(w, filter_.spectrum(w), weights)
     found: dict[str, object] = {
         "floor": factor.floor,
         "order": filter_.order,
         "pole_radius": filter_.radius,
-        "filter_value": design.criterion.value(M),
+        "filter_value": design.criterion.value(design.criterion.information(w, filter_.spectrum(w), weights)),
         "filter": {"A": filter_.A, "B": filter_.B, "C": filter_.C, "D": filter_.D},
     }
     return lambda rng: filter_.filtered(samples, rng), factor.residual, found
@@ -133,10 +327,20 @@ class LossTrial:
 
 @dataclass(frozen=True)
 class LoopErrorTask:
-    """A design for the closed-loop error, and its study."""
+    """A design for the closed-loop error, and its study.
+
+    The `law` of control is called as in the spec, `grid` are the points of spectrum.csv, and the `covariance`
+    is that of a high model order, or exact for the model structure.
+    """
 
     problem: LoopErrorProblem
-    terms: LoopErrorTerms
+    header: Header
+    law: str
+    covariance: Literal["asymptotic", "parametric"]
+    samples: int
+    tolerance: float
+    cost: Mapping[PowerKind, Weight]
+    grid: int
     signal: LoopErrorSignalSettings
     trial: LossTrial
 
@@ -167,36 +371,30 @@ class LoopErrorTask:
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
         started = time.perf_counter()
-        design = design_loop_error(self.problem, self.terms.covariance, tolerance=self.terms.tolerance)
+        design = design_loop_error(self.problem, self.covariance, tolerance=self.tolerance)
         solved = time.perf_counter()
         samples, signal = realise(design, self.signal)
-        outcome = design_outcome(self.terms, design, signal, timing(started, solved))
-        tables, curves = spectrum_results(self.terms, design)
-        tables["signal"], curves["signal"] = signal_results(self.terms.header.units, samples)
-        return design, results_of(self.terms.header, outcome, tables, curves)
+        outcome = design_outcome(self, design, signal, timing(started, solved))
+        tables, curves = spectrum_results(self, design)
+        tables["signal"], curves["signal"] = signal_results(self.header.units, samples)
+        return design, results_of(self.header, outcome, tables, curves)
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
+    solve, key = "run idesign solve, which computes what theory expects", "plant"
     if true.law.desired is None:
-        raise bad_spec(
-            "not-supported",
-            "this version simulates model-reference and internal-model control only",
-            hint="run idesign solve, which computes what theory expects",
-            key=f"{KEY}.control.minimum_variance",
+        what, hint = "simulates model-reference and internal-model control only", solve
+        key = f"{KEY}.control.minimum_variance"
+    elif nominal.estimated is not None:
+        what = (
+            "identifies by least squares, which estimates every coefficient of a plant in q^-1: neither "
+            "named parameters nor coefficients in s, and none is known"
         )
-    if nominal.estimated is not None:
-        raise bad_spec(
-            "not-supported",
-            "this version identifies by least squares, which estimates every coefficient of a plant in q^-1: "
-            "neither named parameters nor coefficients in s, and none is known",
-            hint="run idesign solve, which computes what theory expects; or write A and B as numbers",
-            key="plant",
-        )
-    if not is_arx(true.plant):
-        raise bad_spec(
-            "not-supported",
-            "this version identifies by least squares, so the true system must be of the form A y = B u + e",
-            hint="write A and B only, and simulation.noise: {variance: ..}",
-            key="plant" if true.plant is nominal.plant else "simulation",
-        )
-    true.law.check(true.plant, key="simulation.plant")
+        hint = f"{solve}; or write A and B as numbers"
+    elif not is_arx(true.plant):
+        what = "identifies by least squares, so the true system must be of the form A y = B u + e"
+        hint = "write A and B only, and simulation.noise: {variance: ..}"
+        key = "plant" if true.plant is nominal.plant else "simulation"
+    else:
+        return true.law.check(true.plant, key="simulation.plant")
+    raise bad_spec("not-supported", f"this version {what}", hint=hint, key=key)

@@ -13,8 +13,7 @@ from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
-from inputdesign_cli.questions.regression.outcome import RegressionTerms
-from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, RegressorSettings
+from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
@@ -31,11 +30,7 @@ _refuse = partial(refuse, who="a regression design")
 
 
 def build_regression_task(spec: Spec) -> RegressionTask:
-    """Return the task; everything that can be wrong with its spec is reported here.
-
-    Raises:
-        SpecError: the spec asks for what a regression design does not do.
-    """
+    """Return the task; everything that can be wrong with its spec is reported here."""
     error, plant = spec.accuracy.mean_squared_error, spec.plant
     assert plant.kind == "regression"
     if error is None:
@@ -55,7 +50,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
             key=f"{KEY}.estimated",
         )
     spectrum, signal, solver = spec.spectrum, spec.signal, spec.solver
-    terms = RegressionTerms(
+    return RegressionTask(
         header=build_header(spec),
         regression=Regression(
             estimated=np.array(error.estimated, dtype=float),
@@ -67,14 +62,12 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         samples=spec.experiment.samples,
         target=error.target,
         energy=spec.limits.energy if error.target is None else None,
-    )
-    return RegressionTask(
-        terms=terms,
         alternating=solver.method == "alternating",
         tolerance=solver.tolerance if "tolerance" in solver.model_fields_set else _STRUCTURED_TOLERANCE,
-        signal=RegressorSettings(
-            spec.signal_samples, signal.periods, signal.start or "steady", signal.seed or 0
-        ),
+        record_samples=spec.signal_samples,
+        periods=signal.periods,
+        start=signal.start or "steady",
+        seed=signal.seed or 0,
         trial=_trial(spec),
     )
 
@@ -107,12 +100,8 @@ def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
     """Raise `SpecError` (`not-supported`) unless noise is white, as the theory takes it."""
     for name, polynomial in (("C", noise.C), ("D", noise.D)):
         if np.ravel(polynomial).tolist() != [1.0]:
-            raise bad_spec(
-                "not-supported",
-                "a regression design takes white noise",
-                hint=f"remove {key}.{name}; filter regressors and output with its inverse beforehand",
-                key=f"{key}.{name}",
-            )
+            hint = f"remove {key}.{name}; filter regressors and output with its inverse beforehand"
+            raise _refuse(f"{key}.{name}", "take coloured noise", hint)
 
 
 def _check_supported(spec: Spec) -> None:

@@ -3,62 +3,156 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz
+from inputdesign_cli.design import regression as theory
+from inputdesign_cli.design.regression import ErrorSplit, OutOfReachError, Regression, design_toeplitz
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
-from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
-from inputdesign_cli.outcome import Signal, Simulation, Solver
-from inputdesign_cli.outcome.curves import Curves, MomentsCurves
-from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.simulation import TriedInput
-from inputdesign_cli.questions.common.delivery import results_of, timing, with_study
-from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
-from inputdesign_cli.questions.regression.outcome import (
-    MomentsDesign,
-    RegressionTerms,
-    error_curves,
-    moments_outcome,
-    tried_regressors,
+from inputdesign_cli.monte_carlo.regression import (
+    Contender,
+    Estimates,
+    contending_regressors,
+    run_experiments,
 )
+from inputdesign_cli.outcome import Signal, Simulation, Solver
+from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.questions.common.delivery import (
+    check_claims,
+    of_bounds,
+    proof_status,
+    results_of,
+    timing,
+    with_study,
+)
+from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
 from inputdesign_cli.signal.moments import Start, delayed_regressors, free_regressors, periodic_input, rank
+
+_POINTS = 400
+
 
 KEY = "accuracy.mean_squared_error"
 
 
 @dataclass(frozen=True)
-class RegressorSettings:
-    """The length of the record, its number of equal periods (None: free), its past, and the seed."""
+class MomentsDesign:
+    """R with its proof: no R of the structure goes beyond the `bound`, within `tolerance` it is optimal.
 
-    samples: int
-    periods: int | None
-    start: Start
-    seed: int
+    Of one input `rho` are the autocorrelations (n,).
+    """
 
-    def period(self, least: int) -> int | None:
-        """Return the samples of a period, `least` or more; None if no periods are asked for.
+    R: Array
+    rho: Array | None
+    split: ErrorSplit
+    bound: float
+    tolerance: float
+    how: out.Solver
 
-        Raises:
-            SpecError: `bad-period`.
-        """
-        samples, periods = self.samples, self.periods
-        if periods is None:
-            return None
-        if samples % periods or samples // periods < least:
-            raise bad_spec(
-                "bad-period",
-                f"{samples} samples do not make {periods} equal periods of at least {least} samples",
-                hint=f"choose a divisor of {samples} up to {samples // least}, or change signal.samples",
-                key="signal.periods",
-            )
-        return samples // periods
+    @property
+    def energy(self) -> float:
+        """trace R."""
+        return float(np.trace(self.R))
+
+
+def moments_outcome(
+    task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
+) -> out.Outcome:
+    """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
+    regression, split, target, n = task.regression, design.split, task.target, task.regression.n
+    unit, white = regression.error(np.eye(n)), None
+    if target is not None:
+        kind, value, of = "least_cost", design.energy, "energy"
+        changes = theory.energy_sensitivity(regression, design.energy, target, split)
+        slack = target - unit.bias_squared
+        if slack > 0.0:  # white regressors can meet the target
+            energy = n * unit.variance / slack
+            white = out.White(cost=energy, ratio=energy / value)
+    else:
+        assert task.energy is not None
+        kind, value, of = "mean_squared_error", split.total, "mean_squared_error"
+        changes = theory.error_sensitivity(regression, design.energy, split)
+        error = regression.error(np.eye(n) * (task.energy / n)).total
+        white = out.White(mean_squared_error=error, ratio=error / value)
+    gap = abs(value - design.bound) / value
+    any_bound = task.free()[1] if task.toeplitz else design.bound
+    objective = out.Objective(
+        kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
+    )
+    check_claims(of_bounds(objective, design.tolerance), "rescale the regressors, or state the weights anew")
+    return out.Outcome(
+        title=task.header.title,
+        status=proof_status(gap, design.tolerance),
+        objective=objective,
+        cost=design.energy,
+        samples=task.samples,
+        mean_squared_error=out.MeanSquaredError(
+            split.total, split.bias_squared, split.variance, target, others=asdict(split)
+        ),
+        moments=out.Moments(
+            structure="toeplitz" if task.toeplitz else "free",
+            estimated=regression.m,
+            trace=design.energy,
+            R=design.R,
+            entries={f"R_{i + 1}_{j + 1}": float(design.R[i, j]) for i in range(n) for j in range(i, n)},
+            autocorrelations=design.rho,
+        ),
+        sensitivity=out.Sensitivity(
+            of,
+            changes.neglected_norm,
+            changes.noise_deviation,
+            target=None if target is None else changes.goal,
+            energy=changes.goal if target is None else None,
+        ),
+        baseline=out.Baseline(white),
+        signal=signal,
+        solver=design.how,
+        timing_s=timing,
+    )
+
+
+def error_curves(task: RegressionTask, design: MomentsDesign) -> ErrorCurves:
+    """Return squared bias and variance over the energy, beside the error of white regressors."""
+    regression = task.regression
+    energy = design.energy * np.geomspace(0.1, 10.0, _POINTS)
+    white = regression.error(np.eye(regression.n) / regression.n)
+    return ErrorCurves(
+        energy=energy,
+        bias_squared=np.full(_POINTS, design.split.bias_squared),
+        variance=design.split.variance * design.energy / energy,
+        white=white.bias_squared + white.variance / energy,
+        design=(design.energy, design.split.total),
+        target=task.target,
+    )
+
+
+def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Estimates) -> TriedInput:
+    """Return means with their standard errors, and the theory of these samples."""
+    squared = found.error**2
+    runs = squared.size
+    G, m = Phi.T @ Phi, regression.m
+    inverse = np.linalg.pinv(G[:m, :m], rcond=1e-12, hermitian=True)
+    mean = inverse @ G[:m] @ theta
+    bias = regression.estimated @ mean - regression.estimated @ theta[:m] - regression.neglected @ theta[m:]
+    variance = regression.variance * (regression.estimated @ inverse @ regression.estimated)
+    root, several = np.sqrt(runs), runs > 1
+    return TriedInput(
+        mse=float(squared.mean()),
+        mean_estimate=found.theta.mean(axis=0),
+        theory=TheoryOfError(float(bias**2 + variance), tuple(mean.tolist())),
+        energy=float(np.trace(G)),
+        mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
+        mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
+    )
 
 
 @dataclass(frozen=True)
@@ -74,34 +168,34 @@ class RegressorRecord:
     lines: tuple[Array, Array] | None = None
 
 
-def realise_regressors(
-    settings: RegressorSettings, regression: Regression, R: Array, rho: Array | None, target: float | None
-) -> RegressorRecord | None:
-    """Return the record that is asked for; None when it is too short for any.
+def realise_regressors(task: RegressionTask, design: MomentsDesign) -> RegressorRecord | None:
+    """Return the record with the moments summed over the samples; None when it is too short.
 
-    Args:
-        R: (n, n) moments summed over the samples.
-        rho: (n,) autocorrelations of one input, of which the regressors are delayed copies; None: free ones.
-        target: the error that is allowed, if the energy is what counts.
-
-    Raises:
-        SpecError: `bad-period` when signal.periods does not fit.
+    Regressors are free, or delayed copies of one input. It raises `SpecError` (`bad-period`).
     """
-    samples, least = settings.samples, rank(R) if rho is None else regression.n
+    regression, R, rho = task.regression, design.R, design.rho
+    samples, least, periods = task.record_samples, rank(R) if rho is None else regression.n, task.periods
     if samples < least:
         return None
-    period, details, lines = settings.period(least), dict[str, object](), None
+    if periods is not None and (samples % periods or samples // periods < least):
+        raise bad_spec(
+            "bad-period",
+            f"{samples} samples do not make {periods} equal periods of at least {least} samples",
+            hint=f"choose a divisor of {samples} up to {samples // least}, or change signal.samples",
+            key="signal.periods",
+        )
+    period, details, lines = samples // periods if periods else None, dict[str, object](), None
     if rho is None:
         period = period or (least if samples % least == 0 else samples)
         Phi = channels = free_regressors(R, samples, period)
     else:
         period = period or samples
-        found = design_periodic(regression, rho, float(np.trace(R)), period, target=target)
+        found = design_periodic(regression, rho, float(np.trace(R)), period, target=task.target)
         power = found.energy / (least * samples)
-        u = periodic_input(found.shares, power, samples, period, np.random.default_rng(settings.seed))
-        Phi, channels = delayed_regressors(u, least, settings.start), u[:, None]
+        u = periodic_input(found.shares, power, samples, period, np.random.default_rng(task.seed))
+        Phi, channels = delayed_regressors(u, least, task.start), u[:, None]
         at_rest = _attained(regression, delayed_regressors(u, least, "zero"), R)
-        details = {"start": settings.start, "on_grid": found.exact, "from_rest": at_rest}
+        details = {"start": task.start, "on_grid": found.exact, "from_rest": at_rest}
         used = np.flatnonzero(found.shares > 0.0)
         lines = 2.0 * np.pi * used / period, found.shares[used] * power
     attained = _attained(regression, Phi, R)
@@ -121,11 +215,7 @@ def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class RegressionTrial:
-    """The Monte Carlo study: the true parameters and the other inputs to try.
-
-    `variance` of the true noise, or its deviation relative to the output without noise, are None if they are
-    nominal.
-    """
+    """The study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
 
     theta: Array
     runs: int
@@ -134,25 +224,27 @@ class RegressionTrial:
     variance: float | None
     relative_std: float | None
 
-    def of(self, nominal: Regression, Phi: Array) -> Regression:
-        """Return the regression with the true variance of the noise, for regressors Phi (N, n)."""
-        variance = nominal.variance if self.variance is None else self.variance
-        if self.relative_std is not None:
-            variance = float(self.relative_std**2 * np.mean((Phi @ self.theta) ** 2))
-        return replace(nominal, variance=variance)
-
 
 @dataclass(frozen=True)
 class RegressionTask:
-    """A design of moments, and its study where the spec has the true parameters.
+    """The least energy for a `target` error, or the least error for an `energy`, trace R, and its study.
 
-    `alternating` and `tolerance` (the relative gap to be proved) concern Toeplitz moments.
+    Toeplitz moments belong to delayed copies of one input, and are proved to a relative gap of `tolerance`.
+    The record has a number of equal `periods` (None: free), and a past by `start`.
     """
 
-    terms: RegressionTerms
+    header: Header
+    regression: Regression
+    toeplitz: bool
+    samples: int
+    target: float | None
+    energy: float | None
     alternating: bool
     tolerance: float
-    signal: RegressorSettings
+    record_samples: int
+    periods: int | None
+    start: Start
+    seed: int
     trial: RegressionTrial | None
 
     def solve(self) -> Results:
@@ -173,11 +265,14 @@ class RegressionTask:
         if record is None:
             raise bad_spec(
                 "wrong-shape",
-                f"{self.signal.samples} samples are too few to realise these moments",
+                f"{self.record_samples} samples are too few to realise these moments",
                 hint="set experiment.samples",
                 key="experiment.samples",
             )
-        begun, regression = time.perf_counter(), trial.of(self.terms.regression, record.Phi)
+        begun, regression, variance = time.perf_counter(), self.regression, trial.variance
+        if trial.relative_std is not None:
+            variance = float(trial.relative_std**2 * np.mean((record.Phi @ trial.theta) ** 2))
+        regression = replace(regression, variance=regression.variance if variance is None else variance)
         seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
 
         def tried(Phi: Array, seed: np.random.SeedSequence) -> TriedInput:
@@ -191,24 +286,37 @@ class RegressionTask:
             Phi = contending_regressors(
                 name,
                 record.channels.shape,
-                delayed=regression.n if self.terms.toeplitz else None,
+                delayed=regression.n if self.toeplitz else None,
                 energy=float(np.sum(record.Phi**2)),
                 rng=np.random.default_rng(drawn),
             )
             inputs[name] = tried(Phi, noise)
         return with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
 
+    def free(self) -> tuple[Array, float]:
+        """Return the best moments R (n, n) of any structure, and the bound that proves them."""
+        if self.target is not None:
+            R = theory.least_energy(self.regression, self.target)
+            return R, theory.energy_bound(self.regression, self.target, R)
+        assert self.energy is not None
+        R = theory.least_error(self.regression, self.energy)
+        return R, theory.error_bound(self.regression, self.energy)
+
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
         started = time.perf_counter()
-        terms = self.terms
-        design = self._toeplitz() if terms.toeplitz else self._free()
+        if self.toeplitz:
+            design = self._toeplitz()
+        else:
+            R, bound = self.free()
+            split = self.regression.error(R)
+            design = MomentsDesign(R, None, split, bound, 1e-9, Solver("closed_form"))
         solved = time.perf_counter()
-        record = realise_regressors(self.signal, terms.regression, design.R, design.rho, terms.target)
+        record = realise_regressors(self, design)
         signal = None if record is None else record.signal
-        outcome = moments_outcome(terms, design, signal, timing(started, solved))
-        units, tables = terms.header.units, dict[str, Table]()
-        curves: dict[str, Curves] = {"error": error_curves(terms, design)}
-        moments = MomentsCurves(design.R, terms.regression.m)
+        outcome = moments_outcome(self, design, signal, timing(started, solved))
+        units, tables = self.header.units, dict[str, Table]()
+        curves: dict[str, Curves] = {"error": error_curves(self, design)}
+        moments = MomentsCurves(design.R, self.regression.m)
         if record is not None:
             tables["signal"], curves["signal"] = signal_results(units, record.channels)
             if record.lines is not None:
@@ -217,26 +325,21 @@ class RegressionTask:
                 nyquist = np.pi / units.sample_time
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
         curves["moments"] = moments
-        return record, results_of(terms.header, outcome, tables, curves)
-
-    def _free(self) -> MomentsDesign:
-        R, bound = self.terms.free()
-        return MomentsDesign(R, None, self.terms.regression.error(R), bound, 1e-9, Solver("closed_form"))
+        return record, results_of(self.header, outcome, tables, curves)
 
     def _toeplitz(self) -> MomentsDesign:
-        terms = self.terms
         try:
             found = design_toeplitz(
-                terms.regression,
-                target=terms.target,
-                energy=terms.energy,
+                self.regression,
+                target=self.target,
+                energy=self.energy,
                 tolerance=self.tolerance,
-                rng=np.random.default_rng(self.signal.seed),
+                rng=np.random.default_rng(self.seed),
                 alternating=self.alternating,
             )
         except OutOfReachError as error:
-            assert terms.target is not None
-            raise _out_of_reach(terms.regression, terms.target, error) from error
+            assert self.target is not None
+            raise _out_of_reach(self.regression, self.target, error) from error
         how: dict[str, object] = {"starts": found.starts, "solves": found.solves, "nodes": found.nodes}
         how |= {"assumed_smallest_eigenvalue": found.assumed} if found.assumed else {}
         method = "alternating" if self.alternating else "sequential_convex"
@@ -250,23 +353,19 @@ def _out_of_reach(
     """Return the error that no Toeplitz moments reach the target, as far as it is proved."""
     bias = error.bias * float(np.linalg.norm(regression.estimated))
     smallest, largest = (regression.neglected_norm * bias) ** 2, float(np.sqrt(target)) / bias
-    key, hint = (
-        f"{KEY}.target",
-        (
-            f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}; "
-            "or estimate more parameters"
-        ),
-    )
+    key, of = f"{KEY}.target", f"a mean-squared error of {target:.7g}"
+    hint = f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}"
+    hint += "; or estimate more parameters"
     if not error.proved:
         message = (
-            f"no Toeplitz moments were found that reach a mean-squared error of {target:.7g} (the least "
-            f"biased ones have {smallest:.7g} at any energy), nor was it proved that there are none"
+            f"no Toeplitz moments were found that reach {of} (the least biased ones have {smallest:.7g} at "
+            "any energy), nor was it proved that there are none"
         )
         return InaccurateError.because("target-undecided", message, hint=hint, key=key)
     unit = regression.n * regression.variance * float(np.sum(regression.estimated**2)) / target
     assumed = f" and R11 / r_0 with eigenvalues above {SMALLEST_EIGENVALUE:g}" if error.assumed else ""
     message = (
-        f"no Toeplitz moments reach a mean-squared error of {target:.7g} (proved for every energy up to "
-        f"{error.proved * unit:.3g}{assumed}): the bias alone is {smallest:.7g}"
+        f"no Toeplitz moments reach {of} (proved for every energy up to {error.proved * unit:.3g}{assumed}): "
+        f"the bias alone is {smallest:.7g}"
     )
     return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=key)

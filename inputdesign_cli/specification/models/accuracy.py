@@ -37,9 +37,7 @@ class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
     numerator: fields.Numerator | None = optional("Numerator of W in q^-1.")
     denominator: fields.Denominator | None = optional("Denominator of W (default 1), or its factors.")
     max_db: fields.Positive | None = optional("Largest |S| in dB; stands for a constant W.")
-    controller: Controller | None = optional(
-        "C of the loop to be kept (default: the controller of the experiment)."
-    )
+    controller: Controller | None = optional("C of the loop to be kept (default: experiment.controller).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """W is given as a whole."""
@@ -58,9 +56,7 @@ class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
 class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     """The probability that fixes r_u: of an ellipsoid of parameters, or of the error itself."""
 
-    ellipsoid: fields.Fraction | None = optional(
-        "Probability that fixes alpha by the chi-squared distribution."
-    )
+    ellipsoid: fields.Fraction | None = optional("Probability that fixes alpha by chi-squared.")
     exact: fields.Fraction | None = optional("Probability that |G(theta) - G| <= r_adm at all frequencies.")
     draws: Annotated[fields.Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
         default=4000,
@@ -68,8 +64,7 @@ class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     )
     runs: Annotated[fields.Index, SIZES["accuracy.model_error.confidence.runs"]] = Field(
         default=4000,
-        description="Simulated experiments that correct alpha for records this short, and as many that check "
-        "(0: none, asymptotic theory alone).",
+        description="Simulated experiments that correct alpha for short records, and as many that check.",
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -92,15 +87,13 @@ class ModelError(
     table: fields.FileName | None = optional("CSV file with columns frequency and r_adm.")
     sensitivity: Sensitivity | None = optional("r_adm from a bound on a sensitivity.")
     confidence: Annotated[Confidence, Shorthand("ellipsoid", _PROBABILITY)] | None = optional(
-        "Probability that fixes alpha by the chi-squared distribution (default 0.95), or "
-        "{exact: 0.95}: alpha calibrated by simulated estimates."
+        "Probability that fixes alpha by chi-squared, or {exact: 0.95}: by simulated estimates."
     )
     alpha: fields.Positive | None = optional("Size of the confidence region, in place of confidence.")
     band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
     weight: Transfer | None = optional("Weight on the model error (default 1).")
     norm: Literal["entry", "frobenius"] | None = optional(
-        "Of several channels: entry, each entry of G for itself (default), or frobenius, the "
-        "root of the sum of their squares (the only choice for sensitivity)."
+        "entry: each entry of G for itself (default); frobenius: of all together, as for sensitivity."
     )
     region: Literal["first_order", "ellipsoid"] = Field(
         default="first_order", description="first_order: linearised; ellipsoid: every model of the ellipsoid."
@@ -146,12 +139,8 @@ class InformationTarget(Section):
 class Application(Section):
     """Application-oriented accuracy: M >= (chi2 gamma / 2) V'', V the degradation of the application."""
 
-    parameters: fields.Names = Field(
-        description="Names of the parameters, in the order of the hessian's rows."
-    )
-    hessian: fields.SemidefiniteMatrix = Field(
-        description="V'' of the application cost at the nominal parameters."
-    )
+    parameters: fields.Names = Field(description="Names of the parameters, row by row.")
+    hessian: fields.SemidefiniteMatrix = Field(description="V'' of the application cost.")
     gamma: fields.Positive = Field(description="Accuracy: V may reach 1/gamma.")
     confidence: fields.Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
 
@@ -166,17 +155,13 @@ class WeightedVariance(Section):
     weight: Transfer | None = optional("The weight W (default 1).")
     max: fields.Positive = Field(description="Largest admissible weighted variance.")
     band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
-    relative: fields.Flag = Field(
-        default=False, description="Whether the variance is of G relative to its nominal value."
-    )
+    relative: fields.Flag = Field(default=False, description="Whether the variance is relative to |G|^2.")
 
 
 class MeanSquaredError(Section):
     """Mean-squared error of an estimated quantity when some regressors are neglected."""
 
-    estimated: fields.Numbers = Field(
-        description="Weights of the estimated parameters in the quantity of interest."
-    )
+    estimated: fields.Numbers = Field(description="Weights of the estimated parameters in the quantity.")
     neglected: fields.Numbers | None = optional("Weights of the neglected ones (default 0).")
     neglected_norm: Annotated[
         fields.NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
@@ -195,9 +180,7 @@ class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("fr
     frequencies: Annotated[fields.Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "The lines, increasing; each moves to the nearest harmonic of the period."
     )
-    band: fields.Band | None = optional(
-        "In place of frequencies: lines in [low, high], even in the logarithm."
-    )
+    band: fields.Band | None = optional("Or lines in [low, high], even in the logarithm.")
     lines: Annotated[fields.Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "Number of lines in the band (default: every harmonic of the period)."
     )
@@ -208,8 +191,7 @@ class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("fr
         default=1, description="Periods that are left to the transient and not counted (default 1)."
     )
     detection: Annotated[fields.AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = optional(
-        "Only odd harmonics are excited, and in a band one of each group of this size is "
-        "left out at random: power at the others shows nonlinearity."
+        "Only odd harmonics, without a random one of each such group: power at others is nonlinear."
     )
     noise: fields.FileName | None = optional(
         "CSV file with columns frequency and noise_spectrum (of explore) in place of the model."
@@ -228,9 +210,7 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
     """Requirements on the model; several may stand together. A criterion asks for the best instead."""
 
     model_error: ModelError | None = optional("Bound on the model error over frequency.")
-    loop: LoopMargin | None = optional(
-        "Margin of a control loop, kept with every plant within the model error."
-    )
+    loop: LoopMargin | None = optional("Margin of a loop, kept with every plant within the model error.")
     information: Annotated[InformationTarget, Shorthand("matrix", {"type": "array"})] | None = optional(
         "Lower bound on the information matrix."
     )
@@ -244,12 +224,9 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
         "The best det, trace of inverse, smallest eigenvalue or trace of M within limits."
     )
     scale: Literal["absolute", "relative"] = Field(
-        default="absolute",
-        description="Whether the criterion is of the parameters or of their relative errors.",
+        default="absolute", description="Of the parameters, or of their relative errors."
     )
-    closed_loop_error: ClosedLoopError | None = optional(
-        "Error of the loop with the controller designed on the model."
-    )
+    closed_loop_error: ClosedLoopError | None = optional("Error of the loop that is designed on the model.")
     mean_squared_error: MeanSquaredError | None = optional("Mean-squared error with neglected regressors.")
 
     @property

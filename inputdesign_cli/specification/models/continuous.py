@@ -9,24 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from inputdesign_cli.expressions import Expression, product_of
-from inputdesign_cli.specification.models import fields
-from inputdesign_cli.specification.models.named import (
-    EXPRESSIONS,
-    CoefficientTerms,
-    NamedParameter,
-    TermMatrix,
-    Terms,
-    expressed,
-    matrix,
-)
+from inputdesign_cli.specification.models import fields, named, transfer
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
-from inputdesign_cli.specification.models.transfer import (
-    TransferMatrix,
-    check_each,
-    check_each_proper,
-    check_gain,
-    check_shapes,
-)
 from inputdesign_cli.specification.yaml.plain import Plain
 
 QUANTITIES = ("gain", "time_constant", "damping", "natural_frequency", "dead_time")
@@ -44,17 +28,15 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     common: ClassVar[bool] = False
     common_delay: ClassVar[bool] = False
 
-    gain: Annotated[fields.NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
+    gain: Annotated[fields.NumberGrid, named.EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
+    time_constant: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional(
         "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
-        "Damping ratio of a plant of second order."
-    )
-    natural_frequency: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
+    damping: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional("Damping (second order).")
+    natural_frequency: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional(
         "Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[fields.NonNegativeGrid, EXPRESSIONS] | None = optional(
+    dead_time: Annotated[fields.NonNegativeGrid, named.EXPRESSIONS] | None = optional(
         "Dead time, in time_unit; 0 where there is none."
     )
 
@@ -73,9 +55,9 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 hint = "write one number, or rows (outputs) of columns (inputs), for all of them alike"
                 yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
 
-    def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
+    def check_present(self, terms: named.CoefficientTerms) -> Iterator[PathDiagnostic]:
         """Some gain is present."""
-        yield from check_gain(terms.numerator, "continuous", "gain")
+        yield from transfer.check_gain(terms.numerator, "continuous", "gain")
 
     def grid(self, name: str) -> Grid:
         """Return a quantity as rows of columns; a dead time that is not stated is zero."""
@@ -99,7 +81,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         """Dead times as rows of columns; 0 where there is none."""
         return self.grid("dead_time")
 
-    def own_parameters(self) -> tuple[NamedParameter, ...]:
+    def own_parameters(self) -> tuple[named.NamedParameter, ...]:
         """Return the quantities, entry by entry, without entries of gain zero and dead times of zero."""
         single = fields.depth(self.gain) == 0
         found = []
@@ -109,10 +91,10 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                     continue
                 label = name if single else f"{name}[{i + 1},{j + 1}]"
                 place = ("continuous", name) if single else ("continuous", name, i, j)
-                found.append(NamedParameter(label, f"{name}_{i + 1}_{j + 1}", float(value), place))
+                found.append(named.NamedParameter(label, f"{name}_{i + 1}_{j + 1}", float(value), place))
         return tuple(found)
 
-    def terms(self, written: Mapping[str, Plain] | None = None) -> CoefficientTerms:
+    def terms(self, written: Mapping[str, Plain] | None = None) -> named.CoefficientTerms:
         """Return the coefficients as expressions in its quantities.
 
         Args:
@@ -125,15 +107,15 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
             if written is None:
                 return Expression(f"{name}_{i + 1}_{j + 1}")
             value = written[name]
-            return expressed(value[i][j] if isinstance(value, list | tuple) else value)
+            return named.expressed(value[i][j] if isinstance(value, list | tuple) else value)
 
         return self._composed(of)
 
-    def _composed(self, of: Callable[[str, int, int], Expression]) -> CoefficientTerms:
+    def _composed(self, of: Callable[[str, int, int], Expression]) -> named.CoefficientTerms:
         """The coefficients, descending in s, from an expression for each entry of each quantity."""
         one, two, none = (Expression(number) for number in ("1.0", "2.0", "0.0"))
 
-        def entry(i: int, j: int) -> tuple[Terms, Terms, Expression]:
+        def entry(i: int, j: int) -> tuple[named.Terms, named.Terms, Expression]:
             gain, delay = of("gain", i, j), of("dead_time", i, j)
             if self.time_constant is not None:
                 return (gain,), (of("time_constant", i, j), one), delay
@@ -141,8 +123,11 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
             return (gain * (w * w) if gain.present else none,), (one, two * damping * w, w * w), delay
 
         rows = [[entry(i, j) for j in range(len(row))] for i, row in enumerate(self.grid("gain"))]
-        above, below, delays = (tuple(tuple(one[k] for one in row) for row in rows) for k in range(3))
-        return CoefficientTerms(above, below, delays)
+        return named.CoefficientTerms(
+            tuple(tuple(above for above, _, _ in row) for row in rows),
+            tuple(tuple(below for _, below, _ in row) for row in rows),
+            tuple(tuple(delay for _, _, delay in row) for row in rows),
+        )
 
     def _numbers(self, part: Literal["numerator", "denominator"]) -> fields.PolynomialMatrix:
         """The numerators or the denominators at the values of the quantities."""
@@ -153,35 +138,35 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         )
 
 
-class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matrix in s"):
+class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a transfer matrix in s"):
     """A transfer matrix in s of a plant, with dead times and integrators."""
 
     kind: ClassVar[Literal["rational"]] = "rational"
 
-    numerator: Annotated[fields.GainMatrix, EXPRESSIONS] = Field(
+    numerator: Annotated[fields.GainMatrix, named.EXPRESSIONS] = Field(
         description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
     )
-    denominator: Annotated[fields.ContinuousDenominator, EXPRESSIONS] = Field(
+    denominator: Annotated[fields.ContinuousDenominator, named.EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[fields.NonNegativeGrid, EXPRESSIONS] | None = optional(
+    delay: Annotated[fields.NonNegativeGrid, named.EXPRESSIONS] | None = optional(
         "Dead time in time_unit: a number, common to all entries, or rows of columns.", examples=[25]
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
-        yield from check_shapes(self.numerator, self.denominator)
-        yield from check_each(self.denominator, fields.check_no_growth_in_s, "denominator")
+        yield from transfer.check_shapes(self.numerator, self.denominator)
+        yield from transfer.check_each(self.denominator, fields.check_no_growth_in_s, "denominator")
         sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
         if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
 
-    def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
+    def check_present(self, terms: named.CoefficientTerms) -> Iterator[PathDiagnostic]:
         """Some coefficient of the numerators is present, and every entry is proper."""
         path = ("continuous", "numerator")
-        yield from check_gain(terms.numerator, *path)
-        yield from check_each_proper(
+        yield from transfer.check_gain(terms.numerator, *path)
+        yield from transfer.check_each_proper(
             terms.numerator, self.denominator_matrix, fields.depth(self.numerator), *path
         )
 
@@ -202,20 +187,20 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
             return self.delay
         return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)
 
-    def terms(self, written: Mapping[str, Plain]) -> CoefficientTerms:
+    def terms(self, written: Mapping[str, Plain]) -> named.CoefficientTerms:
         """Return the coefficients as expressions, from the section as it was written."""
         above, below, delay = (
-            expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
+            named.expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
         )
-        rows = matrix(above)
-        denominators: TermMatrix
+        rows = transfer.as_matrix(above)
+        denominators: named.TermMatrix
         if fields.depth(below) == 3:
-            denominators = matrix(below)
+            denominators = transfer.as_matrix(below)
         else:
             common = product_of(below if fields.depth(below) == 2 else [below])
             denominators = tuple(tuple(common for _ in row) for row in rows)
         delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
-        return CoefficientTerms(rows, denominators, delays)
+        return named.CoefficientTerms(rows, denominators, delays)
 
 
 Continuous = Annotated[

@@ -44,20 +44,15 @@ PriorParameters = Annotated[
 class NoiseShape(Section):
     """The filter C(q)/D(q) that colours the noise; one polynomial, or one per output."""
 
-    C: fields.StablePerOutput = Field(
-        default=(1.0,), description="Monic, stable numerator in q^-1 (default 1)."
-    )
+    C: fields.StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1.")
     D: fields.MonicPerOutput = Field(
-        default=(1.0,),
-        description="Monic denominator in q^-1 (default 1), stable; on the unit circle where it is known.",
+        default=(1.0,), description="Monic denominator in q^-1, stable, or at its limit where known."
     )
     drift: fields.PerChannel[fields.Flag] = Field(
         default=False, description="Whether the noise integrates as well; one for all outputs, or a list."
     )
     variance: fields.Variance | None = optional("Variance of e, or its covariance matrix.")
-    known: fields.Names | None = optional(
-        "Names of coefficients of C and D that are known and not estimated."
-    )
+    known: fields.Names | None = optional("Names of coefficients of C and D that are not estimated.")
 
     def covariance(self, outputs: int) -> np.ndarray:
         """Return the covariance (outputs, outputs) of e; a number is a multiple of I, no variance is I."""
@@ -99,16 +94,14 @@ class NoiseShape(Section):
 class Noise(NoiseShape):
     """C(q)/D(q) e(t) with white e."""
 
-    variance: fields.Variance = Field(
-        description="Variance of e, or its covariance matrix (outputs x outputs)."
-    )
+    variance: fields.Variance = Field(description="Variance of e, or its covariance matrix.")
 
 
 class SimulationNoise(NoiseShape, one_of=(("variance", "relative_std"),)):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
     relative_std: fields.Positive | None = optional(
-        "Standard deviation as a fraction of the smallest output rms."
+        "Standard deviation as a share of the smallest output rms."
     )
 
 
@@ -116,12 +109,10 @@ class Prior(Section):
     """Information from before the experiment; with values of the parameters it enters estimates as well."""
 
     information: InformationSource = Field(
-        description="Information matrix (inverse covariance) of the parameters, or the name of a file: data "
-        "(.csv), or a model that identify wrote (.yaml)."
+        description="Information matrix (inverse covariance), or a file: data (.csv), or a model (.yaml)."
     )
     parameters: PriorParameters | None = optional(
-        "Names that order the rows of the matrix (default: the order of the model), or names and "
-        "values: {b1: 3.6, f1: -0.7}."
+        "Names of the rows (default: of the model), or names and values: {b1: 3.6, f1: -0.7}."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -163,15 +154,12 @@ class Estimated(Section):
 class Experiment(Section):
     """How the data will be collected."""
 
-    samples: fields.Count = Field(
-        default=1, description="Number of samples (default 1: criteria are per sample)."
-    )
+    samples: fields.Count = Field(default=1, description="Number of samples; of 1, criteria are per sample.")
     duration: fields.Positive | None = optional(
-        "In place of samples: how long it lasts, in time_unit.", examples=[3600]
+        "In place of samples: its length in time_unit.", examples=[3600]
     )
     controller: Controller | None = optional(
-        "C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
-        "closed loop. With several channels: loops, or numerator and denominator as rows of columns."
+        "C of u = r - C y, in q^-1, as pid or in s; of several channels: loops, or rows of columns."
     )
     prior: Prior | None = optional("Information already at hand.")
 
@@ -252,23 +240,15 @@ class Campaign(Section, not_both=(("stages", "block"), ("stages", "pilot"))):
     )
     pilot: (
         Annotated[Pilot, Shorthand("samples", {"type": "integer", "minimum": 1, "maximum": 1_000_000})] | None
-    ) = optional(
-        "The first part: its samples, or {samples, power} for white noise (default: a block, at "
-        "most a tenth of the experiment)."
-    )
-    max_samples: Samples | None = optional(
-        "Where the experiment ends at the latest (default: three times its samples)."
-    )
+    ) = optional("The first part: its samples, or {samples, power} for white noise (default: a block).")
+    max_samples: Samples | None = optional("The longest experiment (default: three times its samples).")
     power_cap: fields.Positive | None = optional(
-        "Largest cost of a sample, relative to the first plan; a plan beyond it is made longer, "
-        "a part weaker (default: 10)."
+        "Largest cost of a sample, relative to the first plan (default: 10)."
     )
     last: Literal["robust", "nominal"] = Field(
         default="robust",
-        description="robust: a plan that ends with its first part is made for all plants that the data leave "
-        "open (default); nominal: for the estimate alone.",
+        description="Whether the last plan is for all plants that the data allow, or for the estimate.",
     )
     stop: Literal["data", "never"] = Field(
-        default="data",
-        description="data: as soon as the data meet the accuracy (default); never: at experiment.samples.",
+        default="data", description="data: once they meet the accuracy; never: at experiment.samples."
     )

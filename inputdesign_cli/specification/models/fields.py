@@ -32,20 +32,15 @@ def product(factors: Iterable[Polynomial]) -> Polynomial:
 
 def check_not_zero(polynomial: Polynomial) -> PathDiagnostic | None:
     """Some coefficient differs from zero."""
-    if any(polynomial):
-        return None
-    return PathDiagnostic(
-        "zero-polynomial", "all coefficients of {key} are zero", "write at least one that is not"
-    )
+    message, hint = "all coefficients of {key} are zero", "write at least one that is not"
+    return None if any(polynomial) else PathDiagnostic("zero-polynomial", message, hint)
 
 
 def check_leading(polynomial: Polynomial) -> PathDiagnostic | None:
     """The first coefficient differs from zero."""
-    if polynomial[0] != 0.0:
-        return None
-    return check_not_zero(polynomial) or PathDiagnostic(
-        "zero-leading-coefficient", "{key} must not start with 0", "remove the leading zeros"
-    )
+    message, hint = "{key} must not start with 0", "remove the leading zeros"
+    wrong = PathDiagnostic("zero-leading-coefficient", message, hint)
+    return check_not_zero(polynomial) or (wrong if polynomial[0] == 0.0 else None)
 
 
 def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
@@ -53,12 +48,11 @@ def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
     lead = polynomial[0]
     if lead == 1.0:
         return None
-    if lead == 0.0:
-        hint = "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0"
-        return PathDiagnostic("not-monic", "{key} must start with 1, not 0", hint)
-    hint = f"divide all its coefficients by {show(lead)}: {_listed([c / lead for c in polynomial])}"
-    if polynomial[-1] == 1.0:
+    hint = "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0"
+    if lead and polynomial[-1] == 1.0:
         hint = f"its coefficients ascend in q^-1: did you mean {_listed(polynomial[::-1])}?"
+    elif lead:
+        hint = f"divide all its coefficients by {show(lead)}: {_listed([c / lead for c in polynomial])}"
     return PathDiagnostic("not-monic", f"{{key}} must start with 1, not {show(lead)}", hint)
 
 
@@ -71,11 +65,9 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
     """In q^-1, ascending: all roots in z lie strictly inside the unit circle."""
 
     def refuse(worst: complex) -> PathDiagnostic | None:
-        radius = abs(worst)
-        if radius < 1.0 - _ROUNDING:
+        if abs(worst) < 1.0 - _ROUNDING:
             return None
-        where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
-        place = f"radius {where} at {abs(float(np.angle(worst))):.4g} rad/sample"
+        place = f"radius {abs(worst):.6g} at {abs(float(np.angle(worst))):.4g} rad/sample"
         message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
         hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
         return PathDiagnostic("unstable-polynomial", message, hint)
@@ -166,16 +158,14 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
 def two_frequencies(value: object) -> object:
     """A band has two ends."""
     if not isinstance(value, list | tuple) or len(value) != 2:
-        message = "{key} must be two frequencies, [low, high]"
-        raise fail("bad-band", message, "write [0.01, 3.0]")
+        raise fail("bad-band", "{key} must be two frequencies, [low, high]", "write [0.01, 3.0]")
     return value
 
 
 def ascending(band: tuple[float, float]) -> tuple[float, float]:
     """A band is not empty."""
-    low, high = band
-    if not low < high:
-        message = f"{{key}} must ascend: {show(low)} is not below {show(high)}"
+    if not band[0] < band[1]:
+        message = f"{{key}} must ascend: {show(band[0])} is not below {show(band[1])}"
         raise fail("bad-band", message, "write [low, high]")
     return band
 
@@ -183,8 +173,7 @@ def ascending(band: tuple[float, float]) -> tuple[float, float]:
 def same_columns(rows: Nested) -> Nested:
     """The rows of a matrix of polynomials are equally long."""
     if len({len(row) for row in rows}) > 1:
-        lengths = ", ".join(str(len(row)) for row in rows)
-        message = f"the rows of {{key}} must have the same number of columns (they have {lengths})"
+        message = "the rows of {key} must have the same number of columns"
         hint = "one row per output, one column per input; write [0] where an input has no effect"
         raise fail("wrong-shape", message, hint)
     return rows
@@ -204,10 +193,8 @@ def product_exists(denominator: Nested) -> Nested:
 
 def symmetric(rows: Matrix) -> Matrix:
     """A matrix is square and symmetric."""
-    for row in rows:
-        if len(row) != len(rows):
-            message = f"it has {len(rows)} rows, and one of them has {len(row)} entries"
-            raise fail("wrong-shape", f"{{key}} must be square: {message}")
+    if any(len(row) != len(rows) for row in rows):
+        raise fail("wrong-shape", f"{{key}} must be square: {len(rows)} rows of {len(rows)} entries")
     values = np.array(rows)
     for i, j in np.argwhere(np.tril(np.abs(values - values.T)) > 1e-9 * np.max(np.abs(values))):
         one, other = (f"({a + 1}, {b + 1}) is {show(rows[a][b])}" for a, b in ((i, j), (j, i)))

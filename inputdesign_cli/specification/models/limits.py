@@ -27,9 +27,7 @@ class PowerLimit(Section, some_of=(("max", "min"),)):
     """Bounds on a power: of the sum over the channels, or with a list of each channel."""
 
     max: fields.PerChannel[fields.Cap] | None = optional("Largest power; a number or one per channel.")
-    min: fields.PerChannel[fields.NonNegative] | None = optional(
-        "Smallest power; a number or one per channel."
-    )
+    min: fields.PerChannel[fields.NonNegative] | None = optional("Smallest power, likewise.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The lower bound is below the upper one."""

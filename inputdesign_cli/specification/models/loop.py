@@ -8,17 +8,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models import fields, transfer
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import (
-    ContinuousRatio,
-    DiscreteMatrix,
-    DiscreteTransfer,
-    Target,
-    Transfer,
-    check_stable,
-)
 
 Rule = Literal["tustin", "backward", "zoh"]
 _RULE = "How s becomes q^-1: tustin (trapezoids), backward (backward differences) or zoh (a hold on y)."
@@ -32,14 +24,10 @@ class Pid(Section):
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {"Ki": "write Ti: Kp / Ki", "Kd": "write Td: Kd / Kp"}
 
-    Kp: fields.Number = Field(
-        description="Gain; negative where more input means less output.", examples=[2.0]
-    )
+    Kp: fields.Number = Field(description="Gain; negative if more input gives less output.", examples=[2.0])
     Ti: fields.Positive | None = optional("Integral time; absent: no integral action.")
     Td: fields.NonNegative = Field(default=0.0, description="Derivative time (default 0).")
-    Tf: fields.NonNegative | None = optional(
-        "Time constant of the filter of the derivative (default Td / 10)."
-    )
+    Tf: fields.NonNegative | None = optional("Time constant of the derivative's filter (default Td / 10).")
     sample: Rule = Field(default="tustin", description=_RULE)
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -72,7 +60,9 @@ class ContinuousController(Section, family="controller", phrase="a controller in
 
     kind: ClassVar[Literal["continuous"]] = "continuous"
 
-    continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
+    continuous: transfer.ContinuousRatio = Field(
+        description="numerator and denominator in descending powers of s."
+    )
     sample: Rule = Field(description=_RULE)
     delay: _Delay = Field(default=0, description=_DELAY)
 
@@ -87,10 +77,12 @@ _WORDING = Wording(
 def _single(value: dict[str, object]) -> str:
     if "pid" in value:
         return PidController.phrase
-    return (ContinuousController if "continuous" in value else DiscreteTransfer).phrase
+    return (ContinuousController if "continuous" in value else transfer.DiscreteTransfer).phrase
 
 
-SingleController = Annotated[DiscreteTransfer | PidController | ContinuousController, pick(_single), _WORDING]
+SingleController = Annotated[
+    transfer.DiscreteTransfer | PidController | ContinuousController, pick(_single), _WORDING
+]
 """From one output to one input."""
 
 
@@ -121,11 +113,15 @@ class LoopsController(Section, family="controller", phrase="a list of single loo
 def _kind(value: dict[str, object]) -> str:
     if "loops" in value:
         return LoopsController.phrase
-    return DiscreteMatrix.phrase if fields.depth(value.get("numerator")) > 1 else _single(value)
+    return transfer.DiscreteMatrix.phrase if fields.depth(value.get("numerator")) > 1 else _single(value)
 
 
 Controller = Annotated[
-    DiscreteTransfer | DiscreteMatrix | PidController | ContinuousController | LoopsController,
+    transfer.DiscreteTransfer
+    | transfer.DiscreteMatrix
+    | PidController
+    | ContinuousController
+    | LoopsController,
     pick(_kind),
     _WORDING,
 ]
@@ -135,10 +131,10 @@ Controller = Annotated[
 class Control(Section):
     """The control law that will be computed from the model: exactly one."""
 
-    model_reference: Target | None = optional(
+    model_reference: transfer.Target | None = optional(
         "Desired loop from reference to output: t I, or a matrix; from s by a zero-order hold."
     )
-    internal_model: Transfer | None = optional("Filter of an internal-model controller.")
+    internal_model: transfer.Transfer | None = optional("Filter of an internal-model controller.")
     minimum_variance: (
         Annotated[Literal[True], Wording("true", "remove the key to choose another law")] | None
     ) = optional("true: minimum-variance control.")
@@ -147,35 +143,30 @@ class Control(Section):
         """There is one law, and its transfer functions are stable."""
         yield from self.exactly_one(*type(self).model_fields)
         if self.model_reference is not None:
-            yield from check_stable(self.model_reference, "model_reference")
+            yield from transfer.check_stable(self.model_reference, "model_reference")
         if self.internal_model is not None:
-            yield from check_stable(self.internal_model, "internal_model")
+            yield from transfer.check_stable(self.internal_model, "internal_model")
 
 
 class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
-    variance: fields.PerChannel[fields.Positive] = Field(
-        default=1.0, description="Variance; a number or one per output."
-    )
-    filter: Transfer | None = optional("Filter that colours it (default 1).")
+    variance: fields.PerChannel[fields.Positive] = Field(default=1.0, description="One, or one per output.")
+    filter: transfer.Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The filter is stable."""
         if self.filter is not None:
-            yield from check_stable(self.filter, "filter")
+            yield from transfer.check_stable(self.filter, "filter")
 
 
 class ClosedLoopError(Section):
     """E||y - y0||^2 of the loop with the controller designed on the model."""
 
     control: Control = Field(description="The control law.")
-    reference: Reference = Field(
-        default=Reference(), description="The reference of the loop (default: white, variance 1)."
-    )
+    reference: Reference = Field(default=Reference(), description="The reference of the loop.")
     covariance: Literal["asymptotic", "parametric"] = Field(
-        default="asymptotic",
-        description="asymptotic in model order, or parametric: the exact covariance of the model structure.",
+        default="asymptotic", description="Asymptotic in model order, or exact for the model structure."
     )
 
 
@@ -186,9 +177,7 @@ MOST_DECIBELS = 100.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: fields.Positive | None = optional(
-        "Time constant of the closed loop, in time_unit (default: the dead time)."
-    )
+    tau_c: fields.Positive | None = optional("Time constant of the closed loop (default: the dead time).")
 
 
 class Amigo(Section):
@@ -227,15 +216,9 @@ class LoopMargin(
     controller: Controller | None = optional("C of the loop (default: the controller of the experiment).")
     tuning: Tuning | None = optional("Or the rule by which it is tuned.")
     max_sensitivity_db: _Peak | None = optional("Largest |S|, in dB.")
-    phase_margin: _Degrees | None = optional(
-        "Least phase margin in degrees, below 60, kept by the peak of |S| for it."
-    )
-    gain_margin: _Factor | None = optional(
-        "Least gain margin, a factor above 1, kept by the peak of |S| for it."
-    )
-    confidence: fields.Fraction | None = optional(
-        "Probability that fixes alpha by chi-squared (default 0.95)."
-    )
+    phase_margin: _Degrees | None = optional("Least phase margin in degrees, below 60, by the peak of |S|.")
+    gain_margin: _Factor | None = optional("Least gain margin, a factor above 1, by the peak of |S|.")
+    confidence: fields.Fraction | None = optional("Probability that fixes alpha (default 0.95).")
     band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ from pydantic import GetJsonSchemaHandler
 from pydantic_core import core_schema
 
 from inputdesign_cli.expressions import Expression, ExpressionError, is_name
-from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.units import without_unit
 from inputdesign_cli.specification.models.wording import nearest
@@ -91,29 +90,25 @@ def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
             yield PathDiagnostic("bad-name", message, hint, ("parameters", name), at_key=True)
 
 
-def check_used(parameters: Mapping[str, float], texts: Iterable[str]) -> Iterator[PathDiagnostic]:
-    """Something depends on every parameter."""
-    used = frozenset[str]().union(*(Expression(text).names for text in texts))
-    for name in parameters:
-        if name not in used:
-            message = f"nothing depends on the parameter {name}"
-            hint = "write it into a coefficient, or remove it"
-            yield PathDiagnostic("unused-parameter", message, hint, ("parameters", name), at_key=True)
+def worth(
+    value: Plain, parameters: Mapping[str, float], path: Path, found: list[PathDiagnostic], used: set[str]
+) -> Plain:
+    """Return a nested value with numbers in place of texts.
 
-
-def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list[PathDiagnostic]) -> Plain:
-    """Return a nested value with numbers in place of texts; errors in texts are added to `found`."""
+    What is wrong with texts is added to `found`, and the parameters that they name to `used`.
+    """
     if isinstance(value, list | tuple):
-        return [worth(part, parameters, (*path, i), found) for i, part in enumerate(value)]
+        return [worth(part, parameters, (*path, i), found, used) for i, part in enumerate(value)]
     if isinstance(value, dict):
         return {
-            key: part if key in _WORDS else worth(part, parameters, (*path, key), found)
+            key: part if key in _WORDS else worth(part, parameters, (*path, key), found, used)
             for key, part in value.items()
         }
     if not isinstance(value, str):
         return value
     try:
         expression = Expression.of(value)
+        used |= expression.names
     except ExpressionError as error:
         message = f"{{key}} {error.message}: {clip(value)}"
         hint = without_unit(value, None) or error.hint
@@ -136,15 +131,6 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
     return 1.0
 
 
-def texts_in(value: Plain) -> list[str]:
-    """Return every text of a nested value."""
-    if isinstance(value, str):
-        return [value]
-    listed = value if isinstance(value, list | tuple) else ()
-    parts = [v for k, v in value.items() if k not in _WORDS] if isinstance(value, dict) else listed
-    return [found for part in parts for found in texts_in(part)]
-
-
 def leading(terms: Terms) -> int:
     """Return the index of the first coefficient that is present; the length if none is."""
     return next((i for i, one in enumerate(terms) if one.present), len(terms))
@@ -155,8 +141,3 @@ def expressed(value: Plain) -> Plain:
     if isinstance(value, list | tuple):
         return tuple(expressed(part) for part in value)
     return Expression(value if isinstance(value, str) else repr(float(value)))
-
-
-def matrix(value: Plain) -> TermMatrix:
-    """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
-    return value if depth(value) == 3 else ((value,),)

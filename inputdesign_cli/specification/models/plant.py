@@ -9,22 +9,8 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models import fields, named, transfer
 from inputdesign_cli.specification.models.continuous import Continuous
-from inputdesign_cli.specification.models.named import (
-    EXPRESSIONS,
-    CoefficientTerms,
-    NamedParameter,
-    Terms,
-    check_names,
-    check_used,
-    expressed,
-    leading,
-    matrix,
-    texts_in,
-    values_of,
-    worth,
-)
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -34,13 +20,6 @@ from inputdesign_cli.specification.models.section import (
     pick,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import (
-    as_matrix,
-    check_gain,
-    check_per_output,
-    shape_words,
-    size_of,
-)
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
@@ -52,13 +31,10 @@ class NamedPlant(Section):
     parameters: Annotated[Mapping[str, fields.Number], SIZES["plant.parameters"]] | None = Field(
         default=None,
         min_length=1,
-        description="Named parameters and their values. Coefficients may then be expressions in them, and "
-        "these alone are estimated.",
+        description="Named parameters and their values; coefficients may be expressions in them.",
         examples=[{"K": 2.1, "T": 180}],
     )
-    known: fields.Names | None = optional(
-        "Names of parameters that are known and not estimated.", examples=[["b1"]]
-    )
+    known: fields.Names | None = optional("Names of parameters that are not estimated.", examples=[["b1"]])
 
     _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
 
@@ -70,14 +46,17 @@ class NamedPlant(Section):
             return handler(data)
         numbers = dict(data)
         if isinstance(data.get("parameters"), dict):
-            values = values_of(data["parameters"])
+            values = named.values_of(data["parameters"])
             if len(values) > SIZES["plant.parameters"].most:
                 return handler(numbers)
-            found = list(check_names(values))
+            found = list(named.check_names(values))
             stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
-            numbers |= {key: worth(data[key], values, (key,), found) for key in stated}
-            if not found:
-                found += check_used(values, texts_in([data[key] for key in stated]))
+            used: set[str] = set()
+            numbers |= {key: named.worth(data[key], values, (key,), found, used) for key in stated}
+            for name in () if found else [name for name in values if name not in used]:
+                message, path = f"nothing depends on the parameter {name}", ("parameters", name)
+                hint = "write it into a coefficient, or remove it"
+                found.append(PathDiagnostic("unused-parameter", message, hint, path, at_key=True))
             if found:
                 raise carry(*found)
         made = handler(numbers)
@@ -107,10 +86,10 @@ class NamedPlant(Section):
         return self.shape[1]
 
     @property
-    def named_parameters(self) -> tuple[NamedParameter, ...]:
+    def named_parameters(self) -> tuple[named.NamedParameter, ...]:
         """The named parameters; empty if the coefficients are the parameters."""
         stated = self.parameters or {}
-        return tuple(NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
+        return tuple(named.NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
 
 
 _Row = Annotated[fields.Several[fields.Number], SIZES["states"]]
@@ -120,7 +99,7 @@ Rows = Annotated[
     fields.nested(2, "a matrix", "write rows: [[0, 1], [0, -2]]"),
     AfterValidator(fields.same_columns),
     Wording("a matrix", "write rows: [[0, 1], [0, -2]]"),
-    EXPRESSIONS,
+    named.EXPRESSIONS,
 ]
 """A matrix of numbers and expressions."""
 
@@ -136,15 +115,13 @@ class StateSpace(Section):
     C: Rows = Field(description="Outputs by states.", examples=[[[1, 0]]])
     D: Rows | None = optional("Outputs by inputs (default 0).")
     K: Rows | None = optional(
-        "Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
-        "noise is added to the outputs)."
+        "Gain of the one-step predictor of the sampled model, states by outputs (default 0)."
     )
-    delay: Annotated[fields.NonNegative, EXPRESSIONS] = Field(
+    delay: Annotated[fields.NonNegative, named.EXPRESSIONS] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
     )
     time: Literal["continuous", "discrete"] = Field(
-        default="continuous",
-        description="Whether A and B give derivatives of the states, or their next samples.",
+        default="continuous", description="Whether A and B give derivatives of the states or next samples."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -174,56 +151,53 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         "the leading zeros of B are the delay: B: [0, 0, 0, 1] is one of three samples",
     )
 
-    A: Annotated[fields.MonicPerOutput, EXPRESSIONS] = Field(
+    A: Annotated[fields.MonicPerOutput, named.EXPRESSIONS] = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."
     )
-    B: Annotated[fields.GainMatrix, EXPRESSIONS] = Field(
+    B: Annotated[fields.GainMatrix, named.EXPRESSIONS] = Field(
         description="Leading zeros are the delay. MIMO: rows (outputs) of columns (inputs) of polynomials.",
         examples=[[0, 3.6]],
     )
-    F: Annotated[fields.StableMatrix, EXPRESSIONS] | None = optional(
-        "Monic and stable, in the shape of B (default 1)."
+    F: Annotated[fields.StableMatrix, named.EXPRESSIONS] | None = optional(
+        "Monic, stable, shaped as B (default 1)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """A and F have the shape of B, of which some coefficient is present."""
-        yield from check_per_output(self.A, self.outputs, "A")
-        if self.F is not None and (
-            fields.depth(self.F) != fields.depth(self.B) or size_of(self.F) != size_of(self.B)
-        ):
-            message = "{key} must have the shape of B: " + shape_words(self.B)
+        yield from transfer.check_per_output(self.A, self.outputs, "A")
+        if self.F is not None and transfer.shape_words(self.F) != transfer.shape_words(self.B):
+            message = "{key} must have the shape of B: " + transfer.shape_words(self.B)
             yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
-        yield from check_gain(matrix(expressed(self.written["B"])), "B")
+        yield from transfer.check_gain(transfer.as_matrix(named.expressed(self.written["B"])), "B")
 
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
         """The power of the first coefficient of B that is present, entry by entry; the length if none is."""
-        return tuple(
-            tuple(leading(entry) for entry in row) for row in matrix(expressed(self.written.get("B", self.B)))
-        )
+        rows = transfer.as_matrix(named.expressed(self.written.get("B", self.B)))
+        return tuple(tuple(named.leading(entry) for entry in row) for row in rows)
 
     @property
     def shape(self) -> tuple[int, int]:
         """The numbers of outputs and inputs."""
-        return size_of(self.B)
+        return transfer.size_of(self.B)
 
-    def coefficients(self, letter: str, output: int, input: int) -> Terms:
+    def coefficients(self, letter: str, output: int, input: int) -> named.Terms:
         """A, B or F of an entry as expressions in the named parameters."""
-        written = expressed(self.written[letter.upper()])
+        written = named.expressed(self.written[letter.upper()])
         if letter == "a":
             return written[output] if fields.depth(written) == 2 else written
-        return matrix(written)[output][input]
+        return transfer.as_matrix(written)[output][input]
 
     @property
     def B_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (the paper's symbol)
         """B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
-        return as_matrix(self.B)
+        return transfer.as_matrix(self.B)
 
     @property
     def F_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (likewise)
         """F in the same form; absent polynomials are 1."""
         ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
-        return ones if self.F is None else as_matrix(self.F)
+        return ones if self.F is None else transfer.as_matrix(self.F)
 
 
 class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plant"):
@@ -235,14 +209,12 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     continuous: Continuous = Field(
         description="Transfer matrix in s, rows are outputs; or gain, time constant and dead time."
     )
-    sample: Literal["zoh"] | None = optional(
-        "zoh: sampled at sample_time with a zero-order hold. Absent: continuous time."
-    )
+    sample: Literal["zoh"] | None = optional("zoh: a zero-order hold. Absent: continuous time.")
 
     @property
     def shape(self) -> tuple[int, int]:
         """The numbers of outputs and inputs."""
-        return size_of(self.continuous.numerator_matrix)
+        return transfer.size_of(self.continuous.numerator_matrix)
 
     @property
     def sampled(self) -> bool:
@@ -250,7 +222,7 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
         return self.sample is not None
 
     @property
-    def named_parameters(self) -> tuple[NamedParameter, ...]:
+    def named_parameters(self) -> tuple[named.NamedParameter, ...]:
         """The stated parameters, or the quantities of a process model."""
         if self.parameters is None and self.continuous.kind == "process":
             return self.continuous.own_parameters()
@@ -261,14 +233,14 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
         yield from self.continuous.check_present(self.stated_terms)
 
     @cached_property
-    def terms(self) -> CoefficientTerms:
+    def terms(self) -> named.CoefficientTerms:
         """The coefficients as expressions in the named parameters."""
         if self.parameters is None and self.continuous.kind == "process":
             return self.continuous.terms()
         return self.stated_terms
 
     @cached_property
-    def stated_terms(self) -> CoefficientTerms:
+    def stated_terms(self) -> named.CoefficientTerms:
         """The stated coefficients, as expressions in named parameters if there are any."""
         return self.continuous.terms(self.written["continuous"])
 
@@ -281,12 +253,10 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("state_space",)
 
     state_space: StateSpace = Field(description="A, B, C, D, and K of the noise.")
-    sample: Literal["zoh"] | None = optional(
-        "zoh: matrices in continuous time are sampled with a zero-order hold."
-    )
+    sample: Literal["zoh"] | None = optional("zoh: matrices in continuous time are sampled.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some parameter is named, and sampling and dead time are those of the time of the matrices."""
+        """Some parameter is named; sampling and dead time go with the time of the matrices."""
         if self.parameters is None:
             message = "{key} needs parameters: numbers in its matrices are not estimated"
             hint = "write parameters: {k: 2.0}, and k in the matrices"
@@ -312,7 +282,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         """An entry of a matrix, or the dead time, as an expression in the named parameters."""
         written = self.written["state_space"]
         value = written.get("delay", 0.0) if letter == "delay" else written[letter][row][column]
-        return expressed(value)
+        return named.expressed(value)
 
 
 class RegressionSize(Section):
@@ -346,9 +316,7 @@ class TrueParameters(Section, family="plant", phrase="a list of true parameters"
 
     kind: ClassVar[Literal["parameters"]] = "parameters"
 
-    parameters: fields.Numbers = Field(
-        description="True values of all regression parameters, estimated ones first."
-    )
+    parameters: fields.Numbers = Field(description="True values of all parameters, estimated ones first.")
 
 
 _FORMS = Wording(

@@ -225,8 +225,7 @@ def _no_number(value: Plain, what: str, hint: str) -> tuple[str, str, str]:
 def _unknown_type(path: Path, types: list[str], value: dict[str, Plain]) -> PathDiagnostic:
     """A mapping whose `type` is missing or names none of the alternatives."""
     if "type" in value:
-        message, hint = unknown_word(value["type"], types)
-        return PathDiagnostic("unknown-word", message, hint, (*path, "type"))
+        return PathDiagnostic("unknown-word", *unknown_word(value["type"], types), (*path, "type"))
     hint = f"write type: {types[0]}; the types are {', '.join(types)}"
     return PathDiagnostic("missing-key", "{key} needs a type", hint, path)
 

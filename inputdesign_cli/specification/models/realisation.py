@@ -54,9 +54,7 @@ class Quantisation(Section):
 
     bits: fields.RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
     range: fields.PerChannel[fields.Positive] = Field(
-        description="They span [-range, range), in the unit of u, the offset included; a number or one per "
-        "input.",
-        examples=[10.0],
+        description="They span [-range, range), offset included; a number or one per input.", examples=[10.0]
     )
 
 
@@ -85,9 +83,7 @@ class Signal(Section):
     amplitudes: fields.PerChannel[fields.Positive] | None = optional(
         "Amplitude (level) to scale to, whatever it buys; a number or one per input."
     )
-    offset: fields.PerChannel[fields.Number] | None = optional(
-        "Operating point added; a number or one per input."
-    )
+    offset: fields.PerChannel[fields.Number] | None = optional("Operating point; a number or one per input.")
     ramp: Annotated[fields.Index, SIZES["signal.samples"]] | None = optional(
         "Samples over which the signal fades in and out."
     )
@@ -97,13 +93,10 @@ class Signal(Section):
     start: Literal["steady", "zero"] | None = optional(
         "Past of a regression's input: its periodic continuation (default), or zero."
     )
-    bits: fields.RegisterLength | None = optional(
-        "Length of the shift register of a prbs (default: no repetition)."
-    )
+    bits: fields.RegisterLength | None = optional("Length of a prbs register (default: no repetition).")
     quantisation: Quantisation | None = optional("The converter: {bits, range}.")
     scale: Literal["target", "design"] | None = optional(
-        "target: the least power with which the record itself meets the accuracy (default); "
-        "design: the power of the design."
+        "The least power with which the record meets the accuracy (default), or that of the design."
     )
     also: tuple[Literal["mat", "npz", "h", "wav"], ...] | None = optional(
         "Other files of the signal beside signal.csv: mat (MATLAB), npz (numpy), h (C), wav."
@@ -130,21 +123,14 @@ class Solver(Section):
         description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
     )
     tolerance: fields.Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
-    any_spectrum: fields.Flag = Field(
-        default=True,
-        description="Whether to bound what other spectra reach (default true; may take as long again).",
-    )
+    any_spectrum: fields.Flag = Field(default=True, description="Whether to bound what other spectra reach.")
     any_spectrum_tolerance: fields.Tolerance = Field(
-        default=1e-4,
-        description="Relative gap of the bound over every spectrum (default 1e-4; no less than tolerance).",
+        default=1e-4, description="Relative gap of the bound over every spectrum."
     )
     windows: Annotated[fields.Index, SIZES["solver.windows"]] = Field(
-        default=12,
-        description="Longest windows of the bound over all records within limits.amplitude (default 12; 0: none).",
+        default=12, description="Longest windows of the bound over all records (0: no bound)."
     )
-    time_limit: fields.Positive = Field(
-        default=600.0, description="Seconds that a design may take (default 600)."
-    )
+    time_limit: fields.Positive = Field(default=600.0, description="Seconds that a design may take.")
     grid: Annotated[fields.Count, SIZES["solver.grid"]] = Field(
         default=1000, description="Number of frequencies of the lmi method (default 1000)."
     )
@@ -154,16 +140,13 @@ class Solver(Section):
 class Simulation(Section):
     """The Monte Carlo study on the true system."""
 
-    runs: Annotated[fields.Count, SIZES["simulation.runs"]] = Field(
-        default=100, description="Number of runs (default 100)."
-    )
+    runs: Annotated[fields.Count, SIZES["simulation.runs"]] = Field(default=100, description="How many runs.")
     seed: fields.Index = Field(default=0, description="Seed of the random numbers (default 0).")
     plant: TruePlant | None = optional("The true system (default: the nominal plant).")
     noise: SimulationNoise | None = optional("The true noise (default: the nominal noise).")
     excitation: Literal["new", "record"] = Field(
         default="new",
-        description="new: each run realises the spectrum anew (default); record: all runs apply the one "
-        "record that is delivered.",
+        description="new: each run realises the spectrum anew; record: all apply the delivered one.",
     )
     compare: Annotated[
         tuple[Literal["white", "prbs", "multisine", "binary"], ...], SIZES["simulation.compare"]
@@ -187,6 +170,5 @@ class Report(Section):
     """The contents of the figures."""
 
     ellipses: Annotated[fields.Several[Pair], SIZES["report.ellipses"]] | None = optional(
-        "Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
-        "the most correlated ones; with one: none)."
+        "Pairs of parameters whose ellipses are drawn (default: none, or the most correlated ones)."
     )

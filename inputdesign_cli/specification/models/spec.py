@@ -40,15 +40,8 @@ _Error = TypeVar("_Error", bound=IdesignError)
 
 
 OF_DESIGNS = (
-    "accuracy",
-    "campaign",
-    "cost",
-    "limits",
-    "objective",
-    "simulation",
-    "spectrum",
-    "sweep",
-    "uncertainty",
+    *("accuracy", "campaign", "cost", "limits", "objective"),
+    *("simulation", "spectrum", "sweep", "uncertainty"),
 )
 """Keys of a design: a spec for an estimate alone has none of them."""
 
@@ -78,25 +71,19 @@ class Spec(Section):
         description="What inputs u1, u2, .. and outputs y1, y2, .. are called, and their units.",
         examples=[{"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "temperature", "unit": "degC"}}],
     )
-    experiment: Experiment = Field(
-        default=Experiment(), description="Samples, controller, prior information."
-    )
+    experiment: Experiment = Field(default=Experiment(), description="Samples, controller, prior.")
     estimate: Estimated | None = optional(
         "The estimate of plant and noise by identify, with its covariance: for experiment.prior."
     )
     cost: Cost = Field(
         default=Cost(input_power=1.0),
-        description="Weights of the powers. Default: input_power 1; in closed loop also output_power 1.",
+        description="Weights of the powers (default: input_power; in a loop output_power as well).",
     )
     accuracy: Accuracy = Field(default_factory=Accuracy, description="What the model must reach.")
-    objective: Objective | None = optional(
-        "least_cost, best_accuracy or shortest_experiment; default: from the rest."
-    )
+    objective: Objective | None = optional("least_cost, best_accuracy or shortest_experiment.")
     limits: Limits = Field(default=Limits(), description="What the experiment may not exceed.")
     spectrum: Spectrum | None = optional("Family of the input spectrum, or a given excitation.")
-    uncertainty: Uncertainty | None = optional(
-        "How well the plant is known: the design is then made for all such plants."
-    )
+    uncertainty: Uncertainty | None = optional("How well the plant is known, for a robust design.")
     campaign: Campaign | None = optional("The experiment goes in parts, each planned with the data so far.")
     signal: Signal = Field(default=Signal(), description="The time series that realises the spectrum.")
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")

@@ -72,9 +72,7 @@ class PolynomialSpectrum(Section, family="spectrum", phrase="type: polynomial"):
         description="Degree of the polynomial factor."
     )
     band: fields.Band = Field(description="The band [low, high] outside of which the spectrum vanishes.")
-    coefficients: Literal["real", "complex"] = Field(
-        default="real", description="Kind of coefficients (default real)."
-    )
+    coefficients: Literal["real", "complex"] = Field(default="real", description="Kind of coefficients.")
     factor_columns: Annotated[fields.Count, SIZES["spectrum.factor_columns"]] | None = optional(
         "Columns of the spectral factor: the rank of the spectrum (default: full)."
     )
@@ -120,9 +118,7 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
     frequencies: Annotated[fields.Frequencies, SIZES["spectrum.given.frequencies"]] = Field(
         description="Their frequencies, increasing."
     )
-    amplitudes: Amplitudes = Field(
-        description="An amplitude per frequency; for several inputs one list per input."
-    )
+    amplitudes: Amplitudes = Field(description="An amplitude per frequency, or one list per input.")
 
     @property
     def rows(self) -> tuple[tuple[float, ...], ...]:

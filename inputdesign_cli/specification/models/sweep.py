@@ -22,29 +22,22 @@ _RANGE = re.compile(rf"\s*{_NUMBER}\s*:\s*{_NUMBER}\s*(?::\s*{_NUMBER}\s*)?", re
 def range_values(text: str) -> tuple[str, ...] | None:
     """Return the numbers of `low:high:step` as text, both ends included; None for a text that is no range.
 
-    Decimal arithmetic makes 0:1:0.1 hold 0.3 and not 0.30000000000000004.
-
-    Raises:
-        SpecError: `bad-range`.
+    Decimal arithmetic makes 0:1:0.1 hold 0.3 and not 0.30000000000000004. Raises `SpecError`: `bad-range`.
     """
     match = _RANGE.fullmatch(text)
     if match is None:
         return None
-    if match.group(3) is None:
-        message = f'the range "{text.strip()}" has no step'
-        raise bad_spec("bad-range", message, hint="write low:high:step, as 0:40:5")
-    if any("n" in part.lower() for part in match.groups()):
-        message = f'the range "{text.strip()}" has an end or a step that is not finite'
-        raise bad_spec("bad-range", message, hint="write low:high:step with numbers, as 0:40:5")
+    wrong, hint = "", "write low:high:step with numbers, as 0:40:5 or 40:0:-5"
+    if match.group(3) is None or any("n" in part.lower() for part in match.groups()):
+        wrong = "has no step" if match.group(3) is None else "has an end or a step that is not finite"
+        raise bad_spec("bad-range", f'the range "{text.strip()}" {wrong}', hint=hint)
     low, high, step = (Decimal(part) for part in match.groups())
     if step == 0 or (high - low) * step < 0:
-        message = f'the range "{text.strip()}" never gets from {low} to {high}'
-        hint = "the step must lead from the first number to the second, as in 0:40:5 or 40:0:-5"
-        raise bad_spec("bad-range", message, hint=hint)
-    count = int((high - low) / step) + 1
-    if count > MOST_VALUES:
-        message = f'the range "{text.strip()}" holds {count} values'
-        raise bad_spec("bad-range", message, hint="take a larger step")
+        wrong = f"never gets from {low} to {high}"
+    elif (count := int((high - low) / step) + 1) > MOST_VALUES:
+        wrong, hint = f"holds {count} values", "take a larger step"
+    if wrong:
+        raise bad_spec("bad-range", f'the range "{text.strip()}" {wrong}', hint=hint)
     return tuple(_plain(low + i * step) for i in range(count))
 
 

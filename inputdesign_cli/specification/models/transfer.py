@@ -15,7 +15,7 @@ from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
-def as_matrix(value: tuple) -> fields.PolynomialMatrix:
+def as_matrix(value: tuple) -> Plain:
     """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
     return value if fields.depth(value) == 3 else ((value,),)
 
@@ -138,9 +138,7 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 class TransferMatrix(Section):
     """numerator / denominator entry by entry, in s or in q^-1."""
 
-    numerator: fields.GainMatrix = Field(
-        description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
-    )
+    numerator: fields.GainMatrix = Field(description="Coefficients; rows (outputs) of columns (inputs).")
     denominator: fields.ContinuousDenominator = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )

@@ -50,22 +50,15 @@ class Uncertainty(Section, not_both=(SOURCES,)):
     """How well the plant is known, and how the design takes this into account."""
 
     covariance: fields.FileOr[fields.CovarianceMatrix] | None = optional(
-        "Covariance of the parameters around the nominal ones: a matrix, or a model that "
-        "identify wrote (.yaml)."
+        "Covariance of the parameters: a matrix, or a model that identify wrote (.yaml)."
     )
     information: InformationSource | None = optional(
-        "Its inverse: an information matrix, or the name of a file: data (.csv) of the "
-        "excitation of an earlier experiment, or a model (.yaml)."
+        "Its inverse: a matrix, or a file: data (.csv) of an earlier excitation, or a model (.yaml)."
     )
-    intervals: Intervals | None = optional(
-        "Parameters drawn evenly from intervals: {K: [1.5, 2.7]}; others are known."
-    )
-    parameters: fields.Names | None = optional(
-        "Names that order the rows of the matrix (default: the order of the model)."
-    )
+    intervals: Intervals | None = optional("Parameters drawn evenly: {K: [1.5, 2.7]}; others are known.")
+    parameters: fields.Names | None = optional("Names that order the rows (default: of the model).")
     scenarios: Scenarios | None = optional(
-        "How many plants are drawn (default: 100, or what risk needs), or the plants one by one: "
-        "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are nominal."
+        "How many plants are drawn (default: 100, or by risk), or the plants: [{b1: 3.2}, {b1: 4.0}]."
     )
     risk: fields.Fraction | None = optional(
         "Share of plants that may be left out, with confidence 0.999: as many are drawn as it takes."
@@ -74,24 +67,20 @@ class Uncertainty(Section, not_both=(SOURCES,)):
         default=0.0, description="Share of the drawn plants that the design may leave out, the dearest."
     )
     worst_case: fields.Fraction | None = optional(
-        "Confidence of the ellipsoid (of intervals: all of them) in which the worst plant is "
-        "searched and added to the scenarios, until none is found that misses the accuracy. Never proved."
+        "Confidence of the region in which plants that miss the accuracy are searched and added."
     )
     seed: fields.Index = Field(default=1, description="Seed of the draws.")
     stable_within: Annotated[fields.NonNegative, Field(gt=0, le=1)] | None = optional(
-        "Plants with a pole (in closed loop: of the loop), or a zero of their noise model, "
-        "beyond this radius are not drawn (default: 0.998, or halfway from the nominal ones to one)."
+        "Plants, or loops, with poles beyond this radius are not drawn (default: about 0.998)."
     )
     r_adm: Literal["own", "fixed"] = Field(
-        default="own",
-        description="The admissible error of every plant: its own, or that of the nominal plant.",
+        default="own", description="The admissible error of every plant: its own, or the nominal one."
     )
     floor: Annotated[fields.NonNegative, Field(lt=1)] = Field(
         default=0.1, description="Least admissible error of a plant, as a share of that of the nominal plant."
     )
     cost: Literal["nominal", "mean", "worst"] | None = optional(
-        "The powers that are paid for: of the nominal plant, their mean over all (default in "
-        "closed loop), or of the plant where they cost most."
+        "The powers that are paid for: nominal, mean (default in closed loop) or worst."
     )
     fresh: Annotated[fields.Index, SIZES["uncertainty.fresh"]] = Field(
         default=3000, description="Plants drawn afresh that the finished design is tried on."

@@ -27,17 +27,16 @@ _SYNONYMS = {
 
 def describe(value: object) -> str:
     """Return a value in words: "the number 5", "a list"."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return f"the number {show(value)}"
-    if isinstance(value, str):
-        return f"the text {clip(value)}"
-    if isinstance(value, list | tuple):
-        return "a list"
-    if isinstance(value, dict):
-        return "a mapping"
-    return "nothing" if value is None else "something else"
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return f"the number {show(value)}"
+        case str():
+            return f"the text {clip(value)}"
+        case list() | tuple():
+            return "a list"
+    return "a mapping" if isinstance(value, dict) else "something else"
 
 
 def show(value: float) -> str:

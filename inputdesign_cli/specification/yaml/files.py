@@ -17,8 +17,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 def read_text(path: str | os.PathLike[str]) -> str:
     """Return the text of a spec file, UTF-8 with or without a byte order mark.
 
-    Raises:
-        SpecError: There is no such file, or it is a folder, not readable, too large, or not UTF-8.
+    Raises `SpecError`: There is no such file, or it is a folder, not readable, too large, or not UTF-8.
     """
     name = os.fspath(path)
     try:
@@ -60,8 +59,7 @@ def outside(name: str, confine: Path, key: str, location: Location | None) -> Di
 def decode(raw: bytes, file: str) -> str:
     """Return the text of UTF-8 bytes; a byte order mark is dropped.
 
-    Raises:
-        SpecError: `file-encoding`, with the place of the first wrong byte.
+    Raises `SpecError`: `file-encoding`, with the place of the first wrong byte.
     """
     if raw.startswith(_UTF16_MARKS):
         raise _error("file-encoding", f"{file} is encoded as UTF-16", file, "save it as UTF-8")

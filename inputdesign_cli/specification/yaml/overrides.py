@@ -22,10 +22,8 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
     """Add the blocks of included files that the spec does not have; join other mappings key by key.
 
     A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
-    the `known` blocks: it may be any file of the machine.
-
-    Raises:
-        SpecError: A name is no text, or a file cannot be read, holds no blocks or includes others.
+    the `known` blocks: it may be any file of the machine. Raises `SpecError`: A name is no text, or a file
+    cannot be read, holds no blocks or includes others.
     """
     if not isinstance(tree.data, dict) or KEY not in tree.data:
         return
@@ -94,28 +92,6 @@ def _refused(tree: Tree, path: Path, message: str, hint: str) -> SpecError:
     return SpecError.because("bad-include", message.replace("{key}", key), hint, key, location)
 
 
-def compose(
-    tree: Tree,
-    folder: FilePath,
-    overrides: Sequence[str],
-    *,
-    known: Collection[str],
-    confine: FilePath | None = None,
-) -> None:
-    """Join included files to the spec as it is written, then apply overrides (`--set include=..` first).
-
-    Args:
-        tree, folder: the spec, and what names of files are relative to.
-        overrides: `key.path=value` texts.
-        known: the names of blocks.
-        confine: the folder outside of which nothing may be included.
-    """
-    first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
-    apply_overrides(tree, first)
-    apply_includes(tree, folder, known=known, confine=confine)
-    apply_overrides(tree, [override for override in overrides if override not in first])
-
-
 def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
     """Apply each `key.path=value` to the tree, in order; `null` as the value removes the key.
 
@@ -170,8 +146,7 @@ def _apply(tree: Tree, override: str) -> None:
 def _resolve(data: Plain, key: str, override: str) -> Path:
     """The path of a dotted key, with digits turned into indices where the tree has a list.
 
-    Raises:
-        SpecError: `bad-override`.
+    Raises `SpecError`: `bad-override`.
     """
     path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(key.strip()))
     if not path or "" in path or not key.isprintable():

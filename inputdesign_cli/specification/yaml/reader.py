@@ -60,6 +60,12 @@ class Tree:
     broken: set[Path] = field(default_factory=set)
     included: list[str] = field(default_factory=list)
 
+    def sound(self) -> Tree:
+        """Return the tree itself; its diagnostics are raised as a `SpecError`."""
+        if self.diagnostics:
+            raise SpecError(self.diagnostics)
+        return self
+
 
 def read(text: str, file: str, *, source: int = 0, before: str = "", at: Path = ()) -> Tree:
     """Read one YAML document; what is wrong with single keys stands in the diagnostics of the tree.
@@ -116,8 +122,7 @@ class _Document:
     def check_size(self, text: str) -> None:
         """Read the events of a text before its nodes, whose composition recurses and takes memory.
 
-        Raises:
-            SpecError: `yaml-limit`; `several-documents`.
+        Raises `SpecError`: `yaml-limit`; `several-documents`.
         """
         depth = documents = 0
         for event in yaml.parse(text, Loader=_Loader):

@@ -45,8 +45,7 @@ def resolve(word: str) -> Scalar:
 def plain_number(text: str) -> float:
     """Return the number of a text in digits 0 to 9; `float` would accept `1_0` and digits of other scripts.
 
-    Raises:
-        ValueError: the text is no number.
+    Raises `ValueError`: the text is no number.
     """
     if not NUMBER.fullmatch(text.strip()):
         raise ValueError(f"{clip(text)} is no number")

@@ -18,7 +18,9 @@ from inputdesign_cli.specification import Spec
 ERROR = {"model_error": {"relative": 0.2, "band": [0.02, 2.5], "alpha": 3}}
 
 
-def designed(plant: dict, samples: int, accuracy: dict, objective: str = "best_accuracy", **more: object) -> Design:
+def designed(
+    plant: dict, samples: int, accuracy: dict, objective: str = "best_accuracy", **more: object
+) -> Design:
     """Return the design over every spectrum within |u| <= 1."""
     spec = Spec.model_validate(
         {

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import PowerLimit, design_within
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.loop_error import design_within
 from inputdesign_cli.design.loop_error.closed_form import error_of, power_of
 from tests.support.loop_error import adjoint, column, random_complex, random_hermitian
 
@@ -90,10 +91,10 @@ def test_a_limit_that_does_not_bind_has_no_price():
 
 def test_the_column_with_a_limit_for_each_input_and_output():
     limits = (
-        PowerLimit("input", 1.2, 0),
-        PowerLimit("input", 0.6, 1),
-        PowerLimit("output", 1e-3, 0),
-        PowerLimit("output", 1e-3, 1),
+        PowerLimit("input", 1.2, channel=0),
+        PowerLimit("input", 0.6, channel=1),
+        PowerLimit("output", 1e-3, channel=0),
+        PowerLimit("output", 1e-3, channel=1),
     )
     problem = column(limits=limits)
     design, rule, change = problem.asymptotic()

@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import (
-    InternalModel,
-    LoopErrorProblem,
-    MinimumVariance,
-    ModelReference,
-    PowerLimit,
-)
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, MinimumVariance, ModelReference
 from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.parametric import error_eigenvalues, root_moments
 from inputdesign_cli.plant import Rational, TransferMatrix
@@ -178,7 +173,11 @@ def test_the_figures_of_the_errata():
 
 
 def test_the_optimum_meets_its_limits_and_no_mixture_beats_its_bound():
-    limits = (PowerLimit("input", 1.0, 0), PowerLimit("input", 0.5, 1), PowerLimit("output", 1e-3, 0))
+    limits = (
+        PowerLimit("input", 1.0, channel=0),
+        PowerLimit("input", 0.5, channel=1),
+        PowerLimit("output", 1e-3, channel=0),
+    )
     problem = column(limits=limits)
     criterion = problem.parametric()
     best = problem.best_lines(criterion, tolerance=1e-5)

@@ -85,6 +85,7 @@ def test_reference_values(case, goal, value):
     )
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_one_estimated_parameter_against_cvxpy(seed):
     rng = np.random.default_rng(seed)
@@ -95,8 +96,8 @@ def test_one_estimated_parameter_against_cvxpy(seed):
     assert 0.0 <= gap(found, found.split.total) <= 1.1e-6
 
 
-@pytest.mark.first(3)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.first(2)
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 2])
 def test_two_estimated_parameters_are_proved(seed):
     rng = np.random.default_rng(seed)
     weights = rng.standard_normal(4 + seed % 2)

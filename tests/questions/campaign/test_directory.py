@@ -266,21 +266,6 @@ def test_a_poor_plant_of_the_spec_is_told_once(run, begun, tmp_path, gain, sign)
     assert later == []
 
 
-@pytest.mark.slow
-def test_pictures_stay_without_new_ones_and_a_note_dates_them(run, tmp_path):
-    run("campaign", "s.yaml", "-o", "c")
-    begun = tmp_path / "c"
-    before = (begun / "signal.png").read_bytes()
-    for number in (1, 2):
-        record = applied(begun, tmp_path / f"r{number}.csv")
-        assert run("next", "c", record, "--no-figures")[0] == 0
-        assert (begun / "signal.png").read_bytes() == before
-        assert sum("signal.png" in note for note in read_run(begun)["notes"]) == 1
-    assert run("next", "c")[0] == 0
-    assert (begun / "signal.png").read_bytes() != before
-    assert not any("signal.png" in note for note in read_run(begun).get("notes", []))
-
-
 def test_one_process_decides_at_a_time(run, begun, tmp_path):
     record = applied(begun, tmp_path / "r.csv")
     with held(begun):

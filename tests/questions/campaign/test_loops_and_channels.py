@@ -181,6 +181,7 @@ def test_an_output_that_is_what_was_applied_is_refused(run, begin, tmp_path, nam
     assert f"{other} of w.csv is a copy of {'r1' if name == 'loop' else 'u1'}" in err
 
 
+@pytest.mark.slow
 def test_a_record_that_ends_early_says_so(run, begin, tmp_path):
     begin("two")
     header, table = recorded(tmp_path / "c", "two")

@@ -1,4 +1,4 @@
-"""campaign.png, estimates.png, true_ratio.png and cost_coverage.png: how campaigns go, one or many."""
+"""Figures of many experiments, or of many parts of one: ratios, costs and losses."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from inputdesign_cli.figures.style import (
     BLUE,
     DASHED,
     DOTTED,
+    GREEN,
+    GREY,
     ORANGE,
     PALETTE,
     legend_above,
     legend_over_all,
-    page_of_pairs,
     plain_decades,
 )
-from inputdesign_cli.outcome.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
+from inputdesign_cli.outcome.curves import CampaignCurves, LossCurves, RatioCurves, TradeCurves
 
-COLUMNS = 3
+_COLOURS = (BLUE, ORANGE, GREEN, GREY)
 # With few runs, fine bins would show each run separately.
-BINS, RUNS_A_BIN = 40, 4
-SHOWN = 0.99
-WIDE = 5.0  # costs beyond it are shown over their logarithm
+_FEWEST_BINS, _BINS, _RUNS_A_BIN = 6, 40, 4
+# Shares of the ratios and of the losses that are shown: few runs of the tail would squeeze the rest.
+_RATIOS, _LOSSES = 0.99, 0.998
+_WIDE = 5.0  # costs beyond it are shown over their logarithm
 
 
 def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
@@ -35,47 +37,27 @@ def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
     upper.set_ylabel("worst ratio")
     lower.plot(curves.samples, curves.energy, "o-", color=BLUE, markersize=4)
     lower.set_ylim(bottom=0.0)
-    lower.set_ylabel("energy applied")
-    lower.set_xlabel("samples applied")
+    lower.set(xlabel="samples applied", ylabel="energy applied")
     if 2 * curves.samples[-1] > curves.end:
         lower.axvline(curves.end, color=BLACK, linestyle=DASHED)
     legend_above(upper)
-
-
-def draw_estimates(page: Figure, curves: EstimateCurves, time_unit: str) -> None:
-    """One panel a parameter: the estimate after each part with two standard deviations."""
-    for axes, name in zip(page_of_pairs(page, len(curves.estimates), COLUMNS), curves.estimates, strict=True):
-        middle, spread = curves.estimates[name], 2.0 * curves.deviations[name]
-        axes.plot(curves.samples, middle, "o-", color=BLUE, markersize=3, label="estimate")
-        band, label = (middle - spread, middle + spread), "two standard deviations"
-        axes.fill_between(curves.samples, *band, color=BLUE, alpha=0.25, linewidth=0, label=label)
-        # The first estimates know so little that their band would hide the rest.
-        near = spread <= 5.0 * np.median(spread)
-        low, high = (middle[near] + side * 1.2 * spread[near] for side in (-1.0, 1.0))
-        axes.set_ylim(float(low.min()), float(high.max()))
-        axes.set_title(name)
-        axes.set_xlabel("samples")
-    legend_over_all(page)
 
 
 def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
     """A histogram for each way on common bins; at one the true plant has what is asked."""
     axes = page.add_subplot()
     everything = np.concatenate(list(curves.ratios.values()))
-    low, top = float(everything.min()), float(np.quantile(everything, SHOWN))
+    low, top = min(float(everything.min()), 0.95), max(float(np.quantile(everything, _RATIOS)), 1.05)
     runs = max(ratios.size for ratios in curves.ratios.values())
-    number = int(np.clip(runs // RUNS_A_BIN, 2 * COLUMNS, BINS))
-    low, top = min(low, 0.95), max(top, 1.05)
-    step = (top - low) / number
+    step = (top - low) / int(np.clip(runs // _RUNS_A_BIN, _FEWEST_BINS, _BINS))
     # An edge at one: no bin mixes runs that meet the requirement with runs that miss it.
     bins = (1.0 + step * np.arange(np.floor((low - 1.0) / step), np.ceil((top - 1.0) / step) + 1.0)).tolist()
     for (name, ratios), colour in zip(curves.ratios.items(), PALETTE, strict=False):
-        shares = np.full(ratios.size, 100.0 / max(ratios.size, 1))
         filled = name == "campaign"
         axes.hist(
             np.minimum(ratios, bins[-1]),
             bins=bins,
-            weights=shares,
+            weights=np.full(ratios.size, 100.0 / max(ratios.size, 1)),
             color=colour,
             alpha=0.45 if filled else 1.0,
             histtype="stepfilled" if filled else "step",
@@ -99,9 +81,27 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
     axes.axvline(1.0, color=BLACK, linestyle=DASHED, label="knows the plant: its spectrum")
     if curves.record is not None:
         axes.axvline(curves.record, color=BLACK, linestyle=DOTTED, label="knows the plant: its record")
-    if max(dear for _, _, dear, *_ in curves.points.values()) > WIDE:
+    if max(dear for _, _, dear, *_ in curves.points.values()) > _WIDE:
         plain_decades(axes, "x")
     axes.set_xlabel("cost over that of the spectrum that knows the plant\n(mean, 5 to 95 %)")
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)
     legend_over_all(page)
+
+
+def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
+    """A histogram for each input on common bins, with its mean as a vertical line."""
+    axes = page.add_subplot()
+    top = max(float(np.quantile(loss, _LOSSES)) for loss in curves.losses.values())
+    bins = np.linspace(0.0, top, _BINS + 1).tolist()
+    for index, (name, loss) in enumerate(curves.losses.items()):
+        colour = _COLOURS[index % len(_COLOURS)]
+        weights = np.full(loss.size, 100.0 / loss.size)
+        label = f"{name}: mean {loss.mean():.4g}, sd {loss.std(ddof=1):.4g}"
+        axes.hist(loss, bins=bins, weights=weights, color=colour, alpha=0.45, label=label)
+        axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
+        if name in curves.theory:
+            axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
+    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
+    axes.set(ylabel="share of the runs (%)", xlim=(0.0, top))
+    legend_above(axes)

@@ -1,45 +1,23 @@
-"""curves.png, map.png and moments.png: what a sweep over one or two keys has come to."""
+"""Figures of sweeps: curves over a key, maps over two, moments, and trades of length against amplitude."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from inputdesign_cli.figures.style import (
-    BLACK,
-    DASHED,
-    DOTTED,
-    FILE_TYPES,
-    GREY,
-    PALETTE,
-    TYPE_SIZE,
-    ink_on,
-    labelled,
-    legend_above,
-    legend_over_all,
-    log_axes,
-    lowered,
-    rendered,
-    title_above,
-)
-from inputdesign_cli.figures.sweep_axes import (
-    LOG_FROM,
-    curve,
-    key_label,
-    mark_failures,
-    plain_numbers,
-    scale_key,
-)
-from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable
+from inputdesign_cli.figures import style
+from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, ORANGE, PALETTE, log_axes
+from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable, Trade
 from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.run_directory import output_errors, write_bytes
@@ -54,6 +32,18 @@ MOST_LABELLED = 100  # cells of a map that carry their number
 _CELL = 0.6  # inches of the page that a column of a map takes where it has numbers
 _PREFIX, _TRACE = "moments.entries.", "moments.trace"
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
+# Values over a wider ratio are drawn on a logarithmic scale; keys from the second ratio on.
+LOG_FROM = 10.0
+_LOG_KEYS_FROM = 100.0
+_DECADES_IN_FULL = 3.0
+# Ticks at points: their largest number, and their least distance as a share of the axis.
+_MOST_TICKS, _ROOM = 12, 0.055
+_NAMES = {
+    "experiment.samples": "number of samples N",
+    "spectrum.order": "order of the FIR spectrum",
+    "accuracy.mean_squared_error.neglected_norm": "bound α on the neglected parameters",
+    "accuracy.mean_squared_error.target": "mean squared error γ that is admitted",
+}
 
 
 def draw_sweep(table: SweepTable, root: Path, file_type: str = "png") -> list[Path]:
@@ -69,7 +59,7 @@ def draw_into(root: Path, name: str, paint: Callable[[Figure], None], file_type:
     Raises:
         OutputError: see `write_bytes`.
     """
-    content = rendered(paint, FILE_TYPES[file_type])
+    content = style.rendered(paint, style.FILE_TYPES[file_type])
     _remove(root, name)
     path = root / f"{name}.{file_type}"
     write_bytes(path, content)
@@ -78,7 +68,7 @@ def draw_into(root: Path, name: str, paint: Callable[[Figure], None], file_type:
 
 def _remove(root: Path, name: str) -> None:
     with output_errors(root):
-        for file_type in FILE_TYPES:
+        for file_type in style.FILE_TYPES:
             (root / f"{name}.{file_type}").unlink(missing_ok=True)
 
 
@@ -139,16 +129,15 @@ def _draw_panels(
     for axes in grid.flat[len(values) :]:
         axes.set_axis_off()
     if panels:
-        page.supxlabel(key_label(along), fontsize=TYPE_SIZE)
-        page.supylabel(_label(table, quantity), fontsize=TYPE_SIZE)
+        page.supxlabel(key_label(along), fontsize=style.TYPE_SIZE)
+        page.supylabel(_label(table, quantity), fontsize=style.TYPE_SIZE)
     named = table.best
-    title = f"best: {named[1]}" if named and named[0] == quantity else None
-    if panels or len(labelled(grid[0][0])) > 4:
-        legend_over_all(page, title=title)
+    title = f"best: {named[1]}" if named and named[0] == quantity else ""
+    if panels or len(style.labelled(grid[0][0])) > 4:
+        style.legend_over_all(page, title=title)
     else:
-        if title:
-            title_above(page, title)
-        legend_above(grid[0][0])
+        style.title_above(page, title)
+        style.legend_above(grid[0][0])
 
 
 def _draw_curves(
@@ -229,15 +218,10 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     axes.set_xlabel(key_label(along))
     axes.set_ylabel(key_label(down))
     if cells.size <= MOST_LABELLED and page.get_figwidth() >= _CELL * len(columns):
-        _number_cells(axes, cells, image)
-
-
-def _number_cells(axes: Axes, cells: Array, image: QuadMesh) -> None:
-    for (i, j), value in np.ndenumerate(cells):
-        text, colour = "none", BLACK
-        if np.isfinite(value):
-            text, colour = f"{value:.3g}", ink_on(image, value)
-        axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour)
+        for (i, j), value in np.ndenumerate(cells):
+            known = bool(np.isfinite(value))
+            text, colour = (f"{value:.3g}", style.ink_on(image, value)) if known else ("none", BLACK)
+            axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour)
 
 
 def _ordered(texts: list[str]) -> list[str]:
@@ -279,7 +263,7 @@ def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
     for name, colour, width in zip(entries, PALETTE, widths, strict=False):
         y = table.numbers(name)
         assert y is not None
-        curve(axes, x, y, color=colour, linewidth=width, label=f"R{lowered(*_place(name))}")
+        curve(axes, x, y, color=colour, linewidth=width, label=f"R{style.lowered(*_place(name))}")
         values.append(y)
     curve(axes, x, trace, color=BLACK, linestyle=DASHED, label="trace R")
     mark_failures(axes, x[~np.isfinite(trace)])
@@ -289,9 +273,88 @@ def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
         plain_numbers(axes.yaxis, span)
     scale_key(axes, along, x)
     axes.set_ylabel("moments, summed over the samples")
-    legend_above(axes)
+    style.legend_above(axes)
 
 
 def _place(name: str) -> list[str]:
     """Row and column of an entry, from 1."""
     return name.removeprefix(_PREFIX).split("_")[1:]
+
+
+def key_label(key: str) -> str:
+    """What an axis over a key of the spec is called."""
+    return _NAMES.get(key, key)
+
+
+def curve(axes: Axes, x: Array, y: Array, **style: Any) -> None:
+    """A curve through the points in the order of x."""
+    order = np.argsort(x, kind="stable")
+    axes.plot(x[order], y[order], **style)
+
+
+def mark_failures(axes: Axes, where: Array) -> None:
+    """Crosses at the foot of the axes where a point has no result."""
+    where = where[np.isfinite(where)]
+    if not where.size:  # the layout would make room for a line without points
+        return
+    foot = np.full(where.size, 0.02)
+    axes.plot(where, foot, "x", color=ORANGE, transform=axes.get_xaxis_transform(), clip_on=False)
+
+
+def scale_key(axes: Axes, key: str, x: Array) -> None:
+    """The scale and the name of the axis of a key: logarithmic for N and over decades.
+
+    Up to a dozen points that stand apart have their ticks, and no others.
+    """
+    low, high = float(np.nanmin(x)), float(np.nanmax(x))
+    if low > 0 and (key == "experiment.samples" or high > _LOG_KEYS_FROM * low):
+        log_axes(axes, "x")
+        plain_numbers(axes.xaxis, high / low)
+    elif np.all(x == np.round(x)):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    points = np.unique(x[np.isfinite(x)])
+    if _apart(points, logarithmic=axes.get_xscale() == "log"):
+        axes.xaxis.set_major_locator(FixedLocator(points.tolist()))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_xlabel(key_label(key))
+
+
+def _apart(points: Array, *, logarithmic: bool) -> bool:
+    """Whether there is room for a number at each of the points."""
+    if not 1 < points.size <= _MOST_TICKS:
+        return False
+    place = np.log(points) if logarithmic else points
+    return bool(np.diff(place).min() > _ROOM * np.ptp(place))
+
+
+def plain_numbers(axis: Axis, ratio: float) -> None:
+    """Ticks of a logarithmic axis, written out: powers of ten, over few decades 2 and 5 times them too."""
+    subs = (1.0, 2.0, 5.0) if ratio < 10.0**_DECADES_IN_FULL else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def draw_trade(trade: Trade, page: Figure) -> None:
+    """Ratios to what is asked, which stands at one, or the criterion."""
+    axes = page.add_subplot()
+    for number, (text, row) in enumerate(zip(trade.amplitudes, trade.values, strict=True)):
+        name = f"amplitude {text}" if text else "best record"
+        colour, dashes = style.stroke(number)
+        drawn = {"color": colour, "linestyle": dashes, "label": name}
+        curve(axes, trade.lengths, row, marker="o", markersize=4, **drawn)
+    log_axes(axes, "x")
+    axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlabel(f"length of the experiment ({trade.unit})")
+    mark_failures(axes, trade.lengths[np.all(np.isnan(trade.values), axis=0)])
+    if trade.criterion:
+        axes.set_ylabel("criterion")
+    else:
+        axes.axhline(1.0, color=BLACK, linestyle=DASHED, linewidth=1.1, label="what is asked")
+        known = np.append(trade.values[np.isfinite(trade.values)], 1.0)
+        log_axes(axes, "y")
+        plain_numbers(axes.yaxis, float(known.max() / known.min()))
+        axes.set_ylabel("error of the record / what is asked")
+    style.legend_above(axes)

@@ -1,11 +1,18 @@
-"""Findings of designs, their records and their simulations: when they hold, and short sentences."""
+"""The table of findings that need no data: when each holds, its code, and short sentences."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from inputdesign_cli.findings import designed_records as records, designs, simulated_runs as runs, unfinished
+from inputdesign_cli.findings import (
+    campaigns,
+    designed_records as records,
+    designs,
+    simulated_runs as runs,
+    unfinished,
+)
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Objective
 from inputdesign_cli.outcome.design import Coverage
@@ -16,7 +23,7 @@ from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.signal.selection import Record
 from tests.support.wording import long_sentences
 
-UNITS = Units("s", 1.0, sampled=True, closed_loop=True, inputs=1, outputs=1)
+UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
 MODEL = PolynomialModel.single([0.0, 1.0], F=[1.0, -0.99])
 ASKED = Coverage(100, 0.9, (0.8, 0.95), 0.9, 100, 0.9, (0.85, 0.94), asked=0.95)
 RUNS = TriedInput(within_r_adm=0.8, within_r_adm_limits=(0.7, 0.9))
@@ -29,10 +36,39 @@ ELSEWHERE = replace(
 LOST = FloorUse(0.3, (1, 4, 9), (4,), (LostPlant(4, {"b1": 0.2, "f1": -0.9}, 3.1),))
 MADE = Record(np.ones((40, 1)), "filtered_noise", 1.2, extra_power=3.0, met=False)
 GAP = Objective("least_cost", 2.0, lower_bound=1.9, relative_gap=0.05)
+FOLLOWED = {"likeness": 0.95, "spliced": 0.96, "like": 0.9, "follows": True, "other": None}
+
+
+def planned(**change):
+    asked = {"why": "", "capped": False, "share": 1.0, "beyond": False, "part_cost": 2.0, "fragile": False}
+    return campaigns.planned_otherwise("plan_02.csv", **(asked | change))
+
+
+def followed(**change):
+    return campaigns.hardly_followed("r.csv", "plan_02.csv", **(FOLLOWED | change))
+
 
 FOUND = {
+    "part-without-design": planned(why="no power is enough"),
+    "plan-capped": planned(capped=True),
+    "part-scaled": planned(share=0.5),
+    "earlier-parts-cost": planned(beyond=True),
+    "part-not-robust": planned(fragile=True),
+    "part-repeated": followed(other="plan_01.csv"),
+    "record-scaled": [*followed(scale=0.5), *followed(likeness=-0.99, scale=0.5)],
+    "record-unlike-plan": [*followed(likeness=0.7), *followed(likeness=0.1, follows=False)],
+    "record-shorter": campaigns.shorter("r.csv", "plan_01.csv", 59, 60),
+    "record-without-excitation": campaigns.without_excitation("r.csv", "plan_01.csv"),
+    "record-withdrawn": campaigns.withdrawn_record("r.csv", 2),
+    "no-estimate-yet": campaigns.no_estimate_yet("the input never moves"),
+    "estimate-not-used": [
+        *campaigns.estimate_not_used(0.4, ""),
+        *campaigns.estimate_not_used(None, "the loop is unstable"),
+    ],
+    "campaign-doubted": campaigns.campaign_doubted(),
+    "campaign-refuted": campaigns.campaign_refuted(Path("c"), 80, 600, ["record_02.csv"], every=False),
     "no-excitation-needed": [designs.nothing_needed(Experiment(MODEL, 500), at_every_plant=True)],
-    "input-without-power": list(designs.inputs_without_power([1.0, 0.0])),
+    "input-without-power": designs.inputs_without_power([1.0, 0.0]),
     "experiment-short": designs.short_experiment(Experiment(MODEL, 100)),
     "excitation-almost-free": designs.almost_free(
         UNITS, np.array([0.01, 1.0]), np.ones(2), np.array([1e-6, 1.0]), 1.0
@@ -55,18 +91,17 @@ FOUND = {
     "start-from-rest": [records.start_matters(2.0), records.start_matters(np.inf)],
     "other-signal": [
         records.other_signal("a multisine"),
-        records.other_spectrum(
-            "noise", "a multisine", ["limits.amplitude.input", "limits.rate"], 2.0, "cost"
-        ),
+        records.other_spectrum("noise", "a multisine", ["limits.rate"], 2.0, "cost"),
     ],
     "confidence-missed": [
         *runs.confidence_missed(ASKED, ASKED),
         *runs.runs_miss_confidence(ASKED, RUNS),
         *runs.runs_miss_confidence(replace(ASKED, runs=None), RUNS),
     ],
-    "other-length": runs.other_length(1, 7),
+    "other-length": [*runs.other_length(1, 7), *runs.other_length(0, 7)],
     "initial-estimate-off": runs.initial_estimate_off(UNITS, {"design": ELSEWHERE}),
     "runs-see-one-minimum": runs.one_minimum(Searched(10, 3, 7)),
+    "unstable-runs": runs.unstable_runs({"design": 3, "white": 0}, 100),
     "met-within-table": [designs.met_within_table(1e-5)],
 }
 
@@ -80,16 +115,34 @@ def test_a_finding_has_its_code_and_short_sentences(code):
 
 def test_what_is_in_order_is_not_noted():
     good = replace(MADE, met=True, extra_power=0.1)
-    assert list(designs.inputs_without_power([1.0, 0.5])) == []
+    assert planned() == planned(share=0.95) == followed() == campaigns.estimate_not_used(1.0, "") == []
+    assert campaigns.shorter("r.csv", "plan_01.csv", 60, 60) == []
+    assert designs.inputs_without_power([1.0, 0.5]) == []
     assert designs.short_experiment(Experiment(MODEL, 1000)) == []
     assert unfinished.fewer_plants(120, 120) == unfinished.unstable_draws(40, 100) == []
     assert unfinished.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good, held=True) == []
     assert records.length_of_record(good, 40, 1, {}) == records.less_accurate(1.001, 1.0) == []
-    assert list(runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None)) == []
+    assert runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None) == []
     assert runs.other_length(7, 7) == runs.one_minimum(None) == []
 
 
-def test_one_sample_is_singular():
-    assert "counts 1 sample," in runs.other_length(1, 7)[0].message
-    assert "counts 0 samples," in runs.other_length(0, 7)[0].message
+def test_figures_are_the_numbers_of_the_case():
+    (part, full) = FOUND["estimate-not-used"]
+    assert (part.figures["share"], full.figures) == (0.4, {"why": "the loop is unstable"})
+    assert FOUND["part-scaled"][0].figures == {"share": 0.5}
+    assert FOUND["campaign-refuted"][0].figures == {"samples": 80, "end": 600, "records": ["record_02.csv"]}
+    assert str(Path("c/record_02.csv")) in FOUND["campaign-refuted"][0].message
+    assert [one.severity for one in FOUND["record-unlike-plan"]] == ["note", "doubt"]
+    assert [one.figures["scale"] for one in FOUND["record-scaled"]] == [0.5, 0.5]
+    assert FOUND["part-repeated"][0].figures["other"] == "plan_01.csv"
+
+
+def test_a_message_is_the_title_the_fact_and_the_remedy():
+    assert FOUND["unstable-runs"][0].message == (
+        "Controllers of some simulated runs destabilise the loop: 3 of 100 with the input design. Take more "
+        "samples or more power, or ask for a slower loop."
+    )
+    assert FOUND["record-shorter"][0].message == (
+        "A record ends before its plan: r.csv has 59 of the 60 samples of plan_01.csv."
+    )

@@ -1,0 +1,164 @@
+"""Figures of parameters, structures and moments: where estimates are to be expected, and where they were."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from inputdesign_cli.figures import style
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE
+from inputdesign_cli.outcome.curves import (
+    CloudCurves,
+    EllipseCurves,
+    ErrorCurves,
+    EstimateCurves,
+    MomentsCurves,
+    OrderCurves,
+)
+from inputdesign_cli.outcome.results import Array
+
+_POINTS = 200  # of an ellipse
+_TICKS = 2  # intervals between numbers: these are wide for three columns
+_LEAST_SHOWN = -20.0  # per cent of fit
+_OPAQUE = 0.8
+_NUMBERED = 8  # rows up to which the entries are written into the cells
+
+
+def _panels(page: Figure, number: int, columns: int) -> list[Axes]:
+    """Return axes for a number of panels, row by row."""
+    columns = min(columns, number)
+    grid = list(page.subplots(-(-number // columns), columns, squeeze=False).flat)
+    for axes in grid[number:]:
+        axes.set_axis_off()
+    for axes in grid[:number]:
+        axes.locator_params(nbins=4)
+    return grid[:number]
+
+
+def boundary(center: Array, covariance: Array, probability: float) -> Array:
+    """(2, points): the ellipse with (x - center)^T covariance^-1 (x - center) = chi-squared (2 freedoms)."""
+    radius = np.sqrt(-2.0 * np.log(1.0 - probability))
+    angle = np.linspace(0.0, 2.0 * np.pi, _POINTS)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    # The covariance of nearly unidentifiable parameters is singular, to rounding.
+    scale = np.sqrt(np.diag(covariance))
+    sizes, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    root = scale[:, None] * axes * np.sqrt(np.maximum(sizes, 0.0))
+    return center[:, None] + radius * root @ circle
+
+
+def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
+    """One panel a pair: the region that holds the estimate with the probability of the title."""
+    label = f"{100 * curves.probability:g} % of estimates"
+    for axes, pair in zip(_panels(page, len(curves.pairs), 3), curves.pairs, strict=True):
+        axes.locator_params(axis="x", nbins=_TICKS)
+        outline = boundary(pair.center, pair.covariance, curves.probability)
+        axes.plot(*outline, color=BLUE, linewidth=1.8, label=label)
+        if pair.white is not None:
+            outline = boundary(pair.center, pair.white, curves.probability)
+            axes.plot(*outline, color=GREY, linestyle=DASHED, linewidth=1.2, label="flat input")
+        axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
+        axes.set(xlabel=pair.names[0], ylabel=pair.names[1])
+    style.legend_over_all(page)
+
+
+def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
+    """One panel a pair of parameters: an estimate a dot, with the ellipse that theory predicts."""
+    for axes, (i, j) in zip(_panels(page, len(curves.pairs), 2), curves.pairs, strict=True):
+        pair = np.array([i, j])
+        axes.plot(*curves.theta[:, pair].T, ".", color=BLUE, markersize=2.5, alpha=0.5, rasterized=True)
+        outline = boundary(curves.centre[pair], curves.covariance[np.ix_(pair, pair)], curves.probability)
+        axes.plot(*outline, color=ORANGE, linewidth=1.8)
+        axes.plot(*curves.centre[pair], "+", color=BLACK, markersize=9, markeredgewidth=1.6)
+        axes.set(xlabel=curves.names[i], ylabel=curves.names[j])
+    share = f"{100 * curves.probability:g} % ellipse of theory"
+    handles = [
+        Line2D([], [], color=BLUE, marker=".", linestyle="none", label=f"{len(curves.theta)} estimates"),
+        Line2D([], [], color=ORANGE, label=share),
+        Line2D([], [], color=BLACK, marker="+", linestyle="none", label="truth"),
+    ]
+    style.legend_over_all(page, handles)
+
+
+def draw_estimates(page: Figure, curves: EstimateCurves, time_unit: str) -> None:
+    """One panel a parameter: the estimate after each part with two standard deviations."""
+    for axes, name in zip(_panels(page, len(curves.estimates), 3), curves.estimates, strict=True):
+        middle, spread = curves.estimates[name], 2.0 * curves.deviations[name]
+        axes.plot(curves.samples, middle, "o-", color=BLUE, markersize=3, label="estimate")
+        label = "two standard deviations"
+        style.band(axes, curves.samples, middle - spread, middle + spread, BLUE, 0.25, label=label)
+        # The first estimates know so little that their band would hide the rest.
+        near = spread <= 5.0 * np.median(spread)
+        low, high = (middle[near] + side * 1.2 * spread[near] for side in (-1.0, 1.0))
+        axes.set(ylim=(float(low.min()), float(high.max())), title=name, xlabel="samples")
+    style.legend_over_all(page)
+
+
+def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
+    """The fit by simulation to data that were not used, over the number of parameters, family by family."""
+    axes = page.subplots()
+    least = 0.0
+    for number, (family, (sizes, fit)) in enumerate(curves.fits.items()):
+        color, marker = style.point(number)
+        shown = np.maximum(fit, _LEAST_SHOWN)
+        least = min(least, float(np.min(fit, initial=0.0)))
+        axes.plot(sizes, shown, marker, color=color, markersize=5, alpha=0.8, label=family)
+    label = f"chosen: {curves.family}"
+    axes.plot(*curves.chosen, "o", markersize=12, markerfacecolor="none", color=BLACK, label=label)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    name = "y" if curves.output is None else f"y{curves.output + 1}"
+    worse = f"; below {_LEAST_SHOWN:g}: there" if least < _LEAST_SHOWN else ""
+    which = "unseen data" if curves.unseen else "the data that estimate"
+    axes.set(xlabel="parameters", ylabel=f"fit of {name} on {which} (%{worse})")
+    style.legend_over_all(page)
+
+
+def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
+    """Draw R as a coloured matrix, its estimated block framed, and the power of each line of the input."""
+    if curves.line_frequency is None or curves.line_power is None:
+        _draw_matrix(page.add_subplot(), curves)
+        return
+    matrix, lines = page.subplots(1, 2, width_ratios=[1, 1])
+    _draw_matrix(matrix, curves)
+    lines.vlines(curves.line_frequency, 0.0, curves.line_power, color=BLUE, linewidth=1.8)
+    lines.plot(curves.line_frequency, curves.line_power, "o", color=BLUE, markersize=5)
+    lines.set_xlim(-0.03 * curves.nyquist, 1.03 * curves.nyquist)
+    lines.set_ylim(0.0, 1.08 * float(curves.line_power.max()))
+    lines.set(xlabel=style.frequency_label(time_unit), ylabel="power of each line (mean square)")
+
+
+def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
+    R, n, m = curves.R, len(curves.R), curves.estimated
+    largest = float(np.abs(R).max())
+    drawn = axes.imshow(R, cmap="RdBu", vmin=-largest, vmax=largest, alpha=_OPAQUE)
+    axes.grid(False)
+    axes.set_xticks(range(n), [str(i + 1) for i in range(n)])
+    axes.set_yticks(range(n), [str(i + 1) for i in range(n)])
+    axes.set_title(f"R, trace {np.trace(R):.5g}; framed: estimated", loc="left")
+    inner, edge = m - 0.5, -0.5
+    axes.plot([edge, inner, inner], [inner, inner, edge], color=BLACK, linewidth=1.6)
+    axes.set(xlim=(-0.5, n - 0.5), ylim=(n - 0.5, -0.5))
+    for (i, j), value in np.ndenumerate(R if n <= _NUMBERED else np.zeros((0, 0))):
+        colour = style.ink_on(drawn, value, _OPAQUE)
+        axes.text(j, i, f"{value:.3g}", ha="center", va="center", color=colour)
+
+
+def draw_error(page: Figure, curves: ErrorCurves, time_unit: str) -> None:
+    """Draw squared bias and variance stacked over energy, the error of white regressors, and the design."""
+    axes = page.add_subplot()
+    energy, bias = curves.energy, curves.bias_squared
+    total = bias + curves.variance
+    style.band(axes, energy, np.zeros_like(bias), bias, ORANGE, 0.55, label="squared bias")
+    style.band(axes, energy, bias, total, BLUE, 0.35, label="variance")
+    axes.plot(energy, total, color=BLUE, linewidth=2.0)
+    axes.plot(energy, curves.white, color=GREY, linestyle=DASHED, label="white")
+    if curves.target is not None:
+        axes.axhline(curves.target, color=BLACK, linewidth=0.9, label="target")
+    axes.plot(*curves.design, "o", color=BLUE, markersize=7, label="design")
+    style.log_axes(axes, "x")
+    axes.set(xlim=(energy[0], energy[-1]), ylim=(0.0, 3.0 * curves.design[1]))
+    axes.set(xlabel="energy, trace R", ylabel="mean-squared error")
+    style.legend_above(axes)

@@ -1,0 +1,305 @@
+"""Figures over frequency, a panel for every entry of G: errors and their limits, responses, plants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, TypeVar
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
+
+from inputdesign_cli.figures import style
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, OTHERS, lowered
+from inputdesign_cli.outcome.curves import (
+    BoundCurves,
+    BoundPanel,
+    DeviationCurves,
+    DeviationPanel,
+    ErrorBandCurves,
+    ErrorBandPanel,
+    FanCurves,
+    ResponseCurves,
+    ResponsePanel,
+)
+from inputdesign_cli.outcome.results import Array
+
+# How much higher a page is with a panel under one other, or under several.
+_TALL, _TALLER = 1.25, 1.4
+# Ratios beyond this many times the limit, or the design, run out of the linear panel.
+_HIGHEST = 4.0
+# Ratios that all stay below this share of the limit are flat on a linear axis: they are drawn over decades.
+_FAR_BELOW = 0.25
+# A gain below this many times the least error is drawn there.
+_FAR = 1e-2
+# Plants drawn as lines of their own, those with a colour, and the least ratio beside the largest one.
+_MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
+
+
+class Panel(Protocol):
+    """Curves over frequency that belong to one entry of G."""
+
+    @property
+    def frequency(self) -> Array:
+        """(n,) rad per time unit."""
+
+    @property
+    def entry(self) -> tuple[int, int] | None:
+        """Output and input from zero; None: the only entry, or all of them together."""
+
+    @property
+    def names(self) -> str:
+        """Return the names of its input and output; empty if there are none."""
+
+
+P = TypeVar("P", bound=Panel)
+
+
+def draw_panels(
+    page: Figure,
+    panels: Sequence[P],
+    plot: Callable[[Axes, P], None],
+    time_unit: str,
+    *,
+    magnitude: str,
+    title: str = "",
+    below: Callable[[Axes, Sequence[P]], object] | None = None,
+) -> None:
+    """Draw each panel with `plot`, outputs as rows, and all of them together in a further panel with `below`.
+
+    Args:
+        magnitude: the label of the vertical axes at the left.
+        title: says what all panels are about.
+    """
+    single = len(panels) == 1
+    places = [(0, 0)] if single else [panel.entry or (0, 0) for panel in panels]
+    rows, columns = (1 + max(place[side] for place in places) for side in (0, 1))
+    heights = [3] * rows
+    if below is not None:
+        page.set_figheight((_TALL if single else _TALLER) * page.get_figheight())
+        heights.append(2)
+    cells = page.add_gridspec(len(heights), columns, height_ratios=heights)
+    for panel, (i, j) in zip(panels, places, strict=True):
+        axes = page.add_subplot(cells[i, j])
+        plot(axes, panel)
+        style.frequency_axis(axes, panel.frequency, time_unit)
+        if not any(row == i and column < j for row, column in places):
+            axes.set_ylabel(magnitude)
+        if single:
+            title = ": ".join(filter(None, (title, panel.names)))
+        else:
+            axes.set_label(f"G{lowered(i + 1, j + 1)} {panel.names}".strip())
+            axes.set_title(str(axes.get_label()), loc="left", color=GREY)
+        if below is not None or any(row > i and column == j for row, column in places):
+            axes.tick_params(which="both", labelbottom=False)
+            axes.set_xlabel("")
+    if single:
+        style.title_above(page, title)
+        style.legend_above(axes)
+    else:
+        style.legend_over_all(page, title=title)
+    if below is not None:
+        lowest = page.add_subplot(cells[rows, :])
+        below(lowest, panels)
+        style.frequency_axis(lowest, panels[0].frequency, time_unit)
+        if lowest.get_legend() is None:
+            style.legend_above(lowest)
+
+
+def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
+    """r_u of design, record and white excitation against r_adm, and their ratios on a linear axis.
+
+    Where nothing is asked of the error, against |G|.
+    """
+    stated = [panel for panel in curves.panels if panel.r_adm is not None]
+    title = "Model error r_u against the admitted error r_adm" if stated else "Model error r_u beside |G|"
+    title += ", at the plant of the spec" if curves.of_several else ""
+    below = _plot_ratios if stated else None
+    draw_panels(page, curves.panels, _plot_error, time_unit, magnitude="error of G", title=title, below=below)
+
+
+@dataclass(frozen=True)
+class _Error:
+    """One r_u (n,) or its ratio, and how it is drawn wherever it is."""
+
+    name: str
+    values: Array
+    color: str
+    width: float = 1.6
+    style: LineStyleType = "solid"
+
+    def plot(self, axes: Axes, w: Array, values: Array, label: str) -> list[Line2D]:
+        return axes.plot(w, values, color=self.color, linewidth=self.width, linestyle=self.style, label=label)
+
+
+def _errors(curves: BoundPanel) -> list[_Error]:
+    """What r_u there is: the widest first, so that the others show on it."""
+    needed, equal = curves.white_labels
+    found = [_Error(curves.label, curves.r_u, BLUE, 2.4)]
+    if curves.r_u_record is not None:
+        found.append(_Error("record", curves.r_u_record, GREEN, 1.2, DASHED))
+    if curves.r_u_equal is not None:
+        found.append(_Error(equal, curves.r_u_equal, GREY, 1.4))
+    if curves.r_u_white is not None:
+        found.append(_Error(needed, curves.r_u_white, GREY, 1.6, DOTTED))
+    return found
+
+
+def _plot_error(axes: Axes, curves: BoundPanel) -> None:
+    """Draw the curves of one entry, in the range of the errors."""
+    w, errors = curves.frequency, _errors(curves)
+    style.log_axes(axes, "y")
+    for error in errors:
+        error.plot(axes, w, style.positive(error.values), f"r_u, {error.name}")
+    if curves.r_adm is not None:
+        style.plot_admitted(axes, w, curves.r_adm)
+    else:
+        least = _FAR * min(float(np.nanmin(style.positive(error.values))) for error in errors)
+        gain = np.maximum(curves.G_abs, least)  # one that vanishes would stretch the axis without end
+        axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
+    height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
+    style.marked(axes, curves.active, height, label=style.limiting_label(curves.active.size))
+
+
+def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> None:
+    """r_u / r_adm, with the largest in the legend: of one entry all curves, of several that of each."""
+    handles: list[Artist] = []
+    tops, ratios = [1.0], [np.zeros(0)]
+    for number, curves in enumerate(panels):
+        if curves.r_adm is None:
+            continue
+        drawn = _errors(curves)
+        if len(panels) > 1:
+            at = "" if curves.entry is None else f"G{curves.entry[0] + 1}{curves.entry[1] + 1}"
+            color, dashes = style.stroke(number, OTHERS)
+            drawn = [_Error(at, curves.r_u, color, style=dashes)]
+        for place, error in enumerate(drawn):
+            ratio = error.values / style.positive(curves.r_adm)
+            top = float(np.nanmax(ratio, initial=0.0))
+            lines = error.plot(axes, curves.frequency, ratio, f"{error.name}: up to {top:.3g}")
+            # White excitation that meets the same reaches the same: no more than its name is to be said.
+            handles += lines if error.style != DOTTED or curves.r_u_equal is None else []
+            tops.append(top if not place else min(top, _HIGHEST * max(tops)))
+            ratios.append(ratio[ratio > 0])
+        if len(panels) == 1:
+            height = np.interp(curves.active, curves.frequency, curves.r_u / style.positive(curves.r_adm))
+            style.marked(axes, curves.active, height)
+    handles.append(style.plot_limit(axes, 1.12 * max(tops) + 1.0))
+    axes.set_ylim(0.0, 1.12 * max(tops))
+    values = np.concatenate(ratios)
+    if values.size and values.max() < _FAR_BELOW:
+        style.plain_decades(axes, "y")
+        axes.set_ylim(max(0.8 * float(values.min()), _FAR * float(values.max())), 1.3)
+    axes.set_ylabel("r_u / r_adm")
+    style.legend_above(axes, handles)
+
+
+def draw_deviations(page: Figure, curves: DeviationCurves, time_unit: str) -> None:
+    """|G|, the standard deviations and r_adm at every line."""
+    draw_panels(page, curves.panels, _plot_deviations, time_unit, magnitude="magnitude")
+
+
+def _plot_deviations(axes: Axes, panel: DeviationPanel) -> None:
+    w = panel.frequency
+    style.log_axes(axes, "y")
+    axes.plot(w, panel.G_abs, ".-", color=BLACK, linewidth=1.0, markersize=4, label="|G|")
+    axes.plot(w, panel.deviation, "o", color=BLUE, markersize=5, label="standard deviation")
+    if panel.found is not None:
+        axes.plot(w, panel.found, "x", color=GREEN, markersize=6, label=panel.label)
+    style.plot_admitted(axes, w, panel.r_adm)
+
+
+def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
+    """The magnitudes, and between which two the true one is with 95 %; below them the phases."""
+    if len(curves.panels) > 1:
+        draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude", below=_phases)
+        return
+    (panel,) = curves.panels
+    above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    _magnitude(above, panel)
+    style.legend_above(above)
+    above.set_ylabel("magnitude")
+    _phase(below, panel, BLUE, BLACK)
+    below.set_ylabel("phase (degrees)")
+    style.frequency_axis(below, panel.frequency, time_unit)
+
+
+def _magnitude(axes: Axes, panel: ResponsePanel) -> None:
+    w, size, modelled = panel.frequency, np.abs(panel.G), np.abs(panel.model)
+    style.log_axes(axes, "y")
+    axes.plot(w, size, ".", color=BLUE, markersize=4, label="|G|, data alone")
+    axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="|G|, model")
+    least = 0.1 * min(float(size.min()), float(modelled.min()))
+    style.band(axes, w, np.maximum(size - panel.radius, least), size + panel.radius, BLUE, 0.15)
+
+
+def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> None:
+    """Draw the phases of all entries; a negative gain begins half a turn away from a positive one."""
+    for number, panel in enumerate(panels):
+        color, dashes = style.stroke(number)
+        row, column = panel.entry or (0, 0)
+        (line,) = _phase(axes, panel, color, color)
+        line.set(linestyle=dashes, label=f"G{lowered(row + 1, column + 1)}")
+    axes.set_ylabel("phase (degrees)")
+
+
+def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
+    """Draw the phase of the model without jumps, and of the data, if known, on the nearest turn."""
+    model = np.degrees(np.unwrap(np.angle(panel.model)))
+    known = panel.radius < np.abs(panel.G)
+    turn = np.degrees(np.angle(panel.G)) - model
+    nearest = model + (turn + 180.0) % 360.0 - 180.0
+    axes.plot(panel.frequency[known], nearest[known], ".", color=of_data, markersize=4)
+    return axes.plot(panel.frequency, model, color=of_model, linewidth=1.2)
+
+
+def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
+    """Draw a line for every plant, the binding plants in colour; no ratio may exceed one."""
+    axes = page.add_subplot()
+    style.plain_decades(axes, "y")
+    w, rows = curves.frequency, curves.ratios[:_MOST_LINES]
+    width = 0.5 if len(rows) > 20 else 0.8
+    axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
+    if len(rows):
+        largest = f"largest of {len(curves.ratios)} plants"
+        axes.plot(w, curves.ratios.max(axis=0), color=GREY, linewidth=width, label=largest)
+    axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
+    for (name, ratio), color in zip(list(curves.active.items())[:MOST_NAMED], OTHERS, strict=False):
+        axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
+    shown = rows if len(rows) else curves.nominal
+    top = 1.3 * max(float(shown.max()), 1.0)
+    style.plot_limit(axes, top)
+    axes.set_ylim(max(float(shown.min()) * 0.8, _LEAST * float(shown.max())), top)
+    style.frequency_axis(axes, w, time_unit)
+    axes.set_ylabel("r_u / r_adm")
+    style.legend_above(axes)
+
+
+def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
+    """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
+    plot, title = partial(_plot_bands, runs=curves.runs), f"Errors of the models: {curves.name}"
+    draw_panels(page, curves.panels, plot, time_unit, magnitude="|Ĝ − G₀|", title=title)
+
+
+def _plot_bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> None:
+    w, (low, *between, high) = curves.frequency, sorted(curves.quantiles)
+    outer = curves.quantiles[high]
+    style.log_axes(axes, "y")
+    label = f"{100 * low:g} to {100 * high:g} % of {runs} runs"
+    style.band(axes, w, curves.quantiles[low], outer, BLUE, 0.25, label=label)
+    for level in between:
+        axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
+    if curves.r_u is not None:
+        axes.plot(w, curves.r_u, color=BLACK, linestyle=DOTTED, label="r_u, predicted")
+    if curves.r_adm is not None:
+        admitted = style.positive(curves.r_adm)
+        beyond = outer > admitted
+        if np.any(beyond):
+            label = f"where more than {100 * (1.0 - high):.2g} % of the runs leave r_adm"
+            style.band(axes, w, admitted, outer, ORANGE, None, label=label, where=beyond)
+        style.plot_admitted(axes, w, curves.r_adm)
