@@ -1,7 +1,7 @@
 """Search the record of a few levels that gives the least worst ratio, by its own finite information matrix.
 
-A start is improved by the gradient of a soft maximum of the ratios: the most profitable values change all at
-once. Then short runs change one by one, two by two, and at last after random changes, each by an update of the
+The gradient of a soft maximum of the ratios improves a start: the most profitable values change at once. Then
+short runs change one by one, two by two, and at last after random changes. Each change is an update of the
 information matrix. The search is deterministic for a generator as long as time does not end it.
 """
 
@@ -265,18 +265,15 @@ class FlipSearch:
                 turn = np.zeros_like(M)
                 turn[i, j] = turn[j, i] = step
                 up, down = _squares(there, M + turn), _squares(there, M - turn)
-                slope[i, j] = slope[j, i] = float(share @ (down - up)) / (
-                    2.0 * step * total * (1 if i == j else 2)
-                )
+                twice = 2.0 * step * total * (1.0 if i == j else 2.0)
+                slope[i, j] = slope[j, i] = float(share @ (down - up)) / twice
             found.append(slope)
         return found
 
     def _gradient(self, point: _Point, weights: Sequence[Array]) -> Array:
         """Return half the slope in the values of tr(Y M), (n, r)."""
-        return sum(
-            held.adjoint(held.weighed(psi, Y))
-            for held, psi, Y in zip(self._held, point.psis, weights, strict=True)
-        )
+        each = zip(self._held, point.psis, weights, strict=True)
+        return np.sum([held.adjoint(held.weighed(psi, Y)) for held, psi, Y in each], axis=0)
 
     def _climbed(self, start: _Point, over: Callable[[], bool]) -> _Point:
         """Change the most profitable values together, ever fewer of them."""
@@ -306,7 +303,7 @@ class FlipSearch:
         return best
 
     def _descended(self, point: _Point, over: Callable[[], bool], enough: float) -> _Point:
-        """Change runs one by one, and two by two, while that lowers ever sharper soft maxima of the ratios."""
+        """Change runs one by one, and two by two, to lower ever sharper soft maxima of the ratios."""
         best = point
         for sharpness in _SHARPNESSES if np.isfinite(point.ratio) else ():
             while not over() and best.ratio > enough:
@@ -327,7 +324,7 @@ class FlipSearch:
     def _changes(self, point: _Point, weights: Sequence[Array]) -> list[tuple[int, int, Array]]:
         """Return changes of runs, (channel, first value, steps), the most promising first."""
         gradient = self._gradient(point, weights)
-        apart = sum(h.slopes(Y) for h, Y in zip(self._held, weights, strict=True))
+        apart = np.sum([h.slopes(Y) for h, Y in zip(self._held, weights, strict=True)], axis=0)
         found: list[tuple[float, int, int, Array]] = []
         for channel in range(point.values.shape[1]):
             column, levels = point.values[:, channel], self._letters[:, channel]
@@ -355,7 +352,7 @@ class FlipSearch:
         for changes in tried:
             psis, informations = [], []
             for held, psi, M in zip(self._held, point.psis, point.informations, strict=True):
-                step = sum(held.changed(*change) for change in changes)
+                step = np.sum([held.changed(*change) for change in changes], axis=0)
                 cross = held.products(step, psi)
                 psis.append(psi + step)
                 informations.append(M + cross + cross.T + held.products(step, step))

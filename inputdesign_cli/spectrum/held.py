@@ -1,4 +1,4 @@
-"""Spectra of values that are each held for several samples: a sinusoid of values has images at all samples."""
+"""Spectra of values that are each held for several samples: a sinusoid of values has images there."""
 
 from __future__ import annotations
 
@@ -38,13 +38,12 @@ class HeldLines(LinesBasis):
         """Return a density over the frequencies of samples as one over the frequencies of values."""
 
         def over_values(v: Array) -> NDArray:
-            total = 0.0
+            parts = []
             for w, share in zip(*self.images(np.asarray(v)), strict=True):
                 at = density(np.abs(w))
-                weight = share.reshape(-1, *(1,) * (at.ndim - 1))
-                mirrored = np.where((w < 0.0).reshape(weight.shape), at.conj(), at)
-                total = total + weight * mirrored
-            return total
+                shape = (-1, *(1,) * (at.ndim - 1))
+                parts.append(share.reshape(shape) * np.where(w.reshape(shape) < 0.0, at.conj(), at))
+            return np.sum(parts, axis=0)
 
         return over_values
 

@@ -54,7 +54,6 @@ class LinesBasis:
     units: Array
     free: bool = False
 
-    hold = 1
     has_density = False
     degree = 0
     knots = np.zeros(0)
@@ -124,12 +123,6 @@ class LinesBasis:
         if self.inputs == 1:
             return values
         return np.einsum("na,n...ab,nb->n...", self.directions.conj(), values, self.directions).real
-
-    def lags(self, number: int) -> NDArray[np.float64]:
-        """Return the autocovariances E u(t) u(t - k)^T of each line, k below `number`, (L, number, r, r)."""
-        turns = np.exp(1j * np.multiply.outer(self.frequencies, np.arange(number)))
-        outer = self.directions[:, :, None] * self.directions[:, None, :].conj()
-        return (turns[:, :, None, None] * outer[:, None]).real
 
     def _products(self, factor: Factor) -> NDArray[np.float64]:
         """Return Re (F v) (F v)^*, a part of the atoms at a time, (L, k, k)."""

@@ -27,7 +27,7 @@ class Windows:
 
     @classmethod
     def within(cls, amplitude: Array, length: int) -> Windows:
-        """Return the windows of the corners of |u_i| <= amplitude_i (r,): forms that are convex need no others."""
+        """Return the windows of the corners of |u_i| <= amplitude_i (r,), where convex forms are largest."""
         signs = np.array(list(product((-1.0, 1.0), repeat=amplitude.size)))
         return cls(signs * amplitude, length)
 
@@ -58,10 +58,9 @@ class Windows:
         """Return the largest reward with the value behind it, (states,)."""
         size = len(self.letters)
         behind = values.reshape(-1, size)
-        best = None
-        for letter in range(size):
-            one = (rewards[letter].reshape(size, -1) + behind[:, letter]).ravel()
-            best = one if best is None else np.maximum(best, one, out=best)
+        best = (rewards[0].reshape(size, -1) + behind[:, 0]).ravel()
+        for letter in range(1, size):
+            np.maximum(best, (rewards[letter].reshape(size, -1) + behind[:, letter]).ravel(), out=best)
         return best
 
     def largest_mean(
@@ -92,8 +91,10 @@ class Windows:
         return least, cycle, v
 
     def _cycle(self, rewards: Array, v: Array) -> Array:
+        """Return the cycle (period, r) that the best next letters by the values (states,) lead into."""
         choice = (rewards + self._next(v)).argmax(axis=1)
-        state, seen, letters = 0, {}, []
+        state, letters = 0, list[int]()
+        seen = dict[int, int]()
         while state not in seen:
             seen[state] = len(letters)
             letter = int(choice[state])
@@ -106,7 +107,7 @@ class Windows:
         return np.array([cycle.T @ np.roll(cycle, k, axis=0) for k in range(self.length)]) / len(cycle)
 
     def largest_sum(self, form: Array, samples: int) -> tuple[float, Array]:
-        """Return the largest form (m, r, r) of records of this length from rest, and the record, (samples, r)."""
+        """Return the largest form (m, r, r) of records of this length from rest, and that record."""
         if self.length > samples:  # lags beyond the record do not count
             return Windows(self.letters, max(samples, 2)).largest_sum(form[: max(samples, 2)], samples)
         size, m = len(self.letters), self.length

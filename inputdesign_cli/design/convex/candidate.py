@@ -55,7 +55,7 @@ def least_scale(problem: Problem, z: Array) -> float:
     breaches = problem.density_breaches(z, 1.0, above=-np.inf) if problem.densities else []
     used += [breach.ratio for breach in breaches if problem.densities[breach.place.limit].upper]
     if problem.polytope is not None:
-        used.append(problem.amplitude_face(z)[0])
+        used.append(problem.amplitude_facet(z)[0])
     return max(used, default=0.0)
 
 
@@ -137,7 +137,7 @@ def excess(problem: Problem, candidate: Candidate) -> float:
         ratios.append(share if limit.upper else 2.0 - share)
     ratios += [breach.ratio for breach in problem.density_breaches(z, s, above=-np.inf)]
     if problem.polytope is not None:
-        ratios.append(problem.amplitude_face(z)[0] / problem.bound_factor(True, s))
+        ratios.append(problem.amplitude_facet(z)[0] / problem.bound_factor(True, s))
     return max(ratios, default=0.0) - 1.0
 
 

@@ -35,8 +35,8 @@ class Design:
     the inputs and meets the same requirements (or exhausts the same limits). `white_power` is its power;
     `white_within` says whether it keeps to the limits.
     `any_spectrum` solves the same problem over all spectra. Its certificate bounds every excitation whatever
-    (limits on the density left out). It is None if it was not asked for or if time ran out. `any_record` bounds
-    all records within an amplitude, where that was asked for and is known.
+    (limits on the density left out). It is None if it was not asked for or if time ran out. `any_record`
+    bounds all records within an amplitude, where that was asked for and is known.
     """
 
     problem: Problem

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.amplitude.polytope import Face, LagPolytope, form_density, weighted
+from inputdesign_cli.design.amplitude.polytope import Facet, LagPolytope
+from inputdesign_cli.design.amplitude.windows import weighted
 from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.gradients import Gradients, weighty_ones
@@ -314,9 +315,11 @@ class Problem:
 
     def form(self, form: NDArray[np.float64]) -> Functional:
         """Return a quadratic form (m, r, r) of the lags of the excitation as a functional of the spectrum."""
+        polytope = self.polytope
+        assert polytope is not None
 
         def density(w: Array) -> Array:
-            return self.experiment.squeezed(form_density(form, self.basis.hold * np.asarray(w)))
+            return self.experiment.squeezed(polytope.density_of(form, w))
 
         vector = np.tensordot(self._lag_maps, weighted(form), axes=3)
         return Functional(vector, density)
@@ -325,7 +328,9 @@ class Problem:
     def _lag_maps(self) -> NDArray[np.float64]:
         """Return the autocovariances of each basis function, (size, m, r, r)."""
         assert self.polytope is not None
-        return self.basis.lags(self.polytope.windows.length)
+        found = self.basis.integrals(self.polytope.lag_densities, self.experiment.singularities)
+        inputs = self.experiment.inputs
+        return found.reshape(len(found), -1, inputs, inputs)
 
     def with_form_grid(self, grid: Array) -> Array:
         """Return the grid with frequencies that see every ripple of forms of the lags."""
@@ -345,8 +350,8 @@ class Problem:
         assert self.polytope is not None
         return float(np.max(np.sum(self.polytope.windows.letters**2, axis=1)))
 
-    def amplitude_face(self, z: Array) -> tuple[float, Face]:
-        """Return the gauge of the lags of a spectrum within the amplitude, and the face that shows it."""
+    def amplitude_facet(self, z: Array) -> tuple[float, Facet]:
+        """Return the gauge of the lags of a spectrum within the amplitude, and the facet that shows it."""
         assert self.polytope is not None
         return self.polytope.gauge(np.tensordot(z, self._lag_maps, axes=1))
 

@@ -37,7 +37,7 @@ _INPUTS = ("input", "excitation")
 class RecordBound:
     """A lower bound on the objective for every record of `samples` samples within the amplitude.
 
-    For the goal "samples" it is the least number of samples itself. Windows of `length` values were looked at.
+    For the goal "samples" it is the least number of samples itself. Windows of `length` values are used.
     `result` is the design over all spectra with such lags, and `best` (values, r) the record that the form of
     its certificate values most.
     """
@@ -86,7 +86,7 @@ def bound_over_records(
         basis = HeldLines.of(hold, inputs).in_units(amplitude)
         x = basis.spread(amplitude**2)
     relaxed = replace(problem, limits=kept, densities=(), side=(), floors_fixed=False, finer=None)
-    polytope, found = LagPolytope(Windows.within(amplitude, 2)), None
+    polytope, found = LagPolytope(Windows.within(amplitude, 2), hold), None
     values = samples // hold if problem.goal != "samples" else windows
     for length in (*range(_FIRST, windows, _MORE), windows):
         if length > values or 2.0 ** (inputs * (length - 1)) > _MOST_STATES:

@@ -104,10 +104,10 @@ class State:
         self._add(_most_violated(problem, found, self.keys))
         self._add_rows(breaches)
         if problem.polytope is not None:
-            face = problem.amplitude_face(z)[1]
-            if face.share > problem.bound_factor(True, s):
-                problem.polytope.forms.append(face.form)
-                self.rows.append(form_row(problem, face.form))
+            facet = problem.amplitude_facet(z)[1]
+            if facet.share > problem.bound_factor(True, s):
+                problem.polytope.forms.append(facet.form)
+                self.rows.append(form_row(problem, facet.form))
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
             self._grow(problem.grown(basis))

@@ -1,4 +1,4 @@
-"""The best record of two levels within an amplitude that a search finds, and how far it is from the best one."""
+"""The best record of two levels within an amplitude that a search finds, and its distance to the bound."""
 
 from __future__ import annotations
 

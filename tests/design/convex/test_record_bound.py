@@ -18,9 +18,7 @@ from inputdesign_cli.specification import Spec
 ERROR = {"model_error": {"relative": 0.2, "band": [0.02, 2.5], "alpha": 3}}
 
 
-def designed(
-    plant: dict, samples: int, accuracy: dict, objective: str = "best_accuracy", **more: object
-) -> Design:
+def designed(plant, samples, accuracy, objective="best_accuracy", **more) -> Design:
     """Return the design over every spectrum within |u| <= 1."""
     spec = Spec.model_validate(
         {
@@ -61,7 +59,7 @@ PLANTS = [
 
 
 @pytest.mark.parametrize(("plant", "accuracy"), PLANTS)
-def test_no_record_is_better_and_the_search_finds_the_best(plant: dict, accuracy: dict) -> None:
+def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
     samples = 10
     design = designed(plant, samples, accuracy)
     assert design.any_spectrum is not None
@@ -80,7 +78,7 @@ def test_no_record_is_better_and_the_search_finds_the_best(plant: dict, accuracy
     assert goal.worst(goal.plant.information(record)) == pytest.approx(ratio, rel=1e-9)
 
 
-def test_held_values_have_a_bound_of_their_own() -> None:
+def test_held_values_have_a_bound_of_their_own():
     hold, values = 3, 8
     design = designed({"B": [0, 0.4], "F": [1, -0.9]}, hold * values, ERROR)
     assert design.any_spectrum is not None
@@ -90,7 +88,7 @@ def test_held_values_have_a_bound_of_their_own() -> None:
     assert 0.6 * best <= np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
 
 
-def test_fewer_samples_than_the_bound_do_not_suffice() -> None:
+def test_fewer_samples_than_the_bound_do_not_suffice():
     relative = {"model_error": {"relative": 1.0, "band": [0.02, 2.5], "alpha": 3}}
     design = designed({"B": [0, 1.0], "F": [1, -0.5]}, 9, relative, "shortest_experiment")
     assert design.any_spectrum is not None
@@ -102,7 +100,7 @@ def test_fewer_samples_than_the_bound_do_not_suffice() -> None:
     assert best_of_all(worst_of(factor, fewer), fewer) > 1.0
 
 
-def test_two_inputs() -> None:
+def test_two_inputs():
     plant = {"B": [[[0, 1.0], [0, 0.5]]], "F": [[[1, -0.5], [1, 0.3]]]}
     design = designed(plant, 6, {"criterion": "D"})
     assert design.any_spectrum is not None
@@ -114,7 +112,7 @@ def test_two_inputs() -> None:
     assert np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
 
 
-def test_a_reference_figure_of_the_window_bound() -> None:
+def test_a_reference_figure_of_the_window_bound():
     """Plant 6 of the eight output-error plants: 0.2834 by the power, 0.2977 by windows of twelve values."""
     plant = {"B": [0, -2.853291838457013], "F": [1, -0.5059625218880031]}
     design = designed(plant, 300, ERROR)
@@ -126,7 +124,7 @@ def test_a_reference_figure_of_the_window_bound() -> None:
 
 
 @pytest.mark.parametrize("more", [{"experiment": {"samples": 50, "controller": {"numerator": [0.2]}}}])
-def test_there_is_none_in_a_loop(more: dict) -> None:
+def test_there_is_none_in_a_loop(more):
     design = designed({"B": [0, 0.63], "F": [1, -0.5]}, 50, ERROR, **more)
     assert design.any_spectrum is not None
     assert bound_over_records(design.problem, design.any_spectrum, 50, windows=8) is None
