@@ -91,7 +91,7 @@ class LagPolytope:
         return form[0] + half + half.conj().swapaxes(1, 2)
 
     def lag_densities(self, w: Array) -> NDArray:
-        """Return the least multiple of the polytope that contains lags (m, r, r), and a facet that shows it.
+        """Return the densities of each entry of the lags, (n, m, r, r, r, r); for one input (n, m)."""
         length, inputs = self.windows.length, self.windows.letters.shape[1]
         turns = np.exp(1j * self.hold * np.multiply.outer(w, np.arange(length)))
         if inputs == 1:
