@@ -21,7 +21,7 @@ _YOUNG = 500_000
 
 
 def main() -> None:
-    """The `idesign` command."""
+    """Run the `idesign` command."""
     sys.unraisablehook = _send_again
     gc.set_threshold(_YOUNG, 10, 10)
     atexit.register(gc.freeze)  # what is left at the end need not be looked through
@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def _send_again(lost: UnraisableHookArgs) -> None:
-    """An interruption that was raised in a finalizer, where Python drops it, comes again.
+    """Send an interruption again that was raised in a finalizer, where Python drops it.
 
     The handler of `compute.interruptions` sees to that; before it stands, Ctrl-C is sent once more.
     """

@@ -28,7 +28,7 @@ def render(error: IdesignError, color: bool = False) -> str:
 
 
 def as_json(error: IdesignError) -> list[dict[str, object]]:
-    """The diagnostics as plain data; `location` is null where there is none, `details` are left out."""
+    """Return the diagnostics as plain data; `location` is null where absent, `details` are left out."""
     return [
         {key: value for key, value in asdict(diagnostic).items() if key != "details" or value}
         for diagnostic in error.diagnostics
@@ -68,7 +68,7 @@ def _is_override(place: Location) -> bool:
 
 
 def _excerpt(text: str, column: int) -> tuple[str, int]:
-    """The line, clipped around the column if it is long, and the number of cells before the caret."""
+    """Return the line, clipped around the column if it is long, and the number of cells before the caret."""
     line = text.replace("\t", " ").rstrip()
     at = min(max(column - 1, 0), len(line))
     if len(line) > _WIDTH:
@@ -81,5 +81,5 @@ def _excerpt(text: str, column: int) -> tuple[str, int]:
 
 
 def _clean(text: str) -> str:
-    """Without what could move the cursor or change the colours of a terminal."""
+    """Return a text without characters that move the cursor or change the colours of a terminal."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)

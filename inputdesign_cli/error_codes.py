@@ -1,4 +1,4 @@
-"""Explain the codes of errors: `error_codes.yaml`, read when somebody asks."""
+"""Explain the codes of errors by `error_codes.yaml`, which is read at the first question."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from inputdesign_cli.errors import bad_spec
 
 @dataclass(frozen=True)
 class Explanation:
-    """A code in full: a title, what it means, and what to do."""
+    """Explains a code in full: its title, its meaning, and its remedy."""
 
     title: str
     text: str
@@ -24,7 +24,7 @@ class Explanation:
 
 @cache
 def explanations() -> dict[str, Explanation]:
-    """Every code with its explanation, in the order of the file."""
+    """Return every code with its explanation, in the order of the file."""
     content = files("inputdesign_cli").joinpath("error_codes.yaml").read_text(encoding="utf-8")
     return {code: Explanation(**entry) for code, entry in yaml.safe_load(content).items()}
 
@@ -33,7 +33,7 @@ def explanation(code: str, known: Mapping[str, Explanation]) -> str:
     """Return the explanation of a code as text for a terminal.
 
     Args:
-        code: what is asked for.
+        code: the code to explain.
         known: all codes there are.
 
     Raises:

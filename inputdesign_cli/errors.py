@@ -1,9 +1,8 @@
 """The few error types of the house.
 
-Every error that a user can cause is a `Diagnostic`: a stable code (which `idesign explain CODE`
-documents, see `error_codes.yaml`), one sentence that says what is wrong, and a hint that says how to mend it.
-The mathematics knows nothing of files: it names the key (`plant.F`), and the spec adds file, line and
-column where it is at hand.
+Every error that a user can cause is a `Diagnostic`: a stable code, a sentence that states the error, and a
+hint at its remedy. `idesign explain CODE` documents the code, see `error_codes.yaml`. The mathematics knows
+nothing of files: it names the key (`plant.F`), and the spec adds file, line and column where it is at hand.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One thing that is wrong: a code to look up, what is wrong, how to mend it, and where it stands.
+    """One error or warning: its code to look up, its message, its remedy, and its place.
 
     `details` are the figures of the message for programs: plain data, ready for JSON.
     """
@@ -51,7 +50,7 @@ class Diagnostic:
 class IdesignError(Exception):
     """An error that the user can understand and mend; carries one or more diagnostics.
 
-    `exit_code` is what the command line returns for it.
+    `exit_code` is the exit code of the command line for it.
     """
 
     exit_code = EXIT_BAD_INPUT
@@ -64,39 +63,39 @@ class IdesignError(Exception):
     def because(
         cls, code: str, message: str, hint: str = "", key: str = "", location: Location | None = None
     ) -> Self:
-        """An error with a single diagnostic."""
+        """Return an error with a single diagnostic."""
         return cls(Diagnostic(code, message, hint, key, location))
 
 
 class SpecError(IdesignError):
-    """The spec cannot be read, or what it says is not well posed."""
+    """Raised where the spec cannot be read, or states a problem that is not well posed."""
 
 
 class DataError(IdesignError):
-    """A data file (table of r_adm, recorded signals) cannot be used."""
+    """Raised where a data file (table of r_adm, recorded signals) cannot be used."""
 
 
 class OutputError(IdesignError):
-    """The results cannot be written."""
+    """Raised where the results cannot be written."""
 
 
 class InfeasibleError(IdesignError):
-    """No excitation can meet what the spec asks for."""
+    """Raised where no excitation can meet the requirements of the spec."""
 
     exit_code = EXIT_INFEASIBLE
 
 
 class InaccurateError(IdesignError):
-    """The solver stopped before the accuracy that the spec asks for was proved."""
+    """Raised where the solver stopped before the accuracy that the spec asks for was proved."""
 
     exit_code = EXIT_INACCURATE
 
 
 def bad_spec(code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
-    """A `SpecError` with a single diagnostic."""
+    """Return a `SpecError` with a single diagnostic."""
     return SpecError.because(code, message, hint, key)
 
 
 def refuse(key: str, what: str, hint: str, *, who: str = "this version") -> SpecError:
-    """`not-supported`: `who` does not do `what`, said plainly rather than ignored."""
+    """Return the error `not-supported`: `who` does not do `what`."""
     return bad_spec("not-supported", f"{who} does not {what}", hint=hint, key=key)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial, wraps
+from inspect import cleandoc
 from types import MappingProxyType
 from typing import Concatenate, Literal, ParamSpec, TypeVar
 
@@ -135,7 +136,7 @@ def finding(
     """Declare the kind of findings that a function makes; its docstring explains them, up to `Args`."""
 
     def declared(function: Callable[Concatenate[FindingKind, P], R]) -> Callable[P, R]:
-        text = (function.__doc__ or "").partition("\n\n    Args:")[0]
+        text = cleandoc(function.__doc__ or "").partition("\n\nArgs:")[0]
         kind = _kind(severity, code, " ".join(text.split()), remedy, cause)
 
         @wraps(function)

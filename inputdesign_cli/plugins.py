@@ -1,4 +1,4 @@
-"""Names of kinds that a spec may say: this package's own, and what others add by a call or an entry point."""
+"""Names of kinds that a spec may use: this package's own, and others added by a call or an entry point."""
 
 from __future__ import annotations
 

@@ -8,12 +8,12 @@ import stat
 
 
 def read_regular(path: str | os.PathLike[str], most: int = -1) -> bytes:
-    """The bytes of a file, `most` of them at most; what is no plain file is refused without waiting for it.
+    """Return the bytes of a file, at most `most`; refuse anything but a plain file without waiting for it.
 
     Raises:
         OSError: it cannot be read; `IsADirectoryError` for a folder, and with errno EINVAL for a pipe, a
             socket or a device.
-        ValueError: the path holds what the operating system cannot name.
+        ValueError: the path holds characters that the operating system cannot name.
     """
     with open(path, "rb", opener=_without_waiting) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

@@ -24,6 +24,7 @@ OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loa
 OPENED = {
     "regular_file.py": (2, "the function itself"),
     "error_codes.py": (1, "a file of the package"),
+    "cli/options.py": (1, "a file of the package"),
     "cli/reference.py": (2, "files of the package"),
     "cli/streams.py": (3, "the null device and the standard streams"),
     "outcome/origin.py": (1, "a comparison of plain files"),

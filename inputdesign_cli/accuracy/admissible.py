@@ -24,31 +24,31 @@ _TINY = np.finfo(float).tiny
 
 
 class AdmissibleError(Protocol):
-    """r_adm over frequency."""
+    """The admissible error r_adm over frequency."""
 
     @property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
+        """Return poles and zeros near which r_adm varies fast, as points of the frequency plane."""
 
     @property
     def knots(self) -> Array:
-        """Frequencies at which r_adm may have a kink."""
+        """Return frequencies at which r_adm may have a kink."""
 
     @property
     def kept(self) -> Sensitivity | None:
-        """Return the closed loop whose margins the bound preserves, or None if it is about no loop."""
+        """Return the closed loop whose margins the bound preserves, or None if there is no loop."""
 
     @property
     def floored(self) -> Floored | None:
         """Return the bound that replaces r_adm at a plant where it vanishes, or None if there is none."""
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
 
 
 @dataclass(frozen=True)
 class Relative:
-    """r_adm = fraction |G| of one entry (output, input), or of the Frobenius norm of all (None)."""
+    """Sets r_adm = fraction |G| of one entry (output, input), or of the Frobenius norm of all (None)."""
 
     model: Model
     fraction: float
@@ -59,13 +59,13 @@ class Relative:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
+        """Return poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         if self.entry is None:
             return self.model.singularities
         return self.model.entry_singularities(*self.entry)
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
         G = self.model.plant_at(w)
         if self.entry is None:
             return self.fraction * np.linalg.norm(G, axis=(1, 2))
@@ -74,7 +74,7 @@ class Relative:
 
 @dataclass(frozen=True)
 class Absolute:
-    """r_adm = level, in the units of G."""
+    """Sets r_adm = level, in the units of G."""
 
     level: float
     knots = _NOWHERE
@@ -83,13 +83,13 @@ class Absolute:
     singularities = _NOWHERE.astype(complex)
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
         return np.full(np.shape(w), self.level)
 
 
 @dataclass(frozen=True)
 class Table:
-    """r_adm interpolated between given points, linearly in (log frequency, log r_adm).
+    """Interpolates r_adm between given points, linearly in (log frequency, log r_adm).
 
     At frequency zero, and below the first point if that stands at zero, the first value holds.
     """
@@ -102,11 +102,11 @@ class Table:
 
     @property
     def knots(self) -> Array:
-        """Frequencies at which r_adm may have a kink."""
+        """Return frequencies at which r_adm may have a kink."""
         return self.frequency
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
         tiny = 1e-12
         x = np.log(np.maximum(self.frequency, tiny))
         return np.exp(np.interp(np.log(np.maximum(np.asarray(w, dtype=float), tiny)), x, np.log(self.value)))
@@ -114,7 +114,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """r_adm = (1 - |W| s(S)) / s(C S), s the largest singular value and S = (I + G C)^-1 of the nominal loop.
+    """Sets r_adm = (1 - |W| s(S)) / s(C S), s the largest singular value, S = (I + G C)^-1 (nominal loop).
 
     For every plant G + D with s(D) <= r_adm then s(W S') <= 1: S' = S (I + D C S)^-1, so that
     s(S') <= s(S) / (1 - s(D) s(C S)). With one channel that is (|1 + C G| - |W|) / |C|
@@ -131,15 +131,15 @@ class Sensitivity:
 
     @property
     def kept(self) -> Sensitivity:
-        """Return this requirement itself, which is about a loop."""
+        """Return this requirement itself, since it concerns a loop."""
         return self
 
     def nominal(self, w: ArrayLike) -> Array:
-        """The largest singular value of S (n,) with the nominal plant."""
+        """Return the largest singular value of S (n,) with the nominal plant."""
         return largest_gain(self.loop.sensitivity(w)[0])
 
     def margins(self, w: ArrayLike) -> dict[str, float]:
-        """What a loop keeps: the peak of |S| with the nominal plant, that with every other, its margins.
+        """Return the margins of a loop, and the peak of |S| with the nominal plant and with every other.
 
         1 + L stays 1/|S| away from 0: a gain margin of |S|/(|S| - 1) and a phase margin of
         2 asin(1/(2 |S|)), in degrees, follow.
@@ -154,11 +154,11 @@ class Sensitivity:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
+        """Return poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         return np.concatenate([self.loop.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
         S, applied = self.loop.sensitivity(w)
         left = 1.0 - np.abs(self.weight.at(w)) * largest_gain(S)
         return left / np.maximum(largest_gain(applied), _TINY)
@@ -166,7 +166,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class Weighted:
-    """r_adm / |W|, so that |W| r_u stays below r_adm."""
+    """Divides r_adm by |W|, so that |W| r_u stays below r_adm."""
 
     inner: AdmissibleError
     weight: ScalarTransfer
@@ -183,16 +183,16 @@ class Weighted:
 
     @property
     def knots(self) -> Array:
-        """Frequencies at which r_adm may have a kink."""
+        """Return frequencies at which r_adm may have a kink."""
         return self.inner.knots
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
+        """Return poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         return np.concatenate([self.inner.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
         return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)
 
 
@@ -221,19 +221,19 @@ class Floored:
         return self
 
     def lost(self, grid: Array) -> bool:
-        """Whether r_adm of the scenario itself vanishes on the grid or between: no model is that good."""
+        """Return whether r_adm of the scenario itself vanishes on the grid or between two points."""
         own = -self._both(grid)[0]
         return bool(
             np.max(own) >= 0.0 or np.any(local_maxima(lambda w: -self.own.at(w), grid, own)[1] >= 0.0)
         )
 
     def raised(self, grid: Array) -> bool:
-        """Whether it is smaller than what stands in for it, somewhere on the grid."""
+        """Return whether r_adm of the scenario is smaller than its lower bound, somewhere on the grid."""
         own, floor = self._both(grid)
         return bool(np.any(own < floor))
 
     def _both(self, w: Array) -> tuple[Array, Array]:
-        """r_adm of the scenario, and what stands in for it where it is smaller, (n,) each."""
+        """Return r_adm of the scenario, and its lower bound where r_adm is smaller, (n,) each."""
         # The grid of a requirement is asked for again and again, a few points between its own once.
         for grid, own, floor in self._on_grid:
             if np.array_equal(grid, w):
@@ -245,21 +245,21 @@ class Floored:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
+        """Return poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         return np.concatenate([self.own.singularities, self.nominal.singularities])
 
     @property
     def knots(self) -> Array:
-        """Frequencies at which r_adm may have a kink."""
+        """Return frequencies at which r_adm may have a kink."""
         return np.union1d(self.own.knots, self.nominal.knots)
 
     def at(self, w: ArrayLike) -> Array:
-        """r_adm (n,) at frequencies `w` (n,)."""
+        """Return r_adm (n,) at frequencies `w` (n,)."""
         return np.maximum(*self._both(np.asarray(w)))
 
 
 def largest_gain(G: ComplexArray) -> Array:
-    """Largest singular values (n,) of (n, p, r)."""
+    """Return the largest singular values (n,) of (n, p, r)."""
     if G.shape[1:] == (1, 1):
         return np.abs(G[:, 0, 0])
     return np.linalg.norm(G, 2, axis=(1, 2))

@@ -23,7 +23,7 @@ _POINTS, _AT_ONCE = 800, 256
 
 @dataclass(frozen=True)
 class Coverage:
-    """How many fresh draws stay below r_adm in the whole band: by the exact G, and to first order.
+    """Holds the number of fresh draws below r_adm in the whole band: by the exact G, and to first order.
 
     `kept` of `runs` estimates of simulated records do so, where there are any.
     """
@@ -39,11 +39,11 @@ class Coverage:
 class Calibration:
     """Requires max over w of |G(theta) - G| / r_adm <= 1 with this probability.
 
-    The same `draws` serve every information matrix, so that alpha is a smooth function of it. A new set of as
-    many draws estimates the coverage.
+    The same `draws` serve every information matrix, so that alpha is a smooth function of it. A new set of
+    equally many draws estimates the coverage.
 
     Attributes:
-        excess: the quantile of the estimates of such records over that of the draws, which are asymptotic.
+        excess: the quantile of estimates from such records over the quantile of the asymptotic draws.
     """
 
     probability: float
@@ -52,7 +52,7 @@ class Calibration:
     excess: float = 1.0
 
     def alpha(self, errors: Sequence[ModelError], information: Array) -> float:
-        """The calibrated alpha of an experiment with this information (k, k), in the errors' coordinates."""
+        """Return the calibrated alpha for the information (k, k), in the errors' coordinates."""
         reached = self.excess * self._drawn(errors, information)
         return errors[0].alpha * reached / max(error.worst(information).ratio for error in errors)
 
@@ -67,7 +67,7 @@ class Calibration:
         return replace(self, excess=found / self._drawn(errors, information))
 
     def coverage(self, errors: Sequence[ModelError], information: Array, within: float = 1.0) -> Coverage:
-        """What fresh draws say of r_adm times `within`, what the best accuracy reaches in its place."""
+        """Count fresh draws with errors of at most `within` times r_adm; the best accuracy sets `within`."""
         steps = self._steps(information, fresh=True)
         exact, linear = largest_error(errors, _raw(errors, steps)), _to_first_order(errors, steps)
         return Coverage(self.draws, int(np.sum(exact <= within)), int(np.sum(linear <= within)))
@@ -78,7 +78,7 @@ class Calibration:
         return np.asarray(normal @ inverse_factor(information))
 
     def _drawn(self, errors: Sequence[ModelError], information: Array) -> float:
-        """The quantile of the draws."""
+        """Return the quantile of the draws."""
         return self._quantile(largest_error(errors, _raw(errors, self._steps(information, fresh=False))))
 
     def _quantile(self, largest: Array) -> float:
@@ -86,7 +86,7 @@ class Calibration:
 
 
 def largest_error(errors: Sequence[ModelError], estimates: Array) -> Array:
-    """(n,): the largest |G(theta) - G| / r_adm over frequencies and errors; infinite where it has no value.
+    """Return the largest |G(theta) - G| / r_adm over frequencies and errors (n,); infinite without a value.
 
     Args:
         estimates: (n, k) in raw parameters.
@@ -113,7 +113,7 @@ def _raw(errors: Sequence[ModelError], steps: Array) -> Array:
 
 
 def _to_first_order(errors: Sequence[ModelError], steps: Array) -> Array:
-    """Return the same by the gradient of G, (draws,)."""
+    """Return the largest error of each draw by the gradient of G, (draws,)."""
     w, largest = _frequencies(errors), np.zeros(len(steps))
     for error in errors:
         rows = error.plant_rows(w) / _admissible(error, w)[:, None, None]
@@ -124,13 +124,13 @@ def _to_first_order(errors: Sequence[ModelError], steps: Array) -> Array:
 
 
 def _frequencies(errors: Sequence[ModelError]) -> Array:
-    """The grids of all errors, thinned out: a maximum over draws needs no polish."""
+    """Return the grids of all errors, thinned out: a maximum over draws needs no polish."""
     w = np.unique(np.concatenate([error.grid for error in errors]))
     return w[:: -(-len(w) // _POINTS)]
 
 
 def _admissible(error: ModelError, w: Array) -> Array:
-    """r_adm at `w`, without bound outside of the band."""
+    """Return r_adm at `w`, without bound outside of the band."""
     lo, hi = error.band
     inside, found = (w >= lo) & (w <= hi), np.full(w.size, np.inf)
     found[inside] = error.admissible.at(w[inside])
@@ -138,5 +138,5 @@ def _admissible(error: ModelError, w: Array) -> Array:
 
 
 def with_alpha(requirements: Iterable[Requirement], alpha: float) -> list[Requirement]:
-    """The requirements, those on the model error with another alpha."""
+    """Return the requirements, with another alpha in all on the model error."""
     return [replace(r, alpha=alpha) if isinstance(r, ModelError) else r for r in requirements]

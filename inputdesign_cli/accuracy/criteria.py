@@ -25,7 +25,7 @@ from inputdesign_cli.arrays import Array
 
 @dataclass(frozen=True)
 class InformationTarget(OneCondition):
-    """M >= `target` (k, k, symmetric), in the coordinates of the experiment.
+    """The requirement M >= `target` (k, k, symmetric), in the coordinates of the experiment.
 
     This covers `information` itself, the standard deviation s of a parameter (e e^T / s^2) and
     application-oriented accuracy, (chi2 gamma / 2) V'': then the confidence ellipsoid lies where the cost of
@@ -37,16 +37,16 @@ class InformationTarget(OneCondition):
 
     @property
     def name(self) -> str:
-        """`information`, `application` or `standard_deviation of` a parameter."""
+        """Return `information`, `application` or `standard_deviation of` a parameter."""
         return self.label
 
     def ratio(self, information: Array) -> float:
-        """sqrt of the largest eigenvalue of the target relative to M."""
+        """Return the square root of the largest eigenvalue of the target relative to M."""
         K = inverse_factor(information)
         return float(np.sqrt(max(np.linalg.eigvalsh(K @ self.target @ K.T)[-1], 0.0)))
 
     def cut(self, frequency: float | None) -> MatrixCut:
-        """The requirement itself."""
+        """Return the requirement itself as a cut."""
         return MatrixCut(self.target)
 
 
@@ -55,19 +55,19 @@ Letter = Literal["D", "A", "E", "T"]
 
 @dataclass(frozen=True)
 class Criterion(OneCondition):
-    """(det M)^{1/k} >= 1, 1 / tr(M^-1) >= 1, lambda_min(M) >= 1 or tr(M) >= 1, M standing for G M G^T."""
+    """The condition (det M)^{1/k}, 1 / tr(M^-1), lambda_min(M) or tr(M) >= 1, M standing for G M G^T."""
 
     letter: Letter
     scaling: Array
 
     @property
     def name(self) -> str:
-        """`criterion` and its letter, for reports."""
+        """Return `criterion` and its letter, for reports."""
         return f"criterion {self.letter}"
 
     @property
     def definite(self) -> bool:
-        """Whether the criterion is worthless where M is singular: all but T."""
+        """Return whether the criterion is worthless where M is singular: all but T."""
         return self.letter != "T"
 
     @cached_property
@@ -76,11 +76,11 @@ class Criterion(OneCondition):
 
     @cached_property
     def _gain(self) -> float:
-        """(det G)^{2/k}."""
+        """Return the factor (det G)^{2/k}."""
         return float(np.exp(2.0 * np.linalg.slogdet(self.scaling)[1] / len(self.scaling)))
 
     def level(self, information: Array) -> float:
-        """The quantity that must reach one; 0 where M is singular, except for T."""
+        """Return the quantity that must reach one; 0 where M is singular, except for T."""
         if self.letter == "T":
             return float(np.sum(self.scaling * (self.scaling @ information)))
         try:
@@ -94,18 +94,18 @@ class Criterion(OneCondition):
         return float(1.0 / np.sum(singular**2) if self.letter == "A" else 1.0 / singular[0] ** 2)
 
     def value(self, level: float) -> float:
-        """What the level stands for: log det M, -tr M^-1, lambda_min(M) or tr M."""
+        """Return the criterion in its textbook form: log det M, -tr M^-1, lambda_min(M) or tr M."""
         if self.letter == "D":
             return len(self.scaling) * float(np.log(level))
         return -1.0 / level if self.letter == "A" else level
 
     def ratio(self, information: Array) -> float:
-        """1 / sqrt(level)."""
+        """Return the ratio 1 / sqrt(level)."""
         level = self.level(information)
         return float(1.0 / np.sqrt(level)) if level > 0 else np.inf
 
     def cut(self, frequency: float | None) -> Cut:
-        """The criterion itself, as a cone."""
+        """Return the criterion itself, as a cone."""
         if self.letter == "D":
             return DeterminantCut(1.0 / self._gain)
         if self.letter == "A":
@@ -116,6 +116,6 @@ class Criterion(OneCondition):
 
 
 def criterion_of(requirements: Sequence[Requirement]) -> Criterion | None:
-    """The criterion that is to be maximised: it then stands alone."""
+    """Return the criterion that is to be maximised, which then stands alone."""
     first = requirements[0] if requirements else None
     return first if isinstance(first, Criterion) else None

@@ -21,7 +21,7 @@ CutKind = Literal["nonnegative", "psd", "exponential"]
 
 @dataclass(frozen=True)
 class CutBlock:
-    """h * constant + information svec(M) + auxiliary z in a cone (see `design.conic.Block` for the kinds)."""
+    """The constraint h * constant + information svec(M) + auxiliary z in a cone, see `design.conic.Block`."""
 
     kind: CutKind
     order: int
@@ -32,7 +32,7 @@ class CutBlock:
 
 @dataclass(frozen=True)
 class Inequality:
-    """h * `constant` + `scale` * M + nu * `form` positive semidefinite, M filling the leading (k, k).
+    """The constraint h * `constant` + `scale` * M + nu * `form` >= 0 (psd), M filling the leading (k, k).
 
     The matrices are (d, d) with d >= k; nu >= 0 is an unknown of its own, where there is a `form`.
     """
@@ -44,7 +44,7 @@ class Inequality:
 
 @dataclass(frozen=True)
 class ConcaveFunction:
-    """g(M) >= h, g concave on the positive definite matrices (k, k) and of degree one: g(t M) = t g(M).
+    """The constraint g(M) >= h, g concave for M > 0 (k, k) and of degree one: g(t M) = t g(M).
 
     `at` maps (M, M^-1) to g(M) and its gradient G (k, k). The second derivative along D is `curvature`
     (tr(G D)^2 / g - tr(M^-1 D G D)).
@@ -57,18 +57,18 @@ class ConcaveFunction:
 class Cut(Protocol):
     """A convex set of information matrices (k, k) that contains every admissible one.
 
-    `frequency` (rad/sample) is where the requirement asks for it, None when it has no frequency.
+    `frequency` (rad/sample) is where the requirement needs it, None when it has no frequency.
     """
 
     @property
     def frequency(self) -> float | None:
-        """Where the requirement asks for it."""
+        """Return the frequency (rad/sample) at which the requirement needs the cut, if it has one."""
 
     def transformed(self, congruence: Array) -> Cut:
         """Return the same set for K M K^T, K = `congruence` (k, k) nonsingular."""
 
     def blocks(self, size: int) -> list[CutBlock]:
-        """Its cones, all with the same number of auxiliary unknowns; `size` is k."""
+        """Return the cones of the cut, all with the same number of auxiliary unknowns; `size` is k."""
 
     @property
     def inequality(self) -> Inequality | None:
@@ -79,18 +79,18 @@ class Cut(Protocol):
         """Return the set by a concave function, unless it is a matrix inequality."""
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
-        """(Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.
+        """Return (Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.
 
         Args:
-            multipliers: one array a block, suggestions of a solver; the inequality holds whatever they are.
+            multipliers: one array a block, suggestions of a solver; the inequality holds for any.
         """
 
     def implied(self, weight: Array) -> tuple[Array, float]:
-        """The same from one matrix: a multiplier of `inequality`, or of `concave` times its gradient."""
+        """Return (Y, r) from one matrix: a multiplier of `inequality`, or of `concave` times its gradient."""
 
 
 def positive_part(matrix: Array) -> Array:
-    """The nearest positive semidefinite matrix."""
+    """Return the nearest positive semidefinite matrix."""
     eigenvalues, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     kept = eigenvalues > 0
     return (vectors[:, kept] * eigenvalues[kept]) @ vectors[:, kept].T

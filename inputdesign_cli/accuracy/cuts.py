@@ -15,7 +15,7 @@ from inputdesign_cli.spectrum import smat, svec, svec_layout, svec_length
 
 @dataclass(frozen=True)
 class MatrixCut:
-    """M >= `matrix` (k, k)."""
+    """The cut M >= `matrix` (k, k)."""
 
     matrix: Array
     frequency: float | None = None
@@ -27,13 +27,13 @@ class MatrixCut:
         return replace(self, matrix=congruence @ self.matrix @ congruence.T)
 
     def blocks(self, size: int) -> list[CutBlock]:
-        """M - `matrix` positive semidefinite."""
+        """Return M - `matrix` positive semidefinite as a cone."""
         rows = svec_length(size)
         return [CutBlock("psd", size, -svec(self.matrix), sp.eye_array(rows, format="csc"), _none(rows))]
 
     @property
     def inequality(self) -> Inequality:
-        """M - `matrix`."""
+        """Return M - `matrix` >= 0 as an inequality."""
         return Inequality(-self.matrix)
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
@@ -41,17 +41,18 @@ class MatrixCut:
         return self.implied(smat(multipliers[0]))
 
     def implied(self, weight: Array) -> tuple[Array, float]:
-        """tr(Y M) >= tr(Y matrix)."""
+        """Return the implied inequality tr(Y M) >= tr(Y matrix)."""
         Y = positive_part(weight)
         return Y, float(np.sum(Y * self.matrix))
 
 
 @dataclass(frozen=True)
 class VarianceCut:
-    """tr(V^T M^-1 V) <= 1, V = `directions` (k, q): a sum of variances.
+    """The cut tr(V^T M^-1 V) <= 1, V = `directions` (k, q): a sum of variances.
 
-    By a Schur complement ([boyd-vandenberghe-2004], A.5.5) [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The
-    inequality is that of Cauchy and Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear norm.
+    By a Schur complement ([boyd-vandenberghe-2004], A.5.5) it is [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The
+    inequality is the one of Cauchy and Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear
+    norm.
     """
 
     directions: Array
@@ -64,7 +65,7 @@ class VarianceCut:
         return replace(self, directions=congruence @ self.directions)
 
     def blocks(self, size: int) -> list[CutBlock]:
-        """The Schur complement, and the trace of Z, which is the unknown."""
+        """Return the Schur complement, and the trace of Z, which is the unknown."""
         q = self.directions.shape[1]
         order, aux = size + q, svec_length(q)
         corner = np.zeros((order, order))
@@ -82,7 +83,7 @@ class VarianceCut:
 
     @property
     def concave(self) -> ConcaveFunction:
-        """1 / tr(V^T M^-1 V)."""
+        """Return the concave function 1 / tr(V^T M^-1 V)."""
 
         def at(information: Array, inverse: Array) -> tuple[float, Array]:
             half = inverse @ self.directions
@@ -97,18 +98,18 @@ class VarianceCut:
         return self.implied(smat(multipliers[0])[:size, :size])
 
     def implied(self, weight: Array) -> tuple[Array, float]:
-        """tr(Y M) >= |Y^{1/2} V|_*^2."""
+        """Return the implied inequality tr(Y M) >= |Y^{1/2} V|_*^2."""
         Y = positive_part(weight)
         return Y, float(np.linalg.svd(_root(Y) @ self.directions, compute_uv=False).sum() ** 2)
 
 
 @dataclass(frozen=True)
 class DeterminantCut:
-    """(det M)^{1/k} >= `level`.
+    """The cut (det M)^{1/k} >= `level`.
 
-    M >= T diag(T)^-1 T^T with T lower triangular, so that log det M >= sum of log diag(T), each bounded
-    from below by an exponential cone. The inequality is that of the arithmetic and geometric means,
-    tr(Y M) >= k (det Y)^{1/k} (det M)^{1/k}.
+    M >= T diag(T)^-1 T^T with T lower triangular, so that log det M >= sum of log diag(T). Exponential cones
+    bound each term from below. The inequality is the one of the arithmetic and geometric means, tr(Y M) >= k
+    (det Y)^{1/k} (det M)^{1/k}.
     """
 
     level: float = 1.0
@@ -122,7 +123,7 @@ class DeterminantCut:
         return replace(self, level=self.level * float(np.exp(2.0 * logarithm / len(congruence))))
 
     def blocks(self, size: int) -> list[CutBlock]:
-        """The factorisation, the logarithms of diag(T), and their sum."""
+        """Return the factorisation, the logarithms of diag(T), and their sum."""
         triangle, entries = svec_length(size), []
         rows, columns, scale = svec_layout(2 * size)
         # Entry (j, i) of T stands at (i, size + j) of the block [[M, T], [T^T, diag T]], j >= i.
@@ -171,7 +172,7 @@ class DeterminantCut:
         return self.implied(block[:size, :size])
 
     def implied(self, weight: Array) -> tuple[Array, float]:
-        """tr(Y M) >= k (det Y)^{1/k} level."""
+        """Return the implied inequality tr(Y M) >= k (det Y)^{1/k} level."""
         Y, size = positive_part(weight), len(weight)
         sign, logarithm = np.linalg.slogdet(Y)
         mean = float(np.exp(logarithm / size)) if sign > 0 else 0.0
@@ -180,7 +181,7 @@ class DeterminantCut:
 
 @dataclass(frozen=True)
 class TraceCut:
-    """tr(W M) >= 1, W = `weight` (k, k) positive semidefinite."""
+    """The cut tr(W M) >= 1, W = `weight` (k, k) positive semidefinite."""
 
     weight: Array
     frequency: float | None = None
@@ -193,24 +194,24 @@ class TraceCut:
         return replace(self, weight=inverse.T @ self.weight @ inverse)
 
     def blocks(self, size: int) -> list[CutBlock]:
-        """The linear inequality itself."""
+        """Return the linear inequality itself."""
         row = sp.csc_matrix(svec(self.weight)[None, :])
         return [CutBlock("nonnegative", 1, -np.ones(1), row, _none(1))]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
-        """A multiple of the inequality."""
+        """Return a multiple of the inequality."""
         y = max(float(multipliers[0][0]), 0.0)
         return y * self.weight, y
 
     @property
     def concave(self) -> ConcaveFunction:
-        """tr(W M), which is linear."""
+        """Return the concave function tr(W M), which is linear."""
         return ConcaveFunction(
             0.0, lambda information, inverse: (float(np.sum(self.weight * information)), self.weight)
         )
 
     def implied(self, weight: Array) -> tuple[Array, float]:
-        """The multiple of W that is nearest to the suggestion."""
+        """Return the multiple of W that is nearest to the suggestion."""
         return self.proof([np.array([np.sum(weight * self.weight) / np.sum(self.weight**2)])])
 
 
@@ -225,7 +226,7 @@ def _none(rows: int) -> sp.csc_matrix:
 
 @dataclass(frozen=True)
 class EllipsoidCut:
-    """x^T Q x <= 0 for every x = (d, 1) with d^T M d <= alpha^2, Q = `form` (k + 1, k + 1).
+    """The cut x^T Q x <= 0 for all x = (d, 1) with d^T M d <= alpha^2, Q = `form` (k + 1, k + 1).
 
     By the S-procedure this holds exactly when [[M / alpha^2, 0], [0, -1]] >= nu Q for some nu >= 0
     ([polik-terlaky-2007]; the ellipsoid has an interior point, so nothing is lost). With a multiplier
@@ -245,7 +246,7 @@ class EllipsoidCut:
         return replace(self, form=corner @ self.form @ corner.T)
 
     def blocks(self, size: int) -> list[CutBlock]:
-        """The matrix inequality of the S-procedure, and nu, which is the unknown."""
+        """Return the matrix inequality of the S-procedure, and nu, which is the unknown."""
         order, entries = size + 1, svec_length(size)
         corner = np.zeros((order, order))
         corner[-1, -1] = -1.0
@@ -268,13 +269,12 @@ class EllipsoidCut:
         return self.implied(smat(multipliers[0]))
 
     def implied(self, weight: Array) -> tuple[Array, float]:
-        """tr(Z_11 M) / alpha^2 >= Z_22, from any Z >= 0 (k + 1, k + 1) with tr(Z Q) >= 0.
+        """Return the implied tr(Z_11 M) / alpha^2 >= Z_22 for any Z >= 0 (k + 1, k + 1) with tr(Z Q) >= 0.
 
-        Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0, whatever nu is.
-        The solver's Z is made positive semidefinite first, and rounding may leave tr(Z Q) a little below
-        zero. Two changes of Z mend that and keep it positive semidefinite: to shrink its last row and
-        column, or to add to Z_11 the direction in which Q_11 is largest. The first proves more, where it
-        is possible.
+        Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0 for any nu. The
+        solver's Z is made positive semidefinite first, and rounding may make tr(Z Q) slightly negative. Two
+        changes of Z mend that and keep it positive semidefinite: to shrink its last row and column, or to add
+        to Z_11 the direction in which Q_11 is largest. The first proves more, where it is possible.
         """
         Z = positive_part(weight)
         missing = -float(np.sum(Z * self.form))
@@ -290,7 +290,10 @@ class EllipsoidCut:
 
 
 def _shortened(Z: Array, form: Array) -> Array | None:
-    """Z with its last row and column times the largest c < 1 for which tr(Z Q) >= 0, Q = `form`; or None."""
+    """Return Z with its last row and column times the largest c < 1 for which tr(Z Q) >= 0; or None.
+
+    Q is `form`.
+    """
     square = Z[-1, -1] * form[-1, -1]
     linear = 2.0 * float(Z[:-1, -1] @ form[:-1, -1])
     constant = float(np.sum(Z[:-1, :-1] * form[:-1, :-1]))

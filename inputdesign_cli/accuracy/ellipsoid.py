@@ -27,14 +27,14 @@ _FLOOR = 1e-150  # its square is a number still
 class EllipsoidError(OnModelError):
     """The requirement for one entry of G that is a fraction affine in theta (`Model.bends`).
 
-    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. The
-    ellipsoid is that of the parameters of all entries, which share it.
+    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. All
+    entries share the ellipsoid of the parameters.
     """
 
     against: Literal["relative", "absolute"] = "relative"
 
     def _forms(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """z (n, k), c (n, k), c_0 (n,)."""
+        """Return the terms z (n, k), c (n, k) and c_0 (n,) of |z^T d| = |c_0 + c^T d| for the entry."""
         output, input = self.entry or (0, 0)
         part = self.experiment.model.entry_fraction(output, input, w)
         above = self.experiment.whiten_rows(part.numerator_gradient)
@@ -53,10 +53,10 @@ class EllipsoidError(OnModelError):
         return np.concatenate([real_rows(z * turned[:, None]), real_rows(c * turned[:, None])], axis=1)
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
-        """alpha over the radius at which the ellipsoid first touches |z^T d| = |1 + c^T d|.
+        """Return alpha over the radius at which the ellipsoid first touches |z^T d| = |1 + c^T d|.
 
-        That squared radius is the minimum of |y|^2 subject to a quadratic inequality in t = half y, and
-        equals the maximum of its concave dual in one multiplier, which is found by bisection.
+        The squared radius is the minimum of |y|^2 subject to a quadratic inequality in t = half y. It equals
+        the maximum of its concave dual in one multiplier, which is found by bisection.
         """
         left, scale, _ = np.linalg.svd(half, full_matrices=False)
         root = left * scale[:, None, :]
@@ -80,7 +80,7 @@ class EllipsoidError(OnModelError):
             return np.where(never, 0.0, self.alpha / np.sqrt(np.maximum(squared, 1e-300)))
 
     def cut(self, frequency: float | None) -> EllipsoidCut:
-        """The matrix inequality of the S-procedure at this frequency."""
+        """Return the matrix inequality of the S-procedure at this frequency."""
         rows = self.rows(np.array([frequency]))[0]
         k = rows.shape[1]
         form = np.zeros((k + 1, k + 1))

@@ -28,14 +28,14 @@ from inputdesign_cli.plant import local_maxima
 
 @dataclass(frozen=True, kw_only=True)
 class OnModelError(OverFrequency):
-    """What requirements on a model error share: r_adm, the confidence factor alpha, r_u to first order."""
+    """Holds the common part of requirements on a model error: r_adm, alpha, and r_u to first order."""
 
     admissible: AdmissibleError
     alpha: float
 
     @property
     def name(self) -> str:
-        """`model_error`."""
+        """Return the name `model_error`."""
         return "model_error"
 
     @property
@@ -49,20 +49,20 @@ class OnModelError(OverFrequency):
         return self.admissible.singularities
 
     def error_bound(self, information: Array, w: ArrayLike) -> Array:
-        """r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
+        """Return r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
         return self.alpha * largest_singular(turned(self.plant_rows(w), inverse_factor(information).T))
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelError(OnModelError):
-    """The requirement to first order."""
+    """The requirement on the model error to first order."""
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """Return V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T, (n, q, k)."""
         return self.plant_rows(w) * (self.alpha / self.admissible.at(w))[:, None, None]
 
     def cut(self, frequency: float | None) -> MatrixCut:
-        """M >= R_adm at this frequency."""
+        """Return the cut M >= R_adm at this frequency."""
         rows = self.rows(np.array([frequency]))[0]
         return MatrixCut(rows.T @ rows, frequency)
 

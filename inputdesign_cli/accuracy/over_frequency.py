@@ -26,14 +26,14 @@ _KEPT = 8  # sets of frequencies whose rows are remembered at a time
 
 
 class _LastLook:
-    """What the last look at a requirement has computed, since the next ones often ask for the same."""
+    """Holds the last results of a requirement, since later calls often need them again."""
 
     def __init__(self) -> None:
         self.looked: tuple[Array, Array, Array] | None = None  # an information matrix, and what it gives
         self._rows: dict[bytes, NDArray[np.float64]] = {}
 
     def rows_at(self, w: Array, rows: Callable[[Array], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """`rows` (w): while a peak stays in its cell of the grid, the search begins at the same points."""
+        """Return `rows` (w), kept since a search for a peak often begins at the same points."""
         key = w.tobytes()
         if key not in self._rows:
             if len(self._rows) >= _KEPT:
@@ -46,9 +46,9 @@ class _LastLook:
 class OverFrequency(Requirement):
     """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
 
-    It is about one `entry` of G, or about all of them together; `band` is in the unit of the experiment.
-    Subclasses give `rows`, often `measure`, and the points of the frequency plane near which they change
-    fast (`own_singularities`) or have a kink (`knots`).
+    It concerns one `entry` of G, or all of them together; `band` is in the unit of the experiment. Subclasses
+    give `rows`, often `measure`, and the points of the frequency plane near which they change fast
+    (`own_singularities`) or have a kink (`knots`).
     """
 
     experiment: Experiment
@@ -57,17 +57,17 @@ class OverFrequency(Requirement):
 
     @property
     def of_the_norm(self) -> bool:
-        """Whether no entry is named, of several."""
+        """Return whether no entry is named, of several."""
         return self.entry is None and self.experiment.model.outputs * self.experiment.model.inputs > 1
 
     @property
     @abstractmethod
     def own_singularities(self) -> ComplexArray:
-        """Return the singularities besides the ones of the plant and its loop."""
+        """Return the singularities other than from the plant and its loop."""
 
     @property
     def knots(self) -> Array:
-        """Frequencies at which the ratio may have a kink."""
+        """Return frequencies at which the ratio may have a kink."""
         return np.zeros(0)
 
     @abstractmethod
@@ -75,11 +75,11 @@ class OverFrequency(Requirement):
         """Return T(w), (n, q, k)."""
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
-        """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
+        """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
         return largest_singular(half)
 
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k)."""
+        """Return real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k)."""
         if self.entry is not None:
             return real_rows(self.experiment.entry_gradient(w, *self.entry))
         gradient = self.experiment.plant_gradient(w)
@@ -87,25 +87,25 @@ class OverFrequency(Requirement):
         return np.concatenate([flat.real, flat.imag], axis=1)
 
     def concerned(self, G: ComplexArray) -> ComplexArray:
-        """The entry (n, 1) of G (n, p, r), or all of them (n, p r)."""
+        """Return the entry (n, 1) of G (n, p, r), or all of them (n, p r)."""
         if self.entry is None:
             return G.reshape(len(G), G.shape[1] * G.shape[2])
         return G[:, self.entry[0], self.entry[1], None]
 
     def nominal_size(self, w: ArrayLike) -> Array:
-        """|G| (n,) of the entry, or the Frobenius norm."""
+        """Return |G| (n,) of the entry, or the Frobenius norm."""
         return np.linalg.norm(self.concerned(self.experiment.model.plant_at(w)), axis=1)
 
     @cached_property
     def grid_singularities(self) -> ComplexArray:
-        """Points of the frequency plane near which G, the requirement or the loop change fast."""
+        """Return points of the frequency plane near which G, the requirement or the loop change fast."""
         model = self.experiment.model
         plant = model.singularities if self.entry is None else model.entry_singularities(*self.entry)
         return np.concatenate([plant, self.experiment.singularities, self.own_singularities])
 
     @cached_property
     def grid(self) -> Array:
-        """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
+        """Return frequencies of the band that see every resonance of G, the requirement and the loop."""
         grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
         # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
         if self.poles_on_the_circle.size == 0:
@@ -135,17 +135,17 @@ class OverFrequency(Requirement):
         return _LastLook()
 
     def ratios(self, information: Array, frequencies: Array) -> Array:
-        """The ratio (n,) at given frequencies."""
+        """Return the ratio (n,) at given frequencies."""
         rows = self._last.rows_at(frequencies, self.rows)
         return self.measure(turned(rows, inverse_factor(information).T), frequencies)
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
-        """Local maxima of the ratio over the band, polished between the grid points."""
+        """Return local maxima of the ratio over the band, polished between the grid points."""
         turn, on_grid = self._on_grid(information)
         return self._polished(turn, on_grid, above)
 
     def _on_grid(self, information: Array) -> tuple[Array, Array]:
-        """K^T with K^T K = M^-1, and the ratio on the grid.
+        """Return K^T with K^T K = M^-1, and the ratio on the grid.
 
         Raises:
             InaccurateError: `ratio-not-finite`.
@@ -176,11 +176,11 @@ class OverFrequency(Requirement):
         return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
 
     def least(self, information: Array) -> float:
-        """The largest ratio at the points of the grid; NaN where one is not finite."""
+        """Return the largest ratio at the points of the grid; NaN where one is not finite."""
         return float(self._looked(information)[1].max())
 
     def _looked(self, information: Array) -> tuple[Array, Array]:
-        """K^T with K^T K = M^-1, and the ratio on the grid, finite or not."""
+        """Return K^T with K^T K = M^-1, and the ratio on the grid, finite or not."""
         seen = self._last.looked
         if seen is None or not np.array_equal(seen[0], information):
             turn = inverse_factor(information).T
@@ -201,7 +201,7 @@ class OverFrequency(Requirement):
 
 
 def turned(rows: NDArray[np.float64], turn: Array) -> NDArray[np.float64]:
-    """(n, q, k) rows @ turn as one product, since stacks of small matrices are multiplied one by one.
+    """Return rows @ turn (n, q, k) as one product, since stacks of small matrices are multiplied one by one.
 
     In memory the frequencies stand side by side: few sums over many of them are then sums of long vectors.
     """
@@ -210,14 +210,14 @@ def turned(rows: NDArray[np.float64], turn: Array) -> NDArray[np.float64]:
 
 
 def real_rows(gradient: ComplexArray) -> NDArray[np.float64]:
-    """(n, k) complex -> (n, 2, k): real and imaginary parts, in memory as `turned` has them."""
+    """Return complex (n, k) as (n, 2, k): real and imaginary parts, in memory as `turned` has them."""
     rows = np.empty((gradient.shape[1], 2, gradient.shape[0]))
     rows[:, 0], rows[:, 1] = gradient.real.T, gradient.imag.T
     return rows.T
 
 
 def largest_singular(half: NDArray[np.float64]) -> Array:
-    """Largest singular values (n,) of (n, q, k): by the closed form for two rows, else by the Gram matrix."""
+    """Return the largest singular values (n,) of (n, q, k): closed form for two rows, else Gram matrix."""
     if half.shape[1] != 2:
         return np.sqrt(np.maximum(np.linalg.eigvalsh(half @ half.swapaxes(1, 2))[:, -1], 0.0))
     real, imaginary = half[:, 0], half[:, 1]
@@ -227,7 +227,7 @@ def largest_singular(half: NDArray[np.float64]) -> Array:
 
 
 def active_entries(model: Model, highest: float) -> list[Entry]:
-    """The entries of G that are not zero, or change with a parameter, probed below `highest`."""
+    """Return the entries of G that are not zero, or change with a parameter, probed below `highest`."""
     w = np.array([0.12, 0.39]) * highest
     there = np.any(model.plant_at(w), axis=0) | np.any(model.plant_gradient(w), axis=(0, 1))
     return [(i, j) for i in range(model.outputs) for j in range(model.inputs) if there[i, j]]

@@ -16,7 +16,7 @@ Entry = tuple[int, int]
 
 @dataclass(frozen=True)
 class Violation:
-    """How badly a requirement is missed: `ratio` > 1 misses, at a frequency where there is one."""
+    """A violation of a requirement: `ratio` > 1 misses, at a frequency where there is one."""
 
     ratio: float
     frequency: float | None = None
@@ -33,45 +33,45 @@ class Requirement(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """How the spec calls it, for reports."""
+        """Return the name of the requirement in the spec, for reports."""
 
     @property
     def entry(self) -> Entry | None:
-        """The entry (output, input) of G that it is about, from zero; None for G as a whole."""
+        """Return the entry (output, input) of G that it concerns, from zero; None for G as a whole."""
         return None
 
     @property
     def of_the_norm(self) -> bool:
-        """Whether it is about the Frobenius norm of all entries of G."""
+        """Return whether it concerns the Frobenius norm of all entries of G."""
         return False
 
     @property
     def definite(self) -> bool:
-        """Whether it is out of the question that M is singular."""
+        """Return whether the requirement excludes a singular M."""
         return True
 
     @abstractmethod
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
-        """Every local maximum over frequency of the ratio that must not exceed one, if above `above`."""
+        """Return every local maximum over frequency of the ratio (at most one if met), if above `above`."""
 
     @abstractmethod
     def ratios(self, information: Array, frequencies: Array) -> Array:
-        """The ratio at given frequencies (n,): (n,)."""
+        """Return the ratio at given frequencies, (n,)."""
 
     @abstractmethod
     def cut(self, frequency: float | None) -> Cut:
-        """The cone that enforces the requirement at this frequency."""
+        """Return the cone that enforces the requirement at this frequency."""
 
     def most(self, information: Array) -> float:
-        """What the ratio does not exceed; where the search for its maximum is long, without that search."""
+        """Return an upper bound on the largest ratio, without a slow search for it."""
         return worst(self.violations(information)).ratio
 
     def least(self, information: Array) -> float:
-        """What the ratio is at least, in the same way."""
+        """Return a lower bound on the largest ratio, without a slow search for it."""
         return worst(self.violations(information)).ratio
 
     def worst(self, information: Array) -> Violation:
-        """The largest of the violations, for reports."""
+        """Return the largest of the violations, for reports."""
         return worst(self.violations(information))
 
 
@@ -80,20 +80,20 @@ class OneCondition(Requirement):
 
     @abstractmethod
     def ratio(self, information: Array) -> float:
-        """The ratio, see `Requirement`."""
+        """Return the ratio, see `Requirement`."""
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
-        """The one ratio, if above `above`."""
+        """Return the one ratio, if above `above`."""
         ratio = self.ratio(information)
         return [Violation(ratio)] if ratio > above else []
 
     def ratios(self, information: Array, frequencies: Array) -> Array:
-        """The one ratio, as often as there are frequencies."""
+        """Return the one ratio, repeated for every frequency."""
         return np.full(np.shape(frequencies), self.ratio(information))
 
 
 def inverse_factor(information: Array) -> Array:
-    """K (.., k, k) with K^T K = M^-1.
+    """Return K (.., k, k) with K^T K = M^-1.
 
     Raises:
         LinAlgError: M is singular, that is, some parameter is not excited.
@@ -108,5 +108,5 @@ def inverse_factor(information: Array) -> Array:
 
 
 def worst(violations: list[Violation]) -> Violation:
-    """The largest of them; ratio 0 when there are none."""
+    """Return the largest violation; ratio 0 when there are none."""
     return max(violations, key=lambda v: v.ratio, default=Violation(0.0))

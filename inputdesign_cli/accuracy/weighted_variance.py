@@ -22,9 +22,9 @@ _REAL = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class WeightedVariance(OverFrequency):
-    """The requirement for one entry of G.
+    """The requirement on the weighted variance of one entry of G.
 
-    With `relative` the variance is that of G relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
+    With `relative` it is the variance relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
     """
 
     weight: ScalarTransfer
@@ -33,7 +33,7 @@ class WeightedVariance(OverFrequency):
 
     @property
     def name(self) -> str:
-        """`weighted_variance`."""
+        """Return the name `weighted_variance`."""
         return "weighted_variance"
 
     @property
@@ -49,11 +49,11 @@ class WeightedVariance(OverFrequency):
         return self.plant_rows(w) * size[:, None, None]
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
-        """The weighted standard deviation over its limit."""
+        """Return the weighted standard deviation over its limit."""
         return np.sqrt(np.einsum("nqi,nqi->n", half, half))
 
     def cut(self, frequency: float | None) -> Cut:
-        """tr(V^T M^-1 V) <= 1 at this frequency."""
+        """Return the cut tr(V^T M^-1 V) <= 1 at this frequency."""
         rows = self.rows(np.array([frequency]))[0]
         if np.abs(rows[1]).max() <= _REAL * np.abs(rows[0]).max():  # a real gradient, at 0 and pi
             return MatrixCut(np.outer(rows[0], rows[0]), frequency)

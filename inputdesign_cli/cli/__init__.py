@@ -13,7 +13,7 @@ from inputdesign_cli.cli.campaign import campaign, proceed, status
 from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.data import assess, explore, identify
 from inputdesign_cli.cli.designs import analyse, simulate, solve, validate
-from inputdesign_cli.cli.options import unfolded
+from inputdesign_cli.cli.options import declared
 from inputdesign_cli.cli.reference import examples, explain, init, schema
 from inputdesign_cli.cli.signal import signal
 from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
@@ -79,11 +79,12 @@ COMMANDS = (
 # A word of Python is no name of a function.
 _NAMES = {"proceed": "next"}
 for command in COMMANDS:
-    app.command(_NAMES.get(command.__name__))(guarded(unfolded(command)))
+    name = _NAMES.get(command.__name__, command.__name__)
+    app.command(name)(guarded(declared(command, name)))
 
 
 def main() -> None:
-    """The `idesign` command."""
+    """Run the `idesign` command."""
     prepare_streams()
     prepare_signals()
     use_one_thread()  # numpy, which reads it, has not been imported yet

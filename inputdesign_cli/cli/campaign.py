@@ -5,64 +5,27 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import (
-    Changes,
-    Figures,
-    Into,
-    Json,
-    Output,
-    Overwrite,
-    Quiet,
-    Shown,
-    SpecFile,
-)
-from inputdesign_cli.cli.reading import name_of, read_spec
-from inputdesign_cli.cli.rows import OperatingPoint, Written, levels
-from inputdesign_cli.cli.run import Place, keep, renew
+from inputdesign_cli.cli.options import Changes, Into, Shown
+from inputdesign_cli.cli.rows import Written, levels
+from inputdesign_cli.cli.run import Place, keep, name_of, read_spec, renew
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 
-CampaignDirectory = Annotated[
-    Path, typer.Argument(metavar="DIR", help="The directory that idesign campaign wrote.")
-]
-Recorded = Annotated[
-    Path | None, typer.Argument(metavar="DATA", help="What was recorded of the part that signal.csv was for.")
-]
-Withdraw = Annotated[
-    int | None,
-    typer.Option("--withdraw", metavar="N", min=1, help="Leave out record N from now on; its file stays."),
-]
-AsApplied = Annotated[
-    bool,
-    typer.Option(
-        "--as-applied",
-        help="Take a record of something else than what was planned: at another scale, an earlier plan, "
-        "or none.",
-    ),
-]
-Regardless = Annotated[
-    bool,
-    typer.Option(
-        "--regardless",
-        help="Go on, from now on, where tests of the residuals refute the structure of the model.",
-    ),
-]
 _EXIT = {"running": EXIT_DONE, "stopped": EXIT_DONE, "missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
 
 
 def campaign(
-    spec: SpecFile,
+    spec: Path,
     *,
     changes: Changes,
-    output: Output = None,
-    overwrite: Overwrite = False,
-    figures: Figures = True,
-    json_output: Json = False,
-    quiet: Quiet = False,
+    output: Path | None = None,
+    overwrite: bool = False,
+    figures: bool = True,
+    json_output: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Begin an experiment that goes in parts.
 
@@ -82,17 +45,17 @@ def campaign(
 
 
 def proceed(
-    directory: CampaignDirectory,
-    data: Recorded = None,
+    directory: Path,
+    data: Path | None = None,
     *,
-    withdraw: Withdraw = None,
-    as_applied: AsApplied = False,
-    regardless: Regardless = False,
+    withdraw: int | None = None,
+    as_applied: bool = False,
+    regardless: bool = False,
     written: Written,
-    operating_point: OperatingPoint = "",
-    figures: Figures = True,
-    json_output: Json = False,
-    quiet: Quiet = False,
+    operating_point: str = "",
+    figures: bool = True,
+    json_output: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Take the record of a part, and plan the next or stop.
 
@@ -124,13 +87,14 @@ def proceed(
                 taken = replace(written.preparation(), operating_point=levels(operating_point))
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
-        renew(results, directory, Shown(figures, json_output=json_output, quiet=quiet))
+        shown = Shown(figures, json_output=json_output, quiet=quiet)
+        renew(results, directory, shown, stated.figures)
     code = _EXIT[results.result["status"]]
     if code:
         raise typer.Exit(code)
 
 
-def status(directory: CampaignDirectory, json_output: Json = False) -> None:
+def status(directory: Path, *, json_output: bool = False) -> None:
     """Show how a campaign stands: what has been reached, and what comes next."""
     from inputdesign_cli.outcome.codec import json_text
     from inputdesign_cli.questions.campaign.memory import read_memory

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import typer
 
-from inputdesign_cli.cli.options import Json, Quiet
 from inputdesign_cli.cli.reference import shipped
 from inputdesign_cli.cli.terminal import aligned, status
 from inputdesign_cli.errors import EXIT_MISSED, DataError, IdesignError
@@ -18,23 +19,16 @@ from inputdesign_cli.errors import EXIT_MISSED, DataError, IdesignError
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.golden import Row
 
+Seconds = Mapping[tuple[str, str], float]
 HEADER = ("", "run", "quantity", "computed", "expected", "deviation", "tolerance", "source")
 
 
 def check(
-    files: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="[GOLDEN]...",
-            help="Golden files, or names of the package's golden files; the default is golden/*.yaml, or "
-            "else all of the package.",
-        ),
-    ] = None,
-    junit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a JUnit report for a CI server too.")
-    ] = None,
-    json_output: Json = False,
-    quiet: Quiet = False,
+    files: list[Path] | None = None,
+    *,
+    junit: Path | None = None,
+    json_output: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Compare results with golden values.
 
@@ -50,7 +44,6 @@ def check(
     except IdesignError as error:
         stopped = error
     if junit is not None:
-        from inputdesign_cli.cli.junit import junit_text
         from inputdesign_cli.outcome.run_directory import write_text
 
         write_text(junit, junit_text(rows, seconds, stopped))
@@ -89,7 +82,7 @@ def _compare(
 
 
 def _found(path: Path) -> Path:
-    """The file of this name, or else that of the package, with or without its ending.
+    """Return the file of this name, or else the golden file of the package, with or without its ending.
 
     Raises:
         DataError: `golden-missing`, there is neither.
@@ -114,7 +107,7 @@ def _default_files() -> list[Path]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """The comparison as aligned text; where a number is missing, the reason follows its line."""
+    """Return the comparison as aligned text; where a number is missing, the reason follows its line."""
     from rich.text import Text
 
     cells: list[tuple[str | Text, ...]] = [tuple(Text(name, "bold") for name in HEADER)]
@@ -137,3 +130,43 @@ def table(rows: Sequence[Row]) -> str:
         if row.note:
             lines[i] += f"\n       {row.note}"
     return "\n".join([header, *lines])
+
+
+def junit_text(rows: Sequence[Row], seconds: Seconds, error: IdesignError | None = None) -> str:
+    """Return JUnit XML with a suite for each golden file and a test case for each of its quantities.
+
+    Args:
+        rows: the comparison, file by file.
+        seconds: (golden file, run) -> how long the run took; its first quantity carries it.
+        error: what ended the comparison, if anything did; it has a suite of its own.
+    """
+    root = Element("testsuites", name="idesign check")
+    for golden, of_file in groupby(rows, lambda row: row.golden):
+        suite, timed = SubElement(root, "testsuite", name=golden), set()
+        for row in of_file:
+            taken = 0.0 if row.run in timed else seconds.get((golden, row.run), 0.0)
+            timed.add(row.run)
+            _add(suite, golden, row, taken)
+    if error is not None:
+        suite = SubElement(root, "testsuite", name="idesign check")
+        case = SubElement(suite, "testcase", classname="idesign check", name="golden files", time="0")
+        for found in error.diagnostics:
+            SubElement(case, "error", type=found.code, message=found.message).text = found.hint
+    for part in (root, *root):
+        cases = list(part.iter("testcase"))
+        time = sum(float(one.get("time", 0.0)) for one in cases)
+        part.attrib.update({"tests": str(len(cases)), "time": f"{time:.3f}"})
+        for kind in ("failure", "error"):
+            part.set(f"{kind}s", str(sum(one.find(kind) is not None for one in cases)))
+    indent(root)
+    return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add(suite: Element, golden: str, row: Row, taken: float) -> None:
+    quantity = row.quantity
+    name = f"{row.run}: {quantity.name} ({quantity.source})"
+    case = SubElement(suite, "testcase", classname=golden, name=name, time=f"{taken:.3f}")
+    if not row.passed:
+        message = row.note or f"computed {row.computed:.10g}, expected {quantity.expected:.10g}"
+        failure = SubElement(case, "failure", message=message)
+        failure.text = f"{quantity.path}: {message}; tolerance {quantity.tolerance:.3g} ({quantity.why})"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Into, Shown, SpecFile
-from inputdesign_cli.cli.reading import read_spec
-from inputdesign_cli.cli.rows import DataFiles, Levels, Rows
-from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.options import Changes, Into, Shown
+from inputdesign_cli.cli.rows import Levels, Rows
+from inputdesign_cli.cli.run import Place, keep, read_spec
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 
@@ -18,24 +17,18 @@ _EXIT = {"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
 
 
 def explore(
-    data: DataFiles,
+    data: list[Path],
     *,
     rows: Rows,
-    validate: Annotated[
-        Path | None,
-        typer.Option("--validate", metavar="MODEL", help="Judge this model by the data; look for no other."),
-    ] = None,
-    structure: Annotated[
-        Literal["any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"],
-        typer.Option(help="The structure of the model (fopdt: a lag with dead time)."),
-    ] = "any",
+    validate: Path | None = None,
+    structure: Literal["any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"] = "any",
     into: Into,
     shown: Shown,
 ) -> None:
     """Find a model in a log, and write a spec for the next experiment.
 
     Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
-    judged on the other; of those that explain it as well the simplest is taken. Writes model.yaml, a
+    judged on the other; the simplest that explains it as well is taken. Writes model.yaml, a
     commented spec.yaml for `idesign solve`, figures and report.html; prints a summary. Exits with 1, and
     says why, where no model deserves trust.
     """
@@ -55,23 +48,14 @@ def explore(
 
 
 def identify(
-    data: DataFiles,
+    data: list[Path],
     *,
-    spec: Annotated[
-        Path | None,
-        typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure."),
-    ] = None,
+    spec: Path | None = None,
     changes: Changes,
     into: Into,
     levels: Levels,
     rows: Rows,
-    frequency_response: Annotated[
-        bool,
-        typer.Option(
-            "--frequency-response",
-            help="Measure the frequency response without a model instead, at the lines of the spec.",
-        ),
-    ] = False,
+    frequency_response: bool = False,
     shown: Shown,
 ) -> None:
     """Estimate the plant and the noise from recorded experiments.
@@ -105,7 +89,7 @@ def identify(
 
 
 def assess(
-    spec: SpecFile, data: DataFiles, *, changes: Changes, into: Into, levels: Levels, rows: Rows, shown: Shown
+    spec: Path, data: list[Path], *, changes: Changes, into: Into, levels: Levels, rows: Rows, shown: Shown
 ) -> None:
     """Show whether the data of a real experiment meet the target.
 

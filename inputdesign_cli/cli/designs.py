@@ -4,28 +4,16 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from inputdesign_cli.cli.options import (
-    Changes,
-    Fast,
-    Into,
-    Json,
-    KeepPartial,
-    Quiet,
-    Shown,
-    SpecFile,
-    Workers,
-)
-from inputdesign_cli.cli.reading import name_of, read_spec
-from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.options import Changes, Into, Shown, Workers
+from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
 from inputdesign_cli.cli.streams import ending_early
+from inputdesign_cli.cli.sweep import show_trade
 from inputdesign_cli.cli.terminal import computing
-from inputdesign_cli.cli.trade import TradeWords, show_trade
 from inputdesign_cli.compute.time_limit import stoppable
 from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
 
@@ -36,13 +24,13 @@ if TYPE_CHECKING:
 
 
 def solve(
-    spec: SpecFile,
+    spec: Path,
     *,
     changes: Changes,
     into: Into,
-    keep_partial: KeepPartial = False,
-    fast: Fast = False,
-    trade: TradeWords = None,
+    keep_partial: bool = False,
+    fast: bool = False,
+    trade: str | None = None,
     shown: Shown,
 ) -> None:
     """Design the experiment that a spec asks for.
@@ -50,17 +38,14 @@ def solve(
     Writes a run directory with the spectrum, the signal to apply, the model error that it buys, and the
     proof of optimality; prints a summary.
     """
-    place = Place(into, name_of(spec), [spec])
     if trade and (into.no_output or keep_partial or str(spec) == STANDARD_STREAM):
         message = "--trade needs a spec on disc and a directory to write, and does not go with --keep-partial"
         raise typer.BadParameter(message)
-    if fast:
-        changes = replace(changes, overrides=[*(changes.overrides or []), "solver.any_spectrum=false"])
-    came: list[int] = []
+    changes, came = changes.faster(fast), list[int]()
     with ExitStack() as stack:
         if keep_partial:
             came = stack.enter_context(ending_early(stack.enter_context(stoppable())))
-        results, place = _results("solve", place, changes, shown.quiet)
+        results, place = _results("solve", spec, changes, into, shown)
     keep(results, place, shown)
     if trade:
         show_trade(spec, read_spec(spec, changes), trade.split(","), place.directory, changes, shown)
@@ -68,37 +53,43 @@ def solve(
         raise typer.Exit(128 + came[0])
 
 
-def analyse(spec: SpecFile, *, changes: Changes, into: Into, shown: Shown) -> None:
+def analyse(spec: Path, *, changes: Changes, into: Into, shown: Shown) -> None:
     """Show what accuracy a given excitation buys.
 
     Nothing is optimised: the excitation stands in the spec under `spectrum.given`. Writes a run
     directory and prints a summary.
     """
-    place = Place(into, name_of(spec), [spec])
-    results, place = _results("analyse", place, changes, shown.quiet)
-    keep(results, place, shown)
+    keep(*_results("analyse", spec, changes, into, shown), shown)
 
 
-def simulate(spec: SpecFile, *, changes: Changes, into: Into, workers: Workers, shown: Shown) -> None:
+def simulate(spec: Path, *, changes: Changes, into: Into, workers: Workers, shown: Shown) -> None:
     """Try the designed experiment on the true system, many times.
 
     Designs as `solve` does, runs the experiment as often as `simulation.runs` says, each time with new
     noise, and adds to the run directory of `solve` what the models did; prints a summary.
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
-    place = Place(into, name_of(spec), [spec])
     computes = workers.executor(quiet=shown.quiet)
-    results, place = _results("simulate", place, changes, shown.quiet, computes)
-    keep(results, place, shown)
+    keep(*_results("simulate", spec, changes, into, shown, computes), shown)
 
 
-def validate(
-    specs: Annotated[list[Path], typer.Argument(metavar="SPEC...", help="The specs to check, YAML files.")],
-    *,
-    changes: Changes,
-    json_output: Json = False,
-    quiet: Quiet = False,
-) -> None:
+def _results(
+    verb: Verb, file: Path, changes: Changes, into: Into, shown: Shown, executor: Executor | None = None
+) -> tuple[Results, Place]:
+    """Return the results of a verb for a spec file and the place of the run, which is checked before.
+
+    The numerical libraries are imported behind the message.
+    """
+    place = Place(into, name_of(file), [file])
+    with computing(file, quiet=shown.quiet):
+        from inputdesign_cli.questions import run_verb
+
+        spec = read_spec(file, changes)
+        place = place.checked(spec)
+        return run_verb(verb, spec, executor), place
+
+
+def validate(specs: list[Path], *, changes: Changes, json_output: bool = False, quiet: bool = False) -> None:
     """Check specs without computing a design.
 
     A valid spec can be read and is well posed. One that states nothing of a design (accuracy, limits,
@@ -128,19 +119,3 @@ def validate(
         if estimated:
             found["for_identify_only"] = [str(path) for path in estimated]
         typer.echo(json.dumps(found, indent=1, ensure_ascii=False))
-
-
-def _results(
-    verb: Verb, place: Place, changes: Changes, quiet: bool, executor: Executor | None = None
-) -> tuple[Results, Place]:
-    """Return what a verb makes of a spec file, and its place, which is checked before.
-
-    The numerical libraries are imported behind the message.
-    """
-    file = place.sources[0]
-    with computing(file, quiet=quiet):
-        from inputdesign_cli.questions import run_verb
-
-        spec = read_spec(file, changes)
-        place = place.checked(spec)
-        return run_verb(verb, spec, executor), place

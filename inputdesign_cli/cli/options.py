@@ -1,47 +1,58 @@
 """Arguments and options that several commands share, so that they read the same everywhere.
 
-A parameter of a command whose type is a dataclass of this file stands for an option for each of its fields.
+`options.toml` declares them: what all commands share under a name, and what single commands and groups have.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
+from importlib import resources
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 
 import typer
 
-from inputdesign_cli.cli.completion import spec_keys
 from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
 
+TABLE: dict[str, dict[str, dict[str, Any]]] = tomllib.loads(
+    (resources.files(__package__) / "options.toml").read_text(encoding="utf-8")
+)
+TRADED = ("samples", "amplitude")
 
-def unfolded(command: Callable[..., None]) -> Callable[..., None]:
-    """Return the command with an option for each field of its parameters that are dataclasses."""
-    hints = get_type_hints(command, include_extras=True)
-    groups = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+
+def declared(command: Callable[..., None], name: str) -> Callable[..., None]:
+    """Return the command with an argument or an option for each of its parameters, see `options.toml`.
+
+    A parameter whose type is a dataclass stands for an option for each of its fields. Parameters that take
+    positions are arguments of the command line.
+    """
+    hints = get_type_hints(command)
+    groups = {one: kind for one, kind in hints.items() if isinstance(kind, type) and is_dataclass(kind)}
     parameters: list[Parameter] = []
     for one in signature(command).parameters.values():
         if one.name not in groups:
-            parameters.append(one.replace(annotation=hints[one.name], kind=Parameter.KEYWORD_ONLY))
+            is_argument = one.kind is Parameter.POSITIONAL_OR_KEYWORD
+            parameters.append(_declared(one, hints[one.name], name, is_argument=is_argument))
             continue
-        types = get_type_hints(hints[one.name], include_extras=True)
-        parameters += [
-            one.replace(name=field.name, default=field.default, annotation=types[field.name])
-            for field in fields(groups[one.name])
-        ]
+        kind, types = groups[one.name], get_type_hints(groups[one.name])
+        for field in fields(kind):
+            stated = one.replace(name=field.name, default=field.default)
+            owner = next((c.__name__ for c in kind.__mro__ if field.name in TABLE.get(c.__name__, ())), "")
+            parameters.append(_declared(stated, types[field.name], owner))
 
     @wraps(command)
     def run(**given: object) -> None:
         made = {
-            name: hints[name](**{field.name: given.pop(field.name) for field in fields(kind)})
-            for name, kind in groups.items()
+            one: hints[one](**{field.name: given.pop(field.name) for field in fields(kind)})
+            for one, kind in groups.items()
         }
         command(**given, **made)
 
@@ -50,22 +61,20 @@ def unfolded(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-SpecFile = Annotated[
-    Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file; - is standard input.")
-]
-Confine = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="DIR",
-        exists=True,
-        file_okay=False,
-        help="Refuse a spec that names files outside DIR (links followed).",
-    ),
-]
+def _declared(one: Parameter, kind: type, owner: str, *, is_argument: bool = False) -> Parameter:
+    """Return a parameter with what typer has to know of it."""
+    stated = dict(TABLE.get(owner, {}).get(one.name) or TABLE["shared"][one.name])
+    names = stated.pop("names", ())
+    for key in ("parser", "autocompletion", "callback"):
+        if key in stated:
+            stated[key] = _CALLS[stated[key]]
+    default = ... if one.default is Parameter.empty else one.default
+    made = typer.Argument(default, **stated) if is_argument else typer.Option(default, *names, **stated)
+    return one.replace(annotation=kind, default=made, kind=Parameter.KEYWORD_ONLY)
 
 
 def path_option(text: str) -> Path:
-    """Return the path that an option gives; an empty text (of a variable that is not set) is none."""
+    """Return the path that an option gives; refuse an empty text, as of a variable that is not set."""
     if not text.strip():
         raise typer.BadParameter("the name is empty")
     return Path(text)
@@ -90,116 +99,108 @@ def refuse_existing(file: Path, overwrite: bool, option: str = "--overwrite") ->
         raise OutputError.because("output-exists", f"{file} exists already", hint)
 
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Directory to write. The default is runs/SPEC, runs/SPEC-sweep, or runs/DATA_explored, "
-        "_validated, _identified or _assessed.",
-        parser=run_path,
-    ),
-]
-NoOutput = Annotated[
-    bool, typer.Option("--no-output", help="Write no files; print the summary, or the result with --json.")
-]
-Overwrite = Annotated[
-    bool,
-    typer.Option("--overwrite", help="Replace a run of another spec, or one whose spec.yaml was changed."),
-]
-Json = Annotated[
-    bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-KeepPartial = Annotated[
-    bool,
-    typer.Option(
-        "--keep-partial",
-        help="After Ctrl-C or SIGTERM write the best design so far, as after solver.time_limit; a second one "
-        "ends at once.",
-    ),
-]
-Fast = Annotated[
-    bool,
-    typer.Option(
-        "--fast",
-        help="Leave out the bound over every spectrum, which may take as long as the design, and the search "
-        "for other dead times that fit as well (solver.any_spectrum: false).",
-    ),
-]
-Figures = Annotated[
-    bool, typer.Option("--figures/--no-figures", help="Draw the figures of the run, or leave them out.")
-]
-FigureFormat = Annotated[
-    Literal["png", "svg", "pdf"], typer.Option(help="The format of the figures; svg and pdf can be scaled.")
-]
+def _trade_words(text: str | None) -> str | None:
+    for word in () if text is None else text.split(","):
+        if word not in TRADED:
+            raise typer.BadParameter(f'"{word}" is neither samples nor amplitude')
+    return text
+
+
+def error_codes(incomplete: str) -> list[tuple[str, str]]:
+    """Return the codes that `idesign explain` knows, with their titles."""
+    from inputdesign_cli.findings import explanations
+
+    known = sorted(explanations().items())
+    return [(code, entry.title) for code, entry in known if code.startswith(incomplete)]
+
+
+def spec_keys(incomplete: str) -> list[str]:
+    """Return the keys of a spec that `--set` takes, and behind the equals sign the words that a key takes."""
+    from inputdesign_cli.specification import json_schema
+
+    schema = json_schema()
+    found = list(_entries(schema, schema, ""))
+    key, equals, _ = incomplete.partition("=")
+    if not equals:
+        return [f"{name}=" for name in dict.fromkeys(name for name, _ in found) if name.startswith(key)]
+    words = dict.fromkeys(f"{key}={word}" for name, node in found if name == key for word in _words(node))
+    return [word for word in words if word.startswith(incomplete)]
+
+
+def _entries(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the paths of all keys that hold values: through references and alternatives, not into lists."""
+    if "$ref" in node:
+        yield from _entries(root["$defs"][node["$ref"].rpartition("/")[2]], root, path)
+    for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
+        yield from _entries(alternative, root, path)
+    for key, below in node.get("properties", {}).items():
+        name = f"{path}.{key}" if path else key
+        if name != "sweep":
+            yield name, below
+            yield from _entries(below, root, name)
+
+
+def _words(node: dict[str, Any]) -> Iterator[str]:
+    """Yield the texts that a value may be, where it is one of a few."""
+    listed = [*node.get("enum", ()), *([node["const"]] if "const" in node else ())]
+    yield from (word for word in listed if isinstance(word, str))
+    if node.get("type") == "boolean":
+        yield from ("true", "false")
+    for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
+        yield from _words(alternative)
+
+
+_CALLS: dict[str, Callable[..., object]] = {
+    "path": path_option,
+    "run": run_path,
+    "error_codes": error_codes,
+    "spec_keys": spec_keys,
+    "trade_words": _trade_words,
+}
 
 
 @dataclass(frozen=True)
 class Changes:
-    """What is changed in a spec, and which files it may name."""
+    """Holds the changes of a spec, and the files that it may name."""
 
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Override one entry of the spec, as in spectrum.order=10 (the value is YAML). Repeatable.",
-            autocompletion=spec_keys,
-        ),
-    ] = None
-    confine: Confine = None
+    overrides: list[str] | None = None
+    confine: Path | None = None
+
+    def faster(self, fast: bool) -> Changes:
+        """Return the changes, without the bound over every spectrum if the run is to be fast."""
+        more = ["solver.any_spectrum=false"] * fast
+        return replace(self, overrides=[*(self.overrides or []), *more])
 
 
 @dataclass(frozen=True)
 class Into:
-    """Where a run goes."""
+    """Holds the place of a run."""
 
-    output: Output = None
-    overwrite: Overwrite = False
-    no_output: NoOutput = False
+    output: Path | None = None
+    overwrite: bool = False
+    no_output: bool = False
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What is drawn and printed of a run."""
+    """Holds what is drawn and printed of a run."""
 
-    figures: Figures = True
-    figure_format: FigureFormat = "png"
-    json_output: Json = False
-    quiet: Quiet = False
+    figures: bool = True
+    figure_format: Literal["png", "svg", "pdf"] | None = None
+    json_output: bool = False
+    quiet: bool = False
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Where a command computes: in its own process, in several, or on a cluster."""
+    """Describes where a command computes: in its own process, in several, or on a cluster."""
 
-    jobs: Annotated[
-        int,
-        typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core."),
-    ] = 1
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            "--cluster",
-            metavar="ADDRESS",
-            help="Compute on the Dask cluster at this address, tcp://HOST:PORT or tls://HOST:PORT. Without "
-            "TLS anybody who reaches it can run programs there and here (docs/security.md).",
-        ),
-    ] = None
-    worker_timeout: Annotated[
-        float | None,
-        typer.Option(
-            "--worker-timeout",
-            metavar="SECONDS",
-            min=0.0,
-            help="Give up when the cluster has been without workers for so long; the default is to wait.",
-        ),
-    ] = None
+    jobs: int = 1
+    cluster: str | None = None
+    worker_timeout: float | None = None
 
     def executor(self, *, quiet: bool) -> Executor:
-        """Return what computes; an address comes first."""
+        """Return what computes: a cluster if an address is given, else one or more processes here."""
         from inputdesign_cli.compute.cluster import Cluster
         from inputdesign_cli.compute.executor import InProcess
         from inputdesign_cli.compute.processes import Processes

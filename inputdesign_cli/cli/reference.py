@@ -6,12 +6,11 @@ import difflib
 import json
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import typer
 
-from inputdesign_cli.cli.completion import error_codes
-from inputdesign_cli.cli.options import path_option, refuse_existing
+from inputdesign_cli.cli.options import refuse_existing
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.errors import DataError, OutputError
 
@@ -27,21 +26,7 @@ def shipped() -> Path:
     return inside if inside.is_dir() else _PACKAGE.parent
 
 
-def examples(
-    name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="The example to copy; without it, all are listed.")
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Where to copy it. The default is the current folder.",
-            parser=path_option,
-        ),
-    ] = None,
-) -> None:
+def examples(name: str | None = None, *, output: Path | None = None) -> None:
     """List the specs that come with idesign, or copy one.
 
     They are the examples of the documentation; `idesign check` compares their results with golden values.
@@ -70,13 +55,7 @@ def examples(
     typer.echo(target)
 
 
-def init(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="Where to write it, if not to standard output.")
-    ] = None,
-    kind: Annotated[Kind, typer.Option(help="The experiment to start from.")] = "open-loop",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
-) -> None:
+def init(file: Path | None = None, *, kind: Kind = "open-loop", force: bool = False) -> None:
     """Write a commented starter spec.
 
     It is complete: `idesign solve` runs it as it is. Beside FILE stands idesign.schema.json afterwards, from
@@ -96,17 +75,7 @@ def init(
         write_text(file.parent / SCHEMA, schema_text())
 
 
-def explain(
-    code: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[CODE]",
-            help="The code of an error or of a finding; without it, all codes.",
-            autocompletion=error_codes,
-        ),
-    ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Explain all codes, one after the other.")] = False,
-) -> None:
+def explain(code: str | None = None, *, every: bool = False) -> None:
     """Explain the code of an error or of a finding.
 
     Says what it means and what to do about it.

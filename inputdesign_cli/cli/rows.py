@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 import typer
 
@@ -18,72 +18,29 @@ if TYPE_CHECKING:
 _ROWS = re.compile(r"(?:(.+):)?\s*((\d+)(?:\s*-\s*(\d+))?)\s*", re.DOTALL)
 _CHANNEL = re.compile(r"[uyr]([1-9]\d*)?|time", re.ASCII)
 TimeUnit = Literal["s", "ms", "us", "min", "h", "d"]
-DataFiles = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="DATA...",
-        help="Records of experiments with columns u and y, estimated jointly: CSV, TSV, .mat, .npz, and with "
-        "the extra data parquet and Excel.",
-    ),
-]
-OperatingPoint = Annotated[
-    str,
-    typer.Option(
-        "--operating-point",
-        metavar="u1=..,y1=..",
-        help="What channels vary about, as in u1=40,y1=52.3; it is subtracted. For inputs the default is "
-        "signal.offset.",
-    ),
-]
 
 
 @dataclass(frozen=True)
 class Levels:
-    """What the channels of a record vary about."""
+    """Holds the levels about which the channels of a record vary."""
 
-    remove_means: Annotated[
-        bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")
-    ] = False
-    operating_point: OperatingPoint = ""
+    remove_means: bool = False
+    operating_point: str = ""
 
     @property
     def point(self) -> dict[str, float]:
-        """The operating point by channel."""
+        """Return the operating point by channel."""
         return levels(self.operating_point)
 
 
 @dataclass(frozen=True)
 class Written:
-    """How a text file is written, where it does not show it, and which column is which."""
+    """Describes how a text file is written, where it does not show it, and which column is which."""
 
-    columns: Annotated[
-        str,
-        typer.Option(
-            "--columns",
-            metavar="u1=..,y1=..",
-            help="Which column holds which channel, by name or number: u1=Heater 1,y1=4,time=1.",
-        ),
-    ] = ""
-    separator: Annotated[
-        str | None,
-        typer.Option(
-            "--sep",
-            metavar="MARK",
-            help="What separates the columns of a text file: , ; tab blank or another mark.",
-        ),
-    ] = None
-    decimal: Annotated[
-        Literal[".", ","] | None,
-        typer.Option("--decimal", metavar="MARK", help="The decimal mark of the file: . or ,"),
-    ] = None
-    time_format: Annotated[
-        str | None,
-        typer.Option(
-            "--time-format",
-            metavar="FORM",
-            help="How dates and times are written, as %d.%m.%Y %H:%M:%S or %Y%m%d%H%M%S.",
-        ),
-    ] = None
+    columns: str = ""
+    separator: str | None = None
+    decimal: Literal[".", ","] | None = None
+    time_format: str | None = None
 
     def preparation(self) -> Preparation:
         """Return what these options say about data files.
@@ -109,43 +66,15 @@ class Written:
 
 @dataclass(frozen=True)
 class Rows(Written):
-    """How the rows of data files become samples."""
+    """Describes how the rows of data files become samples."""
 
-    sample_time: Annotated[
-        float | None,
-        typer.Option(
-            "--sample-time", metavar="T", help="Time between rows, where the file does not have it."
-        ),
-    ] = None
-    time_unit: Annotated[TimeUnit | None, typer.Option(help="Of the times in the file.")] = None
-    resample: Annotated[
-        bool,
-        typer.Option(
-            "--resample",
-            help="Even out times that jitter by more than 25 % of the sample time, too; join columns that "
-            "were written at different times.",
-        ),
-    ] = False
-    detrend: Annotated[
-        Literal["none", "constant", "linear", "auto"],
-        typer.Option(help="What to take away from every signal, segment by segment."),
-    ] = "none"
-    skip: Annotated[
-        int,
-        typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of data of every file."),
-    ] = 0
-    span: Annotated[
-        str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
-    ] = ""
-    without: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--without",
-            metavar="ROWS",
-            help="Leave out these rows, as notes number them, as in 183-240,310; the record is cut there. Of "
-            "several files: log1.csv:183-240. Repeatable.",
-        ),
-    ] = None
+    sample_time: float | None = None
+    time_unit: TimeUnit | None = None
+    resample: bool = False
+    detrend: Literal["none", "constant", "linear", "auto"] = "none"
+    skip: int = 0
+    span: str = ""
+    without: list[str] | None = None
 
     def of(self, data: Sequence[Path]) -> Preparation:
         """Return what the options say about data files.
@@ -195,7 +124,7 @@ def span(text: str, option: str, form: str) -> tuple[float, float]:
 
 
 def levels(text: str) -> dict[str, float]:
-    """`u1=40,y1=52.3` as numbers; u and y are u1 and y1.
+    """Parse `u1=40,y1=52.3` as numbers by channel; u and y are u1 and y1.
 
     Raises:
         typer.BadParameter: The text is something else.
@@ -212,7 +141,7 @@ def levels(text: str) -> dict[str, float]:
 
 
 def _named(text: str, option: str, example: str) -> dict[str, str]:
-    """`u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
+    """Parse `u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
 
     Raises:
         typer.BadParameter: A part has no `=`, or names nothing.
@@ -233,7 +162,7 @@ def _named(text: str, option: str, example: str) -> dict[str, str]:
 
 
 def _runs(text: str, data: Sequence[Path]) -> Iterator[Run]:
-    """Rows as in 183-240,310, of several files with the name of one before each run.
+    """Parse rows as in 183-240,310; with several files, the name of one stands before each run.
 
     Raises:
         typer.BadParameter: A part is something else, or its file is not clear.

@@ -1,7 +1,8 @@
-"""What commands that make a run end with: a run directory and a summary."""
+"""What a run begins and ends with: a spec, a place for the run, and a summary."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,26 +10,66 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from inputdesign_cli.cli.options import Into, Shown
+from inputdesign_cli.cli.options import Changes, Into, Shown
 from inputdesign_cli.cli.terminal import status
-from inputdesign_cli.errors import OutputError
+from inputdesign_cli.errors import STANDARD_STREAM, OutputError, bad_spec
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.origin import Origin
     from inputdesign_cli.outcome.results import Results
     from inputdesign_cli.specification import Spec
+    from inputdesign_cli.specification.models.realisation import Figures
+
+
+def read_spec(file: Path, changes: Changes, *, design: bool | None = True) -> Spec:
+    """Return the spec in a file; in standard input (`-`) names are relative to the current folder.
+
+    Args:
+        design: whether it must ask for a design, None: if it states anything of one; see `load_spec`.
+
+    Raises:
+        SpecError: as `load_spec`.
+    """
+    from inputdesign_cli import specification
+
+    overrides, confine = changes.overrides or (), changes.confine
+    if str(file) != STANDARD_STREAM:
+        return specification.load_spec(file, overrides, confine=confine, design=design)
+    return specification.parse_spec(standard_input(), "<stdin>", overrides, confine=confine, design=design)
+
+
+def standard_input() -> str:
+    """Return the text of a spec on standard input.
+
+    Raises:
+        SpecError: it is closed, too large, or no text.
+    """
+    from inputdesign_cli.specification.yaml.files import MAX_BYTES, decode
+
+    if sys.stdin is None:
+        raise bad_spec("file-unreadable", "standard input is closed", hint="name a file")
+    raw = sys.stdin.buffer.read(MAX_BYTES + 1)
+    if len(raw) > MAX_BYTES:
+        raise bad_spec("file-too-large", f"the spec is larger than {MAX_BYTES // 2**20} MiB")
+    return decode(raw, "<stdin>")
+
+
+def name_of(file: Path) -> str:
+    """Return the name of a spec for use in names of directories."""
+    return "stdin" if str(file) == STANDARD_STREAM else file.stem
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run goes, else to runs/`name`; what it was made from, the spec first."""
+    """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first."""
 
     into: Into
     name: str
     sources: Sequence[Path]
     judges: bool = False  # the run has a verdict
     asked: str = ""  # the spec as it was read
+    figures: Figures | None = None  # their form, if the spec has one
 
     def __post_init__(self) -> None:
         if self.into.no_output and self.into.output is not None:
@@ -36,12 +77,12 @@ class Place:
 
     @property
     def directory(self) -> Path:
-        """The run directory."""
+        """Return the run directory."""
         return self.into.output or Path("runs") / self.name
 
     @property
     def origin(self) -> Origin:
-        """What the run is made from."""
+        """Return the origin of the run: its files and the text of its spec."""
         from inputdesign_cli.outcome.origin import Origin
 
         return Origin(self.sources, self.asked, self.into.overwrite, self.judges)
@@ -52,7 +93,7 @@ class Place:
         Raises:
             OutputError: the directory cannot take the run, see `check_place`, and `output-is-the-spec`.
         """
-        place = self if spec is None else replace(self, asked=spec.to_yaml())
+        place = self if spec is None else replace(self, asked=spec.to_yaml(), figures=spec.figures)
         if not place.into.no_output:
             from inputdesign_cli.outcome.origin import check_place
 
@@ -99,15 +140,22 @@ def keep(results: Results, place: Place, shown: Shown, *, page: bool = False) ->
         _show(results, [], shown)
         return
     results = replace(results, resolved_spec=place.spared(results.resolved_spec))
-    renew(results, place.directory, shown, place.origin, page=page)
+    renew(results, place.directory, shown, place.figures, place.origin, page=page)
 
 
 def renew(
-    results: Results, directory: Path, shown: Shown, origin: Origin | None = None, *, page: bool = False
+    results: Results,
+    directory: Path,
+    shown: Shown,
+    figures: Figures | None,
+    origin: Origin | None = None,
+    *,
+    page: bool = False,
 ) -> None:
     """Write a run directory, and print its result or its summary.
 
     Args:
+        figures: their form, if the spec has one.
         origin: what the run is made from; None for a run that goes on with what is in the directory.
         page: whether the page about it is written as well.
 
@@ -121,8 +169,10 @@ def renew(
         drawings = {}
         if shown.figures:
             from inputdesign_cli.figures.plots import draw_all
+            from inputdesign_cli.specification.models.realisation import Figures
 
-            drawings = draw_all(results, shown.figure_format)
+            form = figures or Figures()
+            drawings = draw_all(results, shown.figure_format or form.format, form.width)
         replaced = has_other_values(directory, results.resolved_spec)
         files = write_run(results, directory, drawings, origin=origin)
         if page:

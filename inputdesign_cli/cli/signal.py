@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from inputdesign_cli.cli.options import Json, Quiet, path_option, refuse_existing
+from inputdesign_cli.cli.options import path_option, refuse_existing
 from inputdesign_cli.cli.rows import TimeUnit, refuse, span
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.plugins import names
@@ -26,32 +26,14 @@ _SMALLEST, _LARGEST = 1e-15, 1e15
 
 @dataclass(frozen=True)
 class Kinds:
-    """The kinds of signals, of which one is made."""
+    """Holds the kinds of signals, of which one is made."""
 
-    prbs: Annotated[
-        int | None,
-        typer.Option(
-            "--prbs", metavar="BITS", min=2, max=32, help="Pseudo-random binary: period 2^BITS - 1 values."
-        ),
-    ] = None
-    multisine: Annotated[
-        int | None,
-        typer.Option(
-            "--multisine", metavar="LINES", min=1, help="Equal sinusoids in --band, of a low crest factor."
-        ),
-    ] = None
-    chirp: Annotated[
-        str,
-        typer.Option("--chirp", metavar="LOW:HIGH", help="A sinusoid whose frequency rises over the band."),
-    ] = ""
-    steps: Annotated[
-        int | None,
-        typer.Option("--steps", metavar="N", min=2, help="N levels over the range, in random order."),
-    ] = None
+    prbs: int | None = None
+    multisine: int | None = None
+    chirp: str = ""
+    steps: int | None = None
 
-    kind: Annotated[
-        str, typer.Option("--kind", metavar="NAME", help="A kind that another package adds, in --band.")
-    ] = ""
+    kind: str = ""
 
     def chosen(self) -> str:
         """Return the kind that is asked for.
@@ -70,25 +52,18 @@ class Kinds:
 
 @dataclass(frozen=True)
 class Form:
-    """How long a signal is, how far it reaches, and what holds for some kinds only."""
+    """Holds the length and the range of a signal, and what holds for some kinds only."""
 
-    samples: Annotated[
-        int | None, typer.Option(min=3, help="Length. The default is one period of a prbs, or 1000.")
-    ] = None
-    span: Annotated[
-        str,
-        typer.Option("--range", metavar="LOW:HIGH", help="Least and largest value; several inputs: 0:5,2:3."),
-    ] = "-1:1"
-    inputs: Annotated[int, typer.Option(min=1, max=20, help="Channels with signals of their own.")] = 1
-    band: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Of a multisine, in rad per time unit (default: all).")
-    ] = ""
-    odd: Annotated[bool, typer.Option("--odd", help="Of a multisine, odd harmonics only.")] = False
-    hold: Annotated[int, typer.Option(min=1, help="Samples for which each value of a prbs stands.")] = 1
-    periods: Annotated[int, typer.Option(min=1, help="Equal periods of a multisine in the record.")] = 1
-    seed: Annotated[int, typer.Option(min=0, help="Of the random numbers.")] = 0
-    sample_time: Annotated[float, typer.Option(metavar="T", help="Time between samples.")] = 1.0
-    time_unit: Annotated[TimeUnit, typer.Option(help="Of the sample time.")] = "s"
+    samples: int | None = None
+    span: str = "-1:1"
+    inputs: int = 1
+    band: str = ""
+    odd: bool = False
+    hold: int = 1
+    periods: int = 1
+    seed: int = 0
+    sample_time: float = 1.0
+    time_unit: TimeUnit = "s"
 
     def asked(self, kinds: Kinds) -> ReadyMade:
         """Return the signal of the kind that is asked for.
@@ -130,18 +105,10 @@ def signal(
     *,
     kinds: Kinds,
     form: Form,
-    output: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Repeatable. The ending names the kind: .csv, .mat (MATLAB), .npz (numpy), .h (C), .png.",
-        ),
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")] = False,
-    json_output: Json = False,
-    quiet: Quiet = False,
+    output: list[str] | None = None,
+    overwrite: bool = False,
+    json_output: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Make a signal without a spec, and show what it excites.
 

@@ -19,7 +19,7 @@ EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
 
 
 class _Errors(io.TextIOWrapper):
-    """Standard error: what cannot be written there is lost."""
+    """Writes to standard error; what cannot be written there is lost."""
 
     def __init__(self, stream: BinaryIO, encoding: str, *, by_line: bool) -> None:
         super().__init__(stream, encoding, errors="backslashreplace", line_buffering=by_line)
@@ -43,7 +43,7 @@ class _Errors(io.TextIOWrapper):
 
 
 class _Output(_Errors):
-    """Standard output: where it cannot be written the program ends; quietly, if its reader has gone."""
+    """Writes to standard output; the program ends where it cannot, quietly if the reader has gone."""
 
     def _failed(self, error: OSError) -> NoReturn:
         super()._failed(error)
@@ -85,7 +85,7 @@ def prepare_signals() -> None:
 
 @contextmanager
 def ending_early(stop: Callable[[], None]) -> Iterator[list[int]]:
-    """The first Ctrl-C or SIGTERM asks for the end by `stop`, the next one ends the program as usual.
+    """Call `stop` at the first Ctrl-C or SIGTERM; the next one ends the program as usual.
 
     The list has the number of the signal that came.
     """

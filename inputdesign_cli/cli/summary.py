@@ -15,7 +15,7 @@ Line = tuple[str, str]
 
 
 def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced: bool = False) -> str:
-    """What was asked, what it costs, what is proved, how close the error comes, and where the files are.
+    """Return a result in lines: what was asked, its cost, what is proved, the error reached, and the files.
 
     Lines whose numbers the result does not have are left out.
 
@@ -42,7 +42,7 @@ def _lines(found: Iterable[Fact]) -> Iterator[Line]:
 
 
 def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
-    """An estimate with its standard deviations; each requirement with what the data reach."""
+    """Yield the estimate with its standard deviations, and each requirement with what the data reach."""
     estimate = estimate_table(outcome)
     if estimate:
         yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
@@ -56,7 +56,7 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
 
 
 def _simulated(outcome: Outcome) -> Iterator[Line]:
-    """A line for every input that was tried; remarks on a number follow it in parentheses."""
+    """Yield a line for every input that was tried; remarks on a number follow it in parentheses."""
     found = outcome.simulation
     table = simulation_table(found)
     if table and found is not None:
@@ -71,5 +71,5 @@ def _simulated(outcome: Outcome) -> Iterator[Line]:
 
 
 def _named(name: str, texts: Iterable[str]) -> Iterator[Line]:
-    """Lines of which the first alone carries the name."""
+    """Return lines of which only the first carries the name."""
     return (("" if i else name, text) for i, text in enumerate(texts))

@@ -1,84 +1,56 @@
-"""`idesign sweep`."""
+"""`idesign sweep`, and the sweep of `--trade`."""
 
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Confine, FigureFormat, Json, Output, Quiet, SpecFile, Workers
-from inputdesign_cli.cli.reading import name_of, standard_input
-from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned, status
+from inputdesign_cli.cli.options import Changes, Shown, Workers
+from inputdesign_cli.cli.run import name_of, standard_input
+from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned, computing, status
 from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
+    from inputdesign_cli.figures.sweep_table import Trade
+    from inputdesign_cli.specification import Spec
     from inputdesign_cli.sweeps.running import Listing, SweepRun
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is swept, and how failures count."""
+    """Holds what is swept, and how failures count."""
 
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=V1,V2,..",
-            help="Vary a key: a list of values or LOW:HIGH:STEP; a single value holds for all points. "
-            "Repeatable; joins and replaces what the spec has under `sweep`.",
-            autocompletion=spec_keys,
-        ),
-    ] = None
-    zipped: Annotated[
-        bool, typer.Option("--zip", help="Take the values side by side, not in every combination.")
-    ] = False
-    confine: Confine = None
-    output: Output = None
-    overwrite: Annotated[
-        bool,
-        typer.Option(
-            "--overwrite", help="Replace the table of a sweep of another spec, other keys or another command."
-        ),
-    ] = False
-    verb: Annotated[
-        Literal["solve", "analyse", "simulate"], typer.Option(help="The command to run at every point.")
-    ] = "solve"
+    settings: list[str] | None = None
+    zipped: bool = False
+    confine: Path | None = None
+    output: Path | None = None
+    overwrite: bool = False
+    verb: Literal["solve", "analyse", "simulate"] = "solve"
 
 
 def sweep(
-    spec: SpecFile,
+    spec: Path,
     *,
     asked: Asked,
     workers: Workers,
-    fail_fast: Annotated[
-        bool,
-        typer.Option(
-            "--fail-fast/--keep-going",
-            help="Stop at the first point without a result, or note it in the table and go on (the default).",
-        ),
-    ] = False,
-    rerun_failed: Annotated[
-        bool, typer.Option("--rerun-failed", help="Try the points again that failed in an earlier call.")
-    ] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", "-n", help="List the points and whether they are done; run none.")
-    ] = False,
-    plots: Annotated[
-        bool, typer.Option("--plots", help="Draw the figures of every point too, not only of the sweep.")
-    ] = False,
-    figure_format: FigureFormat = "png",
-    json_output: Json = False,
-    quiet: Quiet = False,
+    fail_fast: bool = False,
+    rerun_failed: bool = False,
+    dry_run: bool = False,
+    plots: bool = False,
+    figure_format: Literal["png", "svg", "pdf"] = "png",
+    json_output: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Run a spec over a grid of settings.
 
@@ -164,7 +136,7 @@ def _list(points: Iterable[Listing], *, json_output: bool) -> None:
 
 
 def pace(progress: SweepRun, seconds: float) -> str:
-    """The points, the rate, the time left and the failures. Points done before do not count as speed."""
+    """Return the points done, their rate, the time left and the failures. Points done before add no speed."""
     told = [f"{progress.passed}/{progress.total}"]
     if progress.computed and seconds > 0:
         rate = progress.computed / seconds
@@ -184,3 +156,45 @@ def _summary(done: SweepRun) -> str:
         lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
     lines.append(("files", f"{done.directory}: {', '.join(path.name for path in done.files)}"))
     return "\n".join(aligned(lines, gap=3, wrap=True))
+
+
+def show_trade(
+    file: Path, spec: Spec, words: Sequence[str], run: Path, changes: Changes, shown: Shown
+) -> None:
+    """Sweep in a directory next to that of the run, draw the trade, and print its table."""
+    quiet, directory = shown.quiet or shown.json_output, run.with_name(f"{run.name}-trade")
+    file_type = shown.figure_format or spec.figures.format
+    with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
+        from inputdesign_cli.figures.sweep import draw_into, draw_trade
+        from inputdesign_cli.figures.sweep_table import read_sweep
+        from inputdesign_cli.sweeps.plan import build_plan
+        from inputdesign_cli.sweeps.running import SweepRun
+        from inputdesign_cli.sweeps.trade import trade_of, trade_settings
+
+        settings = [*(changes.overrides or []), *trade_settings(spec, words)]
+        SweepRun(
+            build_plan(file, settings, confine=changes.confine),
+            directory,
+            Workers(jobs=0).executor(quiet=quiet),
+            figure_format=file_type,
+            overwrite=True,  # the directory belongs to the run, whatever was traded there before
+        ).run()
+        found = trade_of(read_sweep(directory), spec)
+        drawn = draw_into(
+            directory, "trade", lambda page: draw_trade(found, page), shown.figure_format or "png"
+        )
+    if not quiet:
+        typer.echo("\n" + trade_table(found))
+        if not found.criterion:
+            typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")
+        typer.echo(f"\nfiles   {directory}: {drawn.name}, sweep.csv, sweep.yaml")
+
+
+def trade_table(trade: Trade) -> str:
+    """Return the table with lengths across and amplitudes down."""
+    heads = [f"{length:g} {trade.unit}" for length in trade.lengths]
+    rows = [["criterion" if trade.criterion else "error / asked", *heads]]
+    for text, values in zip(trade.amplitudes, trade.values, strict=True):
+        cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
+        rows.append([f"amplitude {text}" if text else "best record", *cells])
+    return "\n".join(aligned(rows, right=range(len(heads) + 1)))

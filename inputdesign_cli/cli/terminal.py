@@ -30,7 +30,7 @@ _ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
-    """`command` with every error turned into words on stderr and an exit code.
+    """Return `command` with every error turned into words on stderr and an exit code.
 
     With `--json` the diagnostics also appear on stdout, as {"errors": [..]}. IDESIGN_DEBUG=1 adds the
     traceback to an internal error.
@@ -84,7 +84,7 @@ def complain(error: IdesignError) -> None:
 
 
 def _refusal(error: OSError | MemoryError) -> Diagnostic:
-    """What the operating system refuses to the whole program."""
+    """Return the diagnostic of a refusal of the operating system that ends the program."""
     if isinstance(error, MemoryError):
         return Diagnostic(
             "system-refuses", "there is not enough memory", "shorten the record or lower the order"
@@ -103,7 +103,7 @@ def _trace() -> None:
 
 
 def colourful(stream: TextIO) -> bool:
-    """Whether colours may go to `stream`: a terminal, and the user has not set NO_COLOR."""
+    """Return whether colours may go to `stream`: a terminal, and the user has not set NO_COLOR."""
     from rich.console import Console
 
     console = Console(file=stream)
@@ -144,7 +144,7 @@ def computing(about: Path | str, *, quiet: bool, doing: str = "computing") -> It
 def aligned(
     rows: Sequence[Sequence[str | Text]], *, right: Container[int] = (), gap: int = 2, wrap: bool = False
 ) -> list[str]:
-    """`rows` as lines with aligned columns, plain and each on one line unless they go to a terminal.
+    """Return `rows` as lines with aligned columns, plain and each on one line unless they go to a terminal.
 
     Args:
         rows: the cells; styled ones have their colours on a terminal that may show them.

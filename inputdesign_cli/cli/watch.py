@@ -5,27 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from inputdesign_cli.cli.options import (
-    Changes,
-    Fast,
-    Figures,
-    Into,
-    Output,
-    Overwrite,
-    Quiet,
-    Shown,
-    path_option,
-)
-from inputdesign_cli.cli.reading import read_spec
-from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.options import Changes, Into, Shown
+from inputdesign_cli.cli.run import Place, keep, read_spec
 from inputdesign_cli.cli.terminal import complain, status
 from inputdesign_cli.errors import STANDARD_STREAM, IdesignError, OutputError
 from inputdesign_cli.regular_file import read_regular
@@ -37,26 +25,7 @@ if TYPE_CHECKING:
 _LOOK = 0.1  # seconds between looks at the file while it is solved
 
 
-def report(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run or of a sweep.")],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="The file to write, - for standard output. The default is report.html in RUN.",
-            parser=path_option,
-        ),
-    ] = None,
-    bibtex: Annotated[
-        bool,
-        typer.Option(
-            "--bibtex", help="Print the sources of the methods that the run used, and write no page."
-        ),
-    ] = False,
-    quiet: Quiet = False,
-) -> None:
+def report(directory: Path, *, output: Path | None = None, bibtex: bool = False, quiet: bool = False) -> None:
     """Write a run or a sweep as one HTML page.
 
     The page has the question, the answer, its proof, what was assumed and how to reproduce it, with
@@ -83,21 +52,14 @@ def report(
 
 
 def watch(
-    spec: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SPEC|DIR", help="The experiment to design, a YAML file; or a run, campaign or sweep."
-        ),
-    ],
+    spec: Path,
     *,
     changes: Changes,
-    output: Output = None,
-    overwrite: Overwrite = False,
-    fast: Fast = False,
-    figures: Figures = True,
-    port: Annotated[
-        int, typer.Option("--port", min=0, max=65535, help="Of the page; 0 (default) takes a free one.")
-    ] = 0,
+    output: Path | None = None,
+    overwrite: bool = False,
+    fast: bool = False,
+    figures: bool = True,
+    port: int = 0,
 ) -> None:
     """Serve a local page that solves a spec again whenever it is saved.
 
@@ -117,14 +79,13 @@ def watch(
         typer.echo(f"follows {spec}; open the address in a browser, Ctrl-C ends it", err=True)
         if spec.is_dir():
             _follow_directory(spec, board)
-        if fast:
-            changes = replace(changes, overrides=[*(changes.overrides or []), "solver.any_spectrum=false"])
+        changes = changes.faster(fast)
         place = Place(Into(output, overwrite), spec.stem, [spec])
         _follow_spec(spec, changes, place, board, figures)
 
 
 def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figures: bool) -> None:
-    """Solve and show, again and again."""
+    """Solve the spec and show its page, again and again."""
     from inputdesign_cli.live.pages import Followed, stamp, wait_for_change
     from inputdesign_cli.questions import run_verb
 
@@ -161,7 +122,7 @@ def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figur
 
 
 def _named_files(spec: Path, overrides: list[str]) -> list[Path]:
-    """The files that the spec includes or names, where it can be read."""
+    """Return the files that the spec includes or names, where it can be read."""
     from inputdesign_cli.specification import read_template
 
     try:
@@ -173,7 +134,7 @@ def _named_files(spec: Path, overrides: list[str]) -> list[Path]:
 
 @contextmanager
 def _given_up_when_saved(files: list[Path], before: Stamp) -> Iterator[None]:
-    """What is computed inside ends at the next round once a file is saved."""
+    """Stop the computation inside at its next round once a file is saved."""
     from inputdesign_cli.compute.time_limit import stoppable
     from inputdesign_cli.live.pages import stamp
 

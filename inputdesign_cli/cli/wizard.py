@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Into, Overwrite, Quiet, Shown, refuse_existing
+from inputdesign_cli.cli.options import TRADED, Changes, Into, Shown, refuse_existing
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain, computing, status
 from inputdesign_cli.errors import OutputError, SpecError
@@ -21,33 +21,14 @@ if TYPE_CHECKING:
 
 
 def wizard(
-    answers: Annotated[
-        Path | None,
-        typer.Option("--answers", metavar="FILE", help="Take answers from a YAML file: question: text."),
-    ] = None,
-    given: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--answer",
-            "-a",
-            metavar="KEY=TEXT",
-            help="Answer a question: plant, wish, range, time, limits, noise, drift, loop, signals or "
-            "converter. Repeatable; comes before --answers.",
-        ),
-    ] = None,
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FILE", help="The spec to write (default experiment.yaml)."),
-    ] = Path("experiment.yaml"),
-    solve: Annotated[
-        bool | None,
-        typer.Option("--solve/--no-solve", help="Design the experiment at once, or not; else it is asked."),
-    ] = None,
-    trade: Annotated[
-        bool, typer.Option("--trade", help="Draw accuracy against time and amplitude, too.")
-    ] = False,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
+    *,
+    answers: Path | None = None,
+    given: list[str] | None = None,
+    output: Path = Path("experiment.yaml"),
+    solve: bool | None = None,
+    trade: bool = False,
+    overwrite: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Ask for an experiment in your words, and write a commented spec.
 
@@ -109,9 +90,9 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
             lines = ["", *found, *to_log(spec, results, str(file)), f"files: {place.directory}"]
             typer.echo("\n".join(lines))
     if trade:
-        from inputdesign_cli.cli.trade import WORDS, show_trade
+        from inputdesign_cli.cli.sweep import show_trade
 
-        show_trade(file, spec, WORDS, place.directory, Changes(), Shown(quiet=quiet))
+        show_trade(file, spec, TRADED, place.directory, Changes(), Shown(quiet=quiet))
 
 
 def _result(spec: Spec) -> Result:
@@ -121,7 +102,7 @@ def _result(spec: Spec) -> Result:
 
 
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
-    """The draft of somebody at the terminal, who is asked again where an answer cannot be used."""
+    """Ask for a draft at the terminal, again where an answer cannot be used."""
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.composing import Conversation
     talk = Conversation(known, output.stem, output.parent)
@@ -137,7 +118,7 @@ def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
 
 
 def _typed(one: Question) -> str:
-    """What is typed at the prompt of a question; its default stands there greyed until something is."""
+    """Return what is typed at the prompt of a question; its default stands there in grey before."""
     import questionary
 
     default = one.default or ""

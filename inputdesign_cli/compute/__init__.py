@@ -1,1 +1,1 @@
-"""Where pieces of work are computed: in this process, in others, on a cluster."""
+"""Compute pieces of work in this process, in others, or on a cluster."""

@@ -63,7 +63,7 @@ class Cluster:
                     future.release()
 
     def _finished(self, client: Any, futures: list[Any]) -> Iterable[Any]:
-        """Return the finished ones, one at least; while there are no workers, say so and wait."""
+        """Return the finished jobs, one at least; report an absence of workers and wait."""
         from distributed import wait
 
         alone_since: float | None = None

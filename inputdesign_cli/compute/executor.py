@@ -1,4 +1,4 @@
-"""Where the pieces of a study are computed: the contract that every executor keeps, and the simplest one."""
+"""The place where the pieces of a study are computed: the contract of all executors, and the simplest one."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ ONE_THREAD = dict.fromkeys(
 
 
 def use_one_thread() -> None:
-    """Ask for one thread, unless the environment asks for something else."""
+    """Ask for one thread, unless the environment asks for another number."""
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
 
 
 @dataclass(frozen=True)
 class Finished(Generic[Job, Answer]):
-    """One job with its answer, or with the error that stands in its place."""
+    """Holds one job with its answer, or with the error in place of the answer."""
 
     job: Job
     answer: Answer | None
@@ -36,25 +36,25 @@ class Finished(Generic[Job, Answer]):
 class Executor(Protocol):
     """Computes a function of many jobs.
 
-    Jobs are drawn from the iterable as workers become free, never all at once; answers come in the order
-    in which they are finished. What a job answers must depend on nothing but the job (a random stream
-    travels as its seed), so that every executor gives the same answers to the last digit.
+    Jobs are drawn from the iterable as workers become free, never all at once; answers come in the order in
+    which they are finished. The answer to a job must depend on nothing but the job; a random stream travels
+    as its seed. Then every executor gives the same answers to the last digit.
     """
 
     @property
     def shares_files(self) -> bool:
-        """Whether the function sees the file system of the caller."""
+        """Return whether the function sees the file system of the caller."""
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer. `function` is importable by name; everything can be pickled."""
 
 
 class WorkerLostError(Exception):
-    """A worker ended in the middle of a job, and so did the second one that was given it."""
+    """Raised where a worker ended in the middle of a job, and so did the second one with that job."""
 
 
 class InProcess:
-    """The calling process itself, one job after the other."""
+    """Computes in the calling process itself, one job after the other."""
 
     shares_files = True
 

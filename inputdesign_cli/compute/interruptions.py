@@ -1,4 +1,4 @@
-"""Interruptions reach the caller unchanged, although compiled modules lose them or make other errors."""
+"""Let interruptions reach the caller unchanged, although compiled modules lose them or make other errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HAS_ALARM = hasattr(signal, "SIGALRM")  # not on Windows: what is dropped there
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """A handler of signals: Ctrl-C is `KeyboardInterrupt`, others end the program in order.
+    """Handle a signal: Ctrl-C is `KeyboardInterrupt`, others end the program in order.
 
     Modules that are being imported are imported first. What is dropped on its way is raised again.
 
@@ -42,7 +42,7 @@ def interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _is_under_way(handled: BaseException | None) -> bool:
-    """Whether what is handled came of an interruption, or ends a generator: something may be tidying up."""
+    """Return whether an interruption is being handled, or a generator ends: a clean-up may be under way."""
     while handled is not None:
         if isinstance(handled, KeyboardInterrupt | SystemExit | GeneratorExit):
             return True
@@ -51,7 +51,7 @@ def _is_under_way(handled: BaseException | None) -> bool:
 
 
 def _lets_imports_end(frame: FrameType | None) -> bool:
-    """Whether modules are being imported, and not for too long since the interruption."""
+    """Return whether modules are being imported, and not for too long since the interruption."""
     while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
         frame = frame.f_back
     if frame is not None and not _waiting_since:
@@ -61,7 +61,7 @@ def _lets_imports_end(frame: FrameType | None) -> bool:
 
 @contextmanager
 def bare_interruptions() -> Iterator[None]:
-    """Within, Ctrl-C and the end by a signal are never the cause of another error, but themselves.
+    """Let Ctrl-C and the end by a signal leave the block as themselves, never as the cause of another error.
 
     Some errors name an interruption in their text alone, so that the signals are kept that `interrupt` saw.
 

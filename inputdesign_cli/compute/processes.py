@@ -1,8 +1,8 @@
 """Processes of this machine: each imports the libraries once and computes on one thread.
 
-The pool is that of concurrent.futures, which gives up all its jobs when one process is killed, and leaves
-processes behind when its caller is. Here each of these jobs is tried again in a process of its own, and
-a pipe whose other end only the caller holds ends the processes with it.
+The pool of concurrent.futures gives up all its jobs when one process is killed, and leaves processes behind
+when its caller is. Here each of these jobs is tried again in a process of its own. A pipe whose other end
+only the caller holds ends the processes with it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _ATTEMPTS = 2
 
 @dataclass(frozen=True)
 class Processes:
-    """`count` processes; a job whose process is killed is tried again, in a process of its own."""
+    """Computes in `count` processes; a job whose process is killed is tried again, in its own process."""
 
     count: int
     shares_files: bool = field(default=True, init=False)

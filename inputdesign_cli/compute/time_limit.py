@@ -1,4 +1,4 @@
-"""How long an answer may take: set once where a task begins, asked wherever work is repeated."""
+"""Limit the time of an answer: the limit is set where a task begins, and read wherever work is repeated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HINT_SECONDS = 5.0
 
 
 class OutOfTimeError(InaccurateError):
-    """The time limit has passed, or somebody asked for the end."""
+    """Raised where the time limit has passed, or the computation was asked to end."""
 
 
 _end: ContextVar[float] = ContextVar("end", default=inf)
@@ -25,7 +25,7 @@ _stopped: ContextVar[Event | None] = ContextVar("stopped", default=None)
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """End what is computed inside after `seconds`, at the next `seconds_left`."""
+    """End the computation inside the block after `seconds`, at the next `seconds_left`."""
     token = _end.set(time.monotonic() + seconds)
     try:
         yield
@@ -35,14 +35,14 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 @contextmanager
 def time_for_hints() -> Iterator[None]:
-    """End what is computed inside after `HINT_SECONDS`, or earlier with the time limit around it."""
+    """End the computation inside the block after `HINT_SECONDS`, or earlier with the time limit around it."""
     with time_limit(min(HINT_SECONDS, _end.get() - time.monotonic())):
         yield
 
 
 @contextmanager
 def finishing() -> Iterator[None]:
-    """Let what is computed inside take its time: the last steps after the time limit has passed."""
+    """Let the last steps of a computation run on after the time limit has passed."""
     tokens = _end.set(inf), _stopped.set(None)
     try:
         yield
@@ -53,7 +53,7 @@ def finishing() -> Iterator[None]:
 
 @contextmanager
 def stoppable() -> Iterator[Callable[[], None]]:
-    """What is computed inside ends as if its time were over, once the function given to it is called."""
+    """Yield a function that, once called, ends the computation inside the block as if its time were over."""
     stopped = Event()
     token = _stopped.set(stopped)
     try:
@@ -63,7 +63,7 @@ def stoppable() -> Iterator[Callable[[], None]]:
 
 
 def seconds_left() -> float:
-    """What is left of the time limit; infinite where there is none.
+    """Return the seconds left of the time limit; infinite where there is none.
 
     Raises:
         OutOfTimeError: `out-of-time` when nothing is left.
@@ -75,28 +75,28 @@ def seconds_left() -> float:
 
 
 def time_is_over() -> bool:
-    """Whether nothing is left of the time limit, or somebody asked for the end."""
+    """Return whether the time limit has passed, or the computation was asked to end."""
     return _end.get() <= time.monotonic() or was_stopped()
 
 
 def was_stopped() -> bool:
-    """Return whether somebody asked the computation to end."""
+    """Return whether the computation was asked to end."""
     stopped = _stopped.get()
     return stopped is not None and stopped.is_set()
 
 
 def what_ended() -> str:
-    """What ends a computation that ran out of time, as the subject of a sentence."""
+    """Return the reason that a computation ran out of time, as the subject of a sentence."""
     return "the interrupt" if was_stopped() else "solver.time_limit"
 
 
 def more_time() -> str:
-    """What gives a computation more of it, as a demand."""
+    """Return the demand for more time for a computation."""
     return "let it run to its end" if was_stopped() else "raise solver.time_limit"
 
 
 def out_of_time(reached: str) -> OutOfTimeError:
-    """The error, with a sentence on what was reached."""
+    """Return the error `out-of-time`, with a sentence on the result that was reached."""
     when = "before the interrupt" if was_stopped() else "within solver.time_limit"
     told = f"the answer was not found {when}"
     return OutOfTimeError.because(

@@ -1,4 +1,4 @@
-"""How far a long computation is, for a watcher."""
+"""Report the progress of a long computation to a watcher."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Round:
 
 @dataclass(frozen=True)
 class Counted:
-    """How many of the things that are done one after the other are done."""
+    """Counts the finished ones of a series of tasks."""
 
     what: str
     done: int
@@ -40,7 +40,7 @@ _watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
 
 @contextmanager
 def watching(watcher: Watcher) -> Iterator[None]:
-    """Let what is computed inside report how far it is."""
+    """Let the computation inside the block report its progress."""
     token = _watcher.set(watcher)
     try:
         yield

@@ -24,7 +24,7 @@ ConeKind = Literal["zero", "nonnegative", "psd", "exponential"]
 
 @dataclass(frozen=True)
 class Block:
-    """offset + matrix x in the cone.
+    """The constraint that offset + matrix x lies in the cone.
 
     For "psd" the rows are svec of a matrix of this `order`; for "exponential" they are `order` triples
     (t, y, x) with y exp(t / y) <= x, y > 0.
@@ -37,7 +37,10 @@ class Block:
 
     @classmethod
     def of(cls, kind: ConeKind, parts: NDArray[np.float64]) -> Block:
-        """parts[0] + sum_i x_i parts[i + 1] in the cone: (1 + n, d, d) for "psd", else (1 + n, rows)."""
+        """Build the constraint that parts[0] + sum_i x_i parts[i + 1] lies in the cone.
+
+        `parts` is (1 + n, d, d) for "psd", else (1 + n, rows).
+        """
         rows = svec(parts) if kind == "psd" else parts
         return cls(kind, sp.csc_matrix(rows[1:].T), rows[0], parts.shape[1] if kind == "psd" else 0)
 
@@ -50,7 +53,7 @@ class Block:
 
 @dataclass(frozen=True)
 class ConicSolution:
-    """What the solver returned: a claim, to be judged by residuals that we compute ourselves.
+    """Holds the answer of the solver: a claim, to be judged by residuals that we compute ourselves.
 
     `multipliers` holds one array a block, with q = sum_i matrix_i^T multipliers_i at the optimum.
     """

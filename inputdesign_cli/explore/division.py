@@ -19,7 +19,7 @@ _STILL = 0.2
 
 
 class Division(NamedTuple):
-    """The records that estimate, the records that judge, and how they were parted."""
+    """Holds the records that estimate, the records that judge, and their division."""
 
     first: Parts
     second: Parts

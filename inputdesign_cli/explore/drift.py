@@ -1,7 +1,7 @@
 """Find outputs that drift along one line through all records, in addition to the response to the inputs.
 
-Lines that are removed from u and y separately are no remedy: the response of the plant to the input
-contains a line of its own.
+Lines that are removed from u and y separately are no remedy. The response of the plant to the input contains
+a line of its own.
 """
 
 from __future__ import annotations
@@ -31,7 +31,12 @@ def slopes_of(parts: Parts, *, known: bool = False) -> Array:
         known: whether they are known to drift, so that any slope counts.
     """
     stretch = -(-sum(len(y) for _, y in parts) // _MOST_SAMPLES)
-    short = [tuple(_means(x, stretch) for x in part) for part in parts if len(part[1]) >= 10 * stretch]
+    long = [part for part in parts if len(part[1]) >= 10 * stretch]
+    # Means over blocks; the samples after the last whole block are left out.
+    short = [
+        tuple(x[: len(x) // stretch * stretch].reshape(-1, stretch, x.shape[1]).mean(axis=1) for x in part)
+        for part in long
+    ]
     slopes = np.zeros(parts[0][1].shape[1])
     for i in range(slopes.size if short else 0):
         slopes[i] = _line([(u, y[:, i : i + 1]) for u, y in short], known) / stretch
@@ -41,7 +46,7 @@ def slopes_of(parts: Parts, *, known: bool = False) -> Array:
 def _line(parts: Parts, known: bool) -> float:
     """Return the slope of one output; zero unless it is far from none in noise of any colour.
 
-    What an output-error model with a line does not explain is whitened by an autoregression. The deviation of
+    The residual of an output-error model with a line is whitened by an autoregression. The deviation of
     the slope follows from the whitened line.
     """
     samples, longest = sum(len(y) for _, y in parts), max(len(y) for _, y in parts)
@@ -58,24 +63,13 @@ def _line(parts: Parts, known: bool) -> float:
     A = whitening(errors)
     if float(np.max(np.roots(A).real, initial=0.0)) > 1.0 - _WALKS / samples:
         return 0.0
-    white = [
-        (filtered(A, [1.0], e)[A.size - 1 :], _through(A, len(e))) for e in errors if len(e) > 2 * A.size
-    ]
-    power = sum(float(e @ e) for e, _ in white) / max(sum(len(e) for e, _ in white), 1)
-    size = sum(float(line @ line) for _, line in white)
-    return best.slope if abs(best.slope) * np.sqrt(size) > _CERTAIN * np.sqrt(power) else 0.0
-
-
-def _through(A: Array, samples: int) -> Array:
-    """Return a line of slope one, its level free, through A."""
-    line = filtered(A, [1.0], np.arange(samples, dtype=float))[A.size - 1 :]
-    return np.asarray(line - line.mean())
-
-
-def _means(x: Array, stretch: int) -> Array:
-    """Return means over blocks of `stretch` samples; the samples after the last whole block are left out."""
-    whole = len(x) // stretch * stretch
-    return np.asarray(x[:whole].reshape(-1, stretch, x.shape[1]).mean(axis=1))
+    power, size, count = 0.0, 0.0, 0
+    for e in (e for e in errors if len(e) > 2 * A.size):
+        new, line = filtered(A, [1.0], np.stack([e, np.arange(len(e), dtype=float)]))[:, A.size - 1 :]
+        power, count = power + float(new @ new), count + len(new)
+        size += float(np.sum((line - line.mean()) ** 2))
+    clear = abs(best.slope) * np.sqrt(size) > _CERTAIN * np.sqrt(power / max(count, 1))
+    return best.slope if clear else 0.0
 
 
 def levelled(parts: Parts, slopes: Array) -> list[tuple[Array, Array]]:

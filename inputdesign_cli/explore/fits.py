@@ -28,12 +28,12 @@ NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgErro
 _BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
 # A mode that loses less than this over the whole record is not distinguishable from one on the limit.
-_LEAST_DECAY = 0.01
+LEAST_DECAY = 0.01
 
 
 @dataclass(frozen=True)
 class Fits:
-    """Per cent, output by output; -inf where the model is unstable and has no simulation.
+    """The fits in per cent, output by output; -inf where the model is unstable and has no simulation.
 
     Attributes:
         simulated, errors: the simulations (N, p) of all records, and their prediction errors.
@@ -86,8 +86,8 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
     """Return the per cent of white noise that the best of `tried` simulations explains in 5 % of cases.
 
-    Levels, starts and an agreement by chance take a chi-squared share of its power; the probabilities of
-    the structures that were tried add up at most (Bonferroni). Of no samples it explains all.
+    Levels, starts and an agreement by chance take a chi-squared share of its power. The probabilities of the
+    tried structures add up at most (Bonferroni). Without samples the fit is 100.
     """
     if samples == 0:
         return 100.0
@@ -105,14 +105,14 @@ def percent(errors: Array, varying: Array) -> tuple[float, ...]:
 
 
 def _nearest(responses: NDArray[np.float64], left: Array) -> Array:
-    """Return the combination of responses (m, n) nearest to what is left (n,); infinite where they are."""
+    """Return the combination of responses (m, n) nearest to the remainder (n,); infinite where they are."""
     if not (np.all(np.isfinite(responses)) and np.all(np.isfinite(left))):
         return np.full(left.shape, np.inf)
     columns = responses.T / np.maximum(np.linalg.norm(responses, axis=1), 1e-300)
     return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
 
 
-def is_steady(model: Model, samples: int, decay: float = _LEAST_DECAY) -> bool:
+def is_steady(model: Model, samples: int, decay: float = LEAST_DECAY) -> bool:
     """Return whether a plant is stable, and its slowest mode loses `decay` or more within the samples."""
     return output_error_form(model).radius < 1.0 - decay / samples
 

@@ -27,8 +27,7 @@ from inputdesign_cli.explore.search import Candidate, Chosen, Family, Ranges, ce
 from inputdesign_cli.explore.structures import process_models
 from inputdesign_cli.explore.sweep import lingering
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.estimate import Estimate
-from inputdesign_cli.identification.estimators import identify
+from inputdesign_cli.identification.estimators import Estimate, identify
 from inputdesign_cli.plant import Model, PolynomialModel
 
 _MOST_SAMPLES = 10_000
@@ -40,19 +39,19 @@ _MOST_LINES = 3
 
 @dataclass(frozen=True)
 class Found:
-    """The model that a record supports.
+    """Holds the model that a record supports.
 
     Attributes:
-        outputs: what was found for each; `taken` is the candidate that the model is made of, `ranges` has of
+        outputs: the result for each; `taken` is the candidate that the model is made of, `ranges` has of
             each input the 95 % interval of the delay.
         model: of all channels, estimated on the whole record; inputs that never move have no part in it.
         estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
             stand in all.
         validation: the fits of the same structures, estimated on one part, to the other.
-        helped: (p,), per cent by which what inputs do makes the prediction errors of that part smaller.
-        split: which part estimates and which judges; of none the whole record does both.
+        helped: (p,), per cent by which the inputs make the prediction errors of that part smaller.
+        split: the part that estimates and the part that judges; without one the whole record does both.
         still: inputs (from zero) that never move.
-        slopes: (p,), of the line through all records that was taken away from each output, a sample.
+        slopes: (p,), a sample, of the line through all records that was removed from each output.
     """
 
     outputs: tuple[Chosen, ...]
@@ -85,7 +84,7 @@ class Found:
 
     @property
     def wanders(self) -> tuple[bool, ...]:
-        """Return of each output whether its noise does not fade within the record, as if it integrated."""
+        """Return for each output whether its noise does not fade within the record, as if it integrated."""
         longest = max(len(y) for _, y in self.used)
         named = dict(zip(self.model.names, self.model.theta.tolist(), strict=True))
         suffixes = [f"[{i + 1}]" for i in range(self.model.outputs)] if self.model.outputs > 1 else [""]
@@ -217,9 +216,9 @@ def _together(
 
 
 def _combinations(found: Sequence[Chosen]) -> list[tuple[tuple[Candidate, ...], bool]]:
-    """Return what may be taken for all outputs together, all in s or all in q^-1, the best first.
+    """Return the structures for all outputs together, all in s or all in q^-1, the best first.
 
-    With it whether all explain their part of the record about as well as any.
+    Each comes with whether all its structures explain their part of the record about as well as any.
     """
     first, listed = found[0].best.orders.physical, list[tuple[tuple[Candidate, ...], bool]]()
     for kind in (first, not first):

@@ -61,8 +61,8 @@ def _check_length(samples: int, needed: int) -> None:
 def order_of_excitation(parts: Parts, most: int = 50) -> int:
     """Return the order to which all inputs together are persistently exciting, `most` at most.
 
-    The largest n for which n delays of every input, and a level, are linearly independent ([ljung-1999],
-    Section 13.2): a sinusoid over a part of a period has a mean, which counts as a level.
+    It is the largest n for which n delays of every input, and a level, are linearly independent
+    ([ljung-1999], Section 13.2). A sinusoid over a part of a period has a mean, which counts as a level.
     """
     longest = max((u for u, _ in parts), key=len)
     x = longest - longest.mean(axis=0)

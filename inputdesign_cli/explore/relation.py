@@ -86,10 +86,10 @@ def only_answers(parts: Parts) -> list[int]:
 
 
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
-    """Return of each input the probability, by chance, that it answers y(t) between jumps of its own.
+    """Return for each input the probability, by chance, that it answers y(t) between jumps of its own.
 
-    Past inputs hold all that a controller has made of past outputs between two steps of its reference. News
-    of u and of y goes together there. If y answered u at once, it would do so at the jumps as well.
+    Past inputs hold all that a controller has made of past outputs between two steps of its reference.
+    Innovations of u and of y go together there. If y answered u at once, it would do so at the jumps as well.
     """
     new_u, new_y = (np.concatenate(new) for new in _new(parts, lags))
     found = []
@@ -111,7 +111,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def early_answers(parts: Parts) -> list[ScoreTest]:
-    """Return the outputs that what is new in a future input helps to predict, up to eight samples ahead.
+    """Return the outputs that innovations of future inputs help to predict, up to eight samples ahead.
 
     Args:
         parts: records u (n, r), y (n, p) of an open loop.
@@ -140,7 +140,7 @@ def early_answers(parts: Parts) -> list[ScoreTest]:
 
 
 def like_answers(parts: Parts, output: int, j: int) -> bool:
-    """Return whether u(t) may have been made from y(t): both have news at once, and nobody has set the input.
+    """Return whether u(t) may have been made from y(t): both have innovations at once, and u was not set.
 
     An input that is held, white, or follows from its own past was set without a look at the output.
     """
@@ -161,8 +161,8 @@ def like_answers(parts: Parts, output: int, j: int) -> bool:
 def _by_chance(own: Array, more: Array, target: Array, *, held: bool = True) -> float:
     """Return the probability that columns `more` explain as much by chance beside `own` (n, m).
 
-    The likelihood ratio says so. Of a target that may be held, and moves at few samples only, so must a score
-    test whose covariance allows for errors of any size at any time ([white-1980]).
+    It follows from the likelihood ratio, or from a smaller score test for a target that may be held and moves
+    at few samples only. The covariance of the score allows for errors of any size at any time ([white-1980]).
     """
     both = np.column_stack([own, more])
     alone, together = _left(own, target), _left(both, target)
@@ -179,7 +179,7 @@ def _by_chance(own: Array, more: Array, target: Array, *, held: bool = True) -> 
 
 
 def _left(*regression: Array) -> float:
-    """Return the sum of squares that columns (n, m) leave of a target (n,)."""
+    """Return the sum of squares of the residual of a target (n,) regressed on columns (n, m)."""
     (errors,) = residuals(*([one] for one in regression))
     return float(errors @ errors)
 
@@ -195,7 +195,7 @@ def _centred(parts: Parts, shortest: int) -> list[tuple[Array, Array]]:
 
 
 def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
-    """Return what past inputs and outputs do not explain of inputs and of outputs, (n - lags, ..) each."""
+    """Return the residuals of inputs and outputs regressed on their pasts, (n - lags, ..) each."""
     rows = [np.column_stack([past(u, lags), past(y, lags)]) for u, y in parts]
     return residuals(rows, [u[lags:] for u, _ in parts]), residuals(rows, [y[lags:] for _, y in parts])
 
@@ -203,7 +203,7 @@ def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
 def unhelpful(model: Model, parts: Parts) -> list[int]:
     """Return the outputs (from zero) whose prediction the simulated effect of the inputs does not improve.
 
-    An output is predicted from its own past, a level and a line, and besides from what the model simulates
+    An output is predicted from its own past, a level and a line, and besides from the simulation of the model
     (F-test). With no parameter more, the error of the simulation is predicted from its own past as well.
 
     Args:
@@ -246,14 +246,14 @@ def _idle(signals: Sequence[tuple[Array, Array]], lags: int) -> bool:
 
 @dataclass(frozen=True)
 class UnstablePole:
-    """The pole farthest from the origin, and the standard deviation of its radius."""
+    """Holds the pole farthest from the origin, and the standard deviation of its radius."""
 
     pole: complex
     deviation: float
 
     @property
     def denominator(self) -> Array:
-        """(2,), or (3,) with its conjugate: in q^-1, ascending."""
+        """Return the denominator in q^-1, ascending: (2,), or (3,) with the conjugate pole."""
         both = [self.pole] if self.pole.imag == 0.0 else [self.pole, self.pole.conjugate()]
         return np.asarray(np.poly(both).real)
 
@@ -261,7 +261,7 @@ class UnstablePole:
 def unstable_pole(parts: Parts, output: int) -> UnstablePole | None:
     """Return the unstable pole of one output y (n, p), at the order that BIC prefers; None: it has none.
 
-    A loop that holds an unstable plant excites it, and what ARX models predict does not care where their
+    A loop that holds an unstable plant excites it, and the predictor of an ARX model is stable wherever its
     poles are ([ljung-1999], Section 13.4).
     """
     long = [(u, y[:, output : output + 1]) for u, y in _centred(parts, 4 * _HIGHEST)]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.explore.division import busiest, cut
-from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady
+from inputdesign_cli.explore.fits import LEAST_DECAY, NOT_COMPUTED, Parts, fits, is_steady
 from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import (
     Regressed,
@@ -36,8 +36,7 @@ from inputdesign_cli.explore.sweep import (
 )
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
-from inputdesign_cli.identification.estimate import factor_at, noise_of
-from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.estimators import estimator, factor_at, noise_of
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.identification.white import White
@@ -98,12 +97,12 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What was found for one output.
+    """Holds the result of the search for one output.
 
     Attributes:
-        candidates: those to take come first; the `good` explain the record about as well as any.
+        candidates: the best come first; the `good` explain the record about as well as any.
         estimated: the records of the first part, `swept` its regressions, `least` their shortest delay.
-        dropped: families of which no structure could be estimated.
+        dropped: families without a structure that could be estimated.
     """
 
     candidates: tuple[Candidate, ...]
@@ -115,7 +114,7 @@ class Chosen:
 
     @property
     def best(self) -> Candidate:
-        """Return the one to take."""
+        """Return the best candidate."""
         return self.candidates[0]
 
     def ranges(self, candidate: Candidate) -> Ranges:
@@ -133,7 +132,7 @@ class Chosen:
 
 
 def price(unknowns: int, samples: int) -> float:
-    """Return the price of parameters in the log of a variance: that of BIC, and a share at least."""
+    """Return the price of parameters in the log of a variance: the BIC penalty, and a share at least."""
     return unknowns * max(float(np.log(samples)) / samples, _WORTH)
 
 
@@ -171,10 +170,10 @@ def ranked(
 
 @dataclass(frozen=True)
 class _Records:
-    """What estimates structures and what judges them.
+    """Holds the records by which structures are estimated and judged.
 
     Attributes:
-        first, judging: records of one output; of each that judges the first `late` samples are left out.
+        first, judging: records of one output; the first `late` samples of each that judges are left out.
         white: the first part through the autoregression of its noise; `swept` its regressions.
         C, D: the noise beside a plant.
         feedback: whether inputs answer the outputs.
@@ -206,7 +205,7 @@ class _Records:
         if not shape.physical and near.delays != shape.delays:
             near = Regressed(parts, near.order).output_error(shape.delays, near.F)
         kind, start = estimator(shape.model(), 1.0), shape.start(near)
-        check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
+        check_length(sum(len(y) for _, y in parts), len(kind.model.names), kind.recent, outputs=1)
         records = Records(kind, tuple(centred(parts))).begun_freely(kind.lateness(start))
         found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
         point, theta, noise = found.point, found.point.theta, noise_of(records, found.point)
@@ -231,7 +230,7 @@ class _Records:
             float(np.log(max(noise[0, 0], 1e-300))) + price(unknowns, self.samples),
             found.converged or physical,  # kinks at dead times stop a quick search early
             # Of a plant by its time constants, none may be longer than the record.
-            shape.integrates or is_steady(model, self.samples, *([1.0] if physical else [])),
+            shape.integrates or is_steady(model, self.samples, 1.0 if physical else LEAST_DECAY),
             certain(model.theta[plant], deviations, model.dead_times[plant], self.step * physical),
             tuple(test.name for test in failed(tests)),
         )

@@ -26,7 +26,7 @@ from inputdesign_cli.plant.model import DELAY, Parameter
 
 @dataclass(frozen=True)
 class Orders:
-    """Of A y = sum_j (B_j / F_j) u_j + (C / D) e; B_j has `b` coefficients from the lag `delays[j]` on."""
+    """Orders of A y = sum_j (B_j / F_j) u_j + (C / D) e; B_j has `b` coefficients from lag `delays[j]` on."""
 
     family: str
     delays: tuple[int, ...]
@@ -67,7 +67,7 @@ class Orders:
         return {letter: order for letter, order in every.items() if order}
 
     def start(self, near: Regression) -> Array:
-        """Return where to begin (k,), by a regression; ARMAX begins as an output error."""
+        """Return the start of the search (k,), by a regression; ARMAX begins as an output error."""
         rows = [np.resize(np.append(row, np.zeros(self.b)), self.b) for row in near.B]
         F = np.resize(np.append(near.F, np.zeros(self.order)), self.order + 1)
         A, below = (F, _monic(0)) if self.a else (_monic(0), F)
@@ -128,7 +128,7 @@ _LONGEST = 1e6
 
 @dataclass(frozen=True)
 class Process:
-    """One output: of each input a gain K, a dead time L, and poles by T and zeta (and T3, all in s).
+    """A process model of one output: of each input a gain K, a dead time L, and poles by T and zeta (and T3).
 
     Attributes:
         delays: the lag of the first sample that each input moves.
@@ -150,7 +150,7 @@ class Process:
 
     @property
     def family(self) -> str:
-        """Return its usual name: first, second, third order plus dead time, or integrator."""
+        """Return the usual name: first, second, third order plus dead time, or integrator."""
         return _NAMES[self.order]
 
     @property
@@ -161,7 +161,7 @@ class Process:
 
     @property
     def integrates(self) -> bool:
-        """Return whether it is an integrator."""
+        """Return whether the structure is an integrator."""
         return not self.order
 
     @property
@@ -213,7 +213,7 @@ class Process:
         return process_models([self.coloured(C, D)], [every], np.eye(1))
 
     def start(self, near: Regression) -> Array:
-        """Return where to begin (k,), by a regression with as many poles or more."""
+        """Return the start of the search (k,), by a regression with as many poles or more."""
         poles = np.roots(near.F)
         size = np.clip(np.abs(poles), _FASTEST, _SLOWEST)
         angle = np.where(poles.real > 0.0, np.angle(poles), 0.0)

@@ -37,13 +37,13 @@ _MOST_NOISE = 2
 
 @dataclass(frozen=True)
 class Regression:
-    """y = sum_j (B_j / F) u_j + level + start.
+    """Holds a regression y = sum_j (B_j / F) u_j + level + start.
 
     Attributes:
         F: (n + 1,).
         B: (r, n + 1), from the lags `delays` (r,) on.
         loss: mean square of the output error.
-        slope: that of a line besides, a sample, where one was asked for.
+        slope: the slope of a line besides, a sample, where one was asked for.
     """
 
     F: Array
@@ -65,11 +65,11 @@ class Regression:
 
 @dataclass(frozen=True)
 class Sweep:
-    """The best regression of every order.
+    """Holds the best regression of every order.
 
     Attributes:
         most: the longest delay that was tried.
-        longest, samples: of the longest record, and of all.
+        longest, samples: the length of the longest record, and of all.
     """
 
     by_order: dict[int, Regression]
@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def best(self) -> Regression:
-        """Return the regression with the lowest BIC among the ones with the fewest integrating poles.
+        """Return the regression with the lowest BIC among all with the fewest integrating poles.
 
         Wandering noise looks like the free response of integrators.
         """
@@ -120,7 +120,7 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
 
 @dataclass(frozen=True)
 class Regressed:
-    """Regressions of order n of one output.
+    """Computes regressions of order n of one output.
 
     Attributes:
         parts: records u (n, r), y (n, 1).
@@ -134,7 +134,7 @@ class Regressed:
     def settled(
         self, delays: tuple[int, ...], way: tuple[int, int] | None, F: Array, least: int
     ) -> Regression:
-        """Return a model, its delays of `least` or more from a wide range first, then from the next ones.
+        """Return a model, its delays of `least` or more from a wide range first, then from nearby ones.
 
         Args:
             way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
@@ -188,7 +188,7 @@ class Regressed:
         """Yield of every record the columns and the target (n, m + 1), its own unknowns projected out.
 
         Args:
-            ranges: of each input the first lag, and the one after the last.
+            ranges: the first lag of each input, and the one after the last.
             through: whether lags of y stand among the columns, all signals through 1/F; else y is as it is.
             skipped: samples of each record that are left out.
         """
@@ -242,7 +242,7 @@ class Regressed:
     def _best_delay(
         self, F: Array, delays: tuple[int, ...], j: int, reach: tuple[int, int], skipped: int
     ) -> tuple[int, ...]:
-        """Return the delays with that of input j replaced by the best within reach: one factor for all."""
+        """Return the delays with the best one of input j within reach: one factor for all."""
         b, (low, high), ranges = self.n + 1, reach, self._near(delays)
         ranges[j] = (low, high + b)
         long = [part for part in self.parts if len(part[1]) > skipped + 4 * b]
@@ -268,7 +268,7 @@ class Regressed:
 
 
 def _solved(gram: Array) -> tuple[Array, float]:
-    """Return the least squares from products of columns and target, and the sum of squares that is left."""
+    """Return the least squares from products of columns and target, and the remaining sum of squares."""
     size = len(gram) - 1
     if not np.all(np.isfinite(gram)):
         return np.full(size, np.nan), np.inf
@@ -282,7 +282,7 @@ def _solved(gram: Array) -> tuple[Array, float]:
 def delay_ranges(
     parts: Parts, model: Regression, *, least: int, most: int, own: Sequence[int] = ()
 ) -> tuple[tuple[int, int], ...]:
-    """Return the delays of each input that the likelihood ratio leaves at 95 % confidence.
+    """Return the delays of each input within 95 % confidence by the likelihood ratio.
 
     Args:
         own: delays of another model, which belong to the ranges.
@@ -314,11 +314,13 @@ def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
 def whitening(errors: Sequence[Array]) -> Array:
     """Return the autoregression (m,) that makes errors (n,) of records white."""
     whole = np.concatenate(errors)[:, None]
+    if not np.all(np.isfinite(whole)):
+        return np.ones(1)
     return Whitening.of(whole, tuple(map(len, errors))).filters[0]
 
 
 def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:
-    """Return the records through A (p + 1,), without the samples that need what was before."""
+    """Return the records filtered by A (p + 1,), without the samples that lack a past."""
     lost = A.size - 1
     return [
         (filtered(A, [1.0], u, axis=0)[lost:], filtered(A, [1.0], y, axis=0)[lost:])
@@ -328,10 +330,10 @@ def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:
 
 
 def lingering(polynomial: Array, samples: int) -> int:
-    """Return how many roots hardly fade within `samples` samples, as if they integrated."""
+    """Return the number of roots that hardly fade within `samples` samples, as if they integrated."""
     return int(np.sum(np.roots(polynomial).real > 1.0 - _FADES / samples))
 
 
 def lagged(x: Array, lag: int) -> Array:
-    """Return x (n,) some samples later, zero before."""
+    """Return x (n,) delayed by some samples, zero before."""
     return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])

@@ -1,4 +1,4 @@
-"""Expressions in named parameters: what specs write in place of numbers."""
+"""Expressions in named parameters, which specs write in place of numbers."""
 
 from inputdesign_cli.expressions.expression import (
     Expression as Expression,

@@ -1,6 +1,6 @@
 """Expressions in named parameters, as `K*(1 - exp(-h/T))`: read by a list of permitted syntax, never run.
 
-The text is parsed by Python's `ast` alone and becomes a list of steps by our own rules, with derivatives by
+The text is parsed by Python's `ast` alone and becomes a list of steps by our own rules. Derivatives come by
 forward differentiation: every step carries its value and its slope in all parameters.
 """
 
@@ -24,7 +24,7 @@ CONSTANTS = {"pi": math.pi}
 
 
 class ExpressionError(ValueError):
-    """What is wrong with an expression; its second argument says how to mend it."""
+    """Raised for a flawed expression, with the flaw; the second argument says how to mend it."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -33,10 +33,10 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class Expression:
-    """A text that has been checked, or an expression composed of others, and its value.
+    """A checked text, or an expression composed of others, and its value.
 
     It is a list of steps without duplicates. The list is as long as its parts, however often they are used.
-    It is worked through without recursion, however deep it is.
+    It is evaluated without recursion, however deep it is.
 
     Attributes:
         made: the steps of a composed expression; None for a text, which states them.
@@ -50,7 +50,7 @@ class Expression:
 
     @classmethod
     def of(cls, text: str) -> Expression:
-        """The expression of a text; raises `ExpressionError` for anything that is not allowed."""
+        """Return the expression of a text; raise `ExpressionError` for a text that is not allowed."""
         return cls(text, _read(_tree_of(text)))
 
     @cached_property
@@ -60,12 +60,12 @@ class Expression:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """The parameters that it names."""
+        """Return the parameters that the expression names."""
         return frozenset(str(step.value) for step in self.steps if step.operation == "name")
 
     @cached_property
     def affine(self) -> bool:
-        """Whether it is a sum of constants and of constant multiples of parameters, as it is written."""
+        """Return whether it is written as a sum of constants and of constant multiples of parameters."""
         degrees: list[int] = []
         for step in self.steps:
             degrees.append(_degree(step.operation, [degrees[i] for i in step.operands]))
@@ -73,9 +73,9 @@ class Expression:
 
     @cached_property
     def present(self) -> bool:
-        """Whether a coefficient exists that is written so: it names parameters, or is not zero.
+        """Return whether a coefficient is present as written: it names parameters, or is not zero.
 
-        What a plant consists of is read off its words: it does not change with the nominal parameters.
+        The structure of a plant is read off its words: it does not change with the nominal parameters.
         """
         return bool(self.names) or self.at((), np.zeros(0))[0] != 0.0
 
@@ -92,9 +92,9 @@ class Expression:
         return table.expression(last, f"({self.text}){operation}({other.text})")
 
     def at(self, symbols: Sequence[str], values: Array) -> tuple[float, Array]:
-        """Its value and its gradient (m,) where the `symbols` have these `values` (m,).
+        """Return the value and its gradient (m,) where the `symbols` have these `values` (m,).
 
-        Both are not a number where it is not defined, as one over zero or the root of a negative number.
+        Both are not a number where the value is not defined, as one over zero or the root of minus one.
         Raises `KeyError`: a name is not among the symbols.
         """
         here = evaluated((self,), symbols, values)
@@ -102,7 +102,7 @@ class Expression:
 
 
 def evaluated(expressions: tuple[Expression, ...], symbols: Sequence[str], values: Array) -> Evaluated:
-    """What expressions are worth where `symbols` have `values` (m,); what they share is worked out once.
+    """Return the values of expressions where `symbols` have `values` (m,); shared steps are worked out once.
 
     Raises `KeyError`: a name is not among the symbols.
     """
@@ -112,24 +112,24 @@ def evaluated(expressions: tuple[Expression, ...], symbols: Sequence[str], value
 
 @lru_cache(maxsize=_REMEMBERED)
 def _together(expressions: tuple[Expression, ...]) -> tuple[tuple[Step, ...], tuple[int, ...]]:
-    """All steps of expressions, none of them twice, and where each ends."""
+    """Return all steps of expressions, none of them twice, and the place where each expression ends."""
     table = _Table()
     places = tuple(table.include(one) for one in expressions)
     return table.steps, places
 
 
 class _Table:
-    """Steps to which others are added unless they are there."""
+    """A list of steps to which others are added unless they are there."""
 
     def __init__(self) -> None:
         self._places: dict[Step, int] = {}
 
     def add(self, step: Step) -> int:
-        """The place of the step."""
+        """Add a step unless it is there, and return its place."""
         return self._places.setdefault(step, len(self._places))
 
     def include(self, expression: Expression) -> int:
-        """The place of an expression, all steps of which are added."""
+        """Add all steps of an expression, and return the place of the expression."""
         places: list[int] = []
         for step in expression.steps:
             places.append(self.add(step._replace(operands=tuple(places[i] for i in step.operands))))
@@ -152,7 +152,7 @@ class _Table:
 
 
 def product_of(factors: Sequence[Sequence[Expression]]) -> tuple[Expression, ...]:
-    """The product of polynomials whose coefficients are expressions."""
+    """Return the product of polynomials whose coefficients are expressions."""
     table = _Table()
     result = [table.add(Step("number", 1.0))]
     for factor in factors:
@@ -179,7 +179,7 @@ def _tree_of(text: str) -> ast.expr:
 
 
 def is_name(text: str) -> bool:
-    """Whether a parameter may be called so."""
+    """Return whether a word may name a parameter."""
     taken = text in CONSTANTS or text in FUNCTIONS or keyword.iskeyword(text)
     return text.isidentifier() and text.isascii() and not taken
 
@@ -192,7 +192,7 @@ def _number(value: float) -> float:
 
 
 def _read(tree: ast.expr) -> tuple[Step, ...]:
-    """The steps of a tree, which is walked from its leaves.
+    """Return the steps of a syntax tree, which is walked from its leaves.
 
     Raises:
         ExpressionError: It is not arithmetic in names and numbers.

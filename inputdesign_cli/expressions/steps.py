@@ -38,7 +38,7 @@ class Step(NamedTuple):
 
 
 class Evaluated(NamedTuple):
-    """K expressions in m parameters at one point; not a number where one is not defined there."""
+    """Holds K expressions in m parameters at one point; not a number where one is not defined there."""
 
     values: Array  # (K,)
     gradients: Array  # (K, m)
@@ -47,7 +47,7 @@ class Evaluated(NamedTuple):
 def worked_through(
     steps: tuple[Step, ...], places: tuple[int, ...], symbols: Sequence[str], values: Array
 ) -> Evaluated:
-    """What the expressions that end at `places` are worth where `symbols` have `values` (m,).
+    """Return the values of the expressions that end at `places`, where `symbols` have `values` (m,).
 
     Raises `KeyError`: a name is not among the symbols.
     """

@@ -39,7 +39,7 @@ def _panels(page: Figure, number: int, columns: int) -> list[Axes]:
 
 
 def boundary(center: Array, covariance: Array, probability: float) -> Array:
-    """(2, points): the ellipse with (x - center)^T covariance^-1 (x - center) = chi-squared (2 freedoms)."""
+    """Return the ellipse (x - center)^T covariance^-1 (x - center) = chi-squared(2) as (2, points)."""
     radius = np.sqrt(-2.0 * np.log(1.0 - probability))
     angle = np.linspace(0.0, 2.0 * np.pi, _POINTS)
     circle = np.stack([np.cos(angle), np.sin(angle)])
@@ -51,7 +51,7 @@ def boundary(center: Array, covariance: Array, probability: float) -> Array:
 
 
 def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
-    """One panel a pair: the region that holds the estimate with the probability of the title."""
+    """Draw for each pair of parameters the ellipse that holds the estimate with the title's probability."""
     label = f"{100 * curves.probability:g} % of estimates"
     for axes, pair in zip(_panels(page, len(curves.pairs), 3), curves.pairs, strict=True):
         axes.locator_params(axis="x", nbins=_TICKS)
@@ -66,7 +66,7 @@ def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
 
 
 def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
-    """One panel a pair of parameters: an estimate a dot, with the ellipse that theory predicts."""
+    """Draw for each pair of parameters the estimates as dots, with the ellipse that theory predicts."""
     for axes, (i, j) in zip(_panels(page, len(curves.pairs), 2), curves.pairs, strict=True):
         pair = np.array([i, j])
         axes.plot(*curves.theta[:, pair].T, ".", color=BLUE, markersize=2.5, alpha=0.5, rasterized=True)
@@ -84,7 +84,7 @@ def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
 
 
 def draw_estimates(page: Figure, curves: EstimateCurves, time_unit: str) -> None:
-    """One panel a parameter: the estimate after each part with two standard deviations."""
+    """Draw each parameter in a panel: the estimate after each part, with two standard deviations."""
     for axes, name in zip(_panels(page, len(curves.estimates), 3), curves.estimates, strict=True):
         middle, spread = curves.estimates[name], 2.0 * curves.deviations[name]
         axes.plot(curves.samples, middle, "o-", color=BLUE, markersize=3, label="estimate")
@@ -98,7 +98,7 @@ def draw_estimates(page: Figure, curves: EstimateCurves, time_unit: str) -> None
 
 
 def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
-    """The fit by simulation to data that were not used, over the number of parameters, family by family."""
+    """Draw the fit of simulations to validation data over the number of parameters, family by family."""
     axes = page.subplots()
     least = 0.0
     for number, (family, (sizes, fit)) in enumerate(curves.fits.items()):

@@ -42,15 +42,15 @@ _MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
 
 
 class Panel(Protocol):
-    """Curves over frequency that belong to one entry of G."""
+    """Holds curves over frequency that belong to one entry of G."""
 
     @property
     def frequency(self) -> Array:
-        """(n,) rad per time unit."""
+        """Return the frequencies (n,) in rad per time unit."""
 
     @property
     def entry(self) -> tuple[int, int] | None:
-        """Output and input from zero; None: the only entry, or all of them together."""
+        """Return output and input, from zero; None for the only entry, or for all of them together."""
 
     @property
     def names(self) -> str:
@@ -112,9 +112,9 @@ def draw_panels(
 
 
 def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
-    """r_u of design, record and white excitation against r_adm, and their ratios on a linear axis.
+    """Draw r_u of design, record and white excitation against r_adm, and their ratios on a linear axis.
 
-    Where nothing is asked of the error, against |G|.
+    Where nothing is asked of the error, r_u is drawn against |G|.
     """
     stated = [panel for panel in curves.panels if panel.r_adm is not None]
     title = "Model error r_u against the admitted error r_adm" if stated else "Model error r_u beside |G|"
@@ -125,7 +125,7 @@ def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
 
 @dataclass(frozen=True)
 class _Error:
-    """One r_u (n,) or its ratio, and how it is drawn wherever it is."""
+    """Holds one r_u (n,) or its ratio, and its style in all figures."""
 
     name: str
     values: Array
@@ -138,7 +138,7 @@ class _Error:
 
 
 def _errors(curves: BoundPanel) -> list[_Error]:
-    """What r_u there is: the widest first, so that the others show on it."""
+    """Return the curves of r_u that are known, the widest line first, so that the others show on it."""
     needed, equal = curves.white_labels
     found = [_Error(curves.label, curves.r_u, BLUE, 2.4)]
     if curves.r_u_record is not None:
@@ -167,7 +167,7 @@ def _plot_error(axes: Axes, curves: BoundPanel) -> None:
 
 
 def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> None:
-    """r_u / r_adm, with the largest in the legend: of one entry all curves, of several that of each."""
+    """Draw r_u / r_adm, the largest in the legend: all curves of one entry, or of several the design's."""
     handles: list[Artist] = []
     tops, ratios = [1.0], [np.zeros(0)]
     for number, curves in enumerate(panels):
@@ -200,7 +200,7 @@ def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> None:
 
 
 def draw_deviations(page: Figure, curves: DeviationCurves, time_unit: str) -> None:
-    """|G|, the standard deviations and r_adm at every line."""
+    """Draw |G|, the standard deviations and r_adm at every line."""
     draw_panels(page, curves.panels, _plot_deviations, time_unit, magnitude="magnitude")
 
 
@@ -215,7 +215,7 @@ def _plot_deviations(axes: Axes, panel: DeviationPanel) -> None:
 
 
 def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
-    """The magnitudes, and between which two the true one is with 95 %; below them the phases."""
+    """Draw the magnitudes with a 95 % band for the true one; below them the phases."""
     if len(curves.panels) > 1:
         draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude", below=_phases)
         return
@@ -281,7 +281,7 @@ def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
 
 
 def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
-    """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
+    """Draw the median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
     plot, title = partial(_plot_bands, runs=curves.runs), f"Errors of the models: {curves.name}"
     draw_panels(page, curves.panels, plot, time_unit, magnitude="|Ĝ − G₀|", title=title)
 

@@ -30,7 +30,7 @@ _LEFT, _RIGHT, _HALF = -2.2, 1.2, 1.35
 
 
 def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
-    """C G over frequency, discs of radius |C| r_u along it, -1, and the circle that it is to keep off."""
+    """Draw C G over frequency, discs of radius |C| r_u along it, -1, and the circle that it must avoid."""
     axes = page.add_subplot()
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(_LEFT, _RIGHT)
@@ -85,12 +85,12 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
 
 
 def _shown(L: NDArray[np.complex128]) -> NDArray[np.bool_]:
-    """Which points of L (n,) are within the axes."""
+    """Return the mask (n,) of the points of L (n,) within the axes."""
     return (L.real > _LEFT) & (L.real < _RIGHT) & (np.abs(L.imag) < _HALF)
 
 
 def _along(L: NDArray[np.complex128]) -> NDArray[np.int_]:
-    """Indices (m,) of points of L (n,) evenly along the curve, where it is shown (NaN where not)."""
+    """Return indices (m,) of points of L (n,) evenly along the curve, where it is shown (NaN where not)."""
     inside = np.flatnonzero(np.isfinite(L))
     if inside.size <= _DISCS:
         return inside

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures import estimates, frequency, records, spectrum, studies
 from inputdesign_cli.figures.nyquist import draw_nyquist
-from inputdesign_cli.figures.style import FILE_TYPES, FileType, painted, rendered
+from inputdesign_cli.figures.style import FILE_TYPES, FileType, Width, painted, rendered
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results
@@ -46,9 +46,9 @@ def painter(curves: Curves, time_unit: str = "s") -> Callable[[Figure], None]:
     return lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit)
 
 
-def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> bytes:
+def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png", width: Width = "page") -> bytes:
     """Return the figure of curves as a file, see `rendered`."""
-    return rendered(painter(curves, time_unit), file_type)
+    return rendered(painter(curves, time_unit), file_type, width=width)
 
 
 def figure(results: Results, name: str) -> Figure:
@@ -60,9 +60,7 @@ def figure(results: Results, name: str) -> Figure:
     return painted(painter(results.curves[name], results.time_unit))
 
 
-def draw_all(results: Results, file_type: str = "png") -> dict[str, bytes]:
+def draw_all(results: Results, file_type: str = "png", width: Width = "page") -> dict[str, bytes]:
     """Return the figures of a run by their file names: bound.png, spectrum.png, .., or in another format."""
-    kind = FILE_TYPES[file_type]
-    return {
-        f"{stem}.{kind}": draw(curves, results.time_unit, kind) for stem, curves in results.curves.items()
-    }
+    kind, unit = FILE_TYPES[file_type], results.time_unit
+    return {f"{stem}.{kind}": draw(curves, unit, kind, width) for stem, curves in results.curves.items()}

@@ -22,14 +22,14 @@ class Traced(Line2D):
     Args:
         x, y: its points (n,).
         along: what it goes along (n,), called `name`.
-        told: values shown at every point, (n,) by name.
+        values: shown at every point, (n,) by name.
     """
 
     def __init__(
-        self, x: Array, y: Array, along: Array, name: str, told: Mapping[str, Array], **style: Any
+        self, x: Array, y: Array, along: Array, name: str, values: Mapping[str, Array], **style: Any
     ) -> None:
         super().__init__(x, y, **style)
-        self.along, self.name, self.told = along, name, told
+        self.along, self.name, self.values = along, name, values
 
 
 def readings(page: Figure) -> list[dict[str, object]]:
@@ -55,7 +55,7 @@ def _panel(axes: Axes) -> dict[str, object]:
 
 
 def _labels(axes: Axes) -> tuple[str, str]:
-    """Return the labels of a panel: its own, those of panels beside and below it, or those of the page.
+    """Return the labels of a panel: its own, or of panels beside and below it, or of the page.
 
     The second label names the panel where there are several.
     """
@@ -71,7 +71,7 @@ def _labels(axes: Axes) -> tuple[str, str]:
 
 
 def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, object]]:
-    """A named curve over the axis; not a limit across it, and no marks."""
+    """Yield the readings of a named curve over the axis; limits across it and marks have none."""
     name = str(line.get_label()).strip()
     if not name or name.startswith("_") or line.get_transform() != axes.transData:
         return
@@ -79,21 +79,21 @@ def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, object]]:
     fewest = _FEWEST if line.get_linestyle() in ("None", "none", "") else 2
     if x.size >= fewest and np.all(np.diff(x) >= 0.0) and x[-1] > x[0]:
         kept = _kept(x.size)
-        yield {"name": name.split(": ")[0], "x": _told(x[kept]), "y": _told(y[kept])}
+        yield {"name": name.split(": ")[0], "x": _rounded(x[kept]), "y": _rounded(y[kept])}
 
 
 def _along(axes: Axes, line: Traced) -> dict[str, object]:
-    """The points of a curve in the plane that are within the axes."""
+    """Return the readings of a curve in the plane at its points within the axes."""
     x, y = (np.asarray(line.get_data()[k], dtype=float) for k in (0, 1))
     across, down = axes.transAxes.inverted().transform(axes.transData.transform(np.stack([x, y], 1))).T
     shown = np.flatnonzero((across >= 0.0) & (across <= 1.0) & (down >= 0.0) & (down <= 1.0))
     shown = shown[_kept(shown.size)]
-    at = _told(line.along[shown])
+    at = _rounded(line.along[shown])
     return {
         "x": line.name,
         "y": str(line.get_label()),
-        "path": [_told(across[shown]), _told(1.0 - down[shown])],
-        "curves": [{"name": name, "x": at, "y": _told(values[shown])} for name, values in line.told.items()]
+        "path": [_rounded(across[shown]), _rounded(1.0 - down[shown])],
+        "curves": [{"name": name, "x": at, "y": _rounded(row[shown])} for name, row in line.values.items()]
         if shown.size
         else [],
     }
@@ -103,12 +103,12 @@ def _kept(size: int) -> slice:
     return slice(None, None, max(-(-size // _MOST), 1))
 
 
-def _told(values: Array) -> list[float]:
+def _rounded(values: Array) -> list[float]:
     return [float(f"{v:.4g}") for v in values.tolist()]
 
 
 def _points(line: Line2D) -> tuple[Array, Array]:
-    """The points (n,) of a curve at which it has a value."""
+    """Return the points x, y (n,) of a curve at which it has a value."""
     x, y = (np.asarray(line.get_data()[k], dtype=float).ravel() for k in (0, 1))
     there = np.isfinite(x) & np.isfinite(y)
     return x[there], y[there]

@@ -41,9 +41,9 @@ _LINE = 2e-3  # the width of a curve, as a share of the height drawn
 
 
 def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
-    """Each channel against time, its first samples if the record is long, beside a histogram of all of it.
+    """Draw each channel over time (of a long record the first samples), beside a histogram of all samples.
 
-    Below them the outputs that are to be expected, from rest, with two standard deviations of noise.
+    Below them are the outputs that are expected from rest, with two standard deviations of noise.
     """
     predicted = curves.predicted[: _ROWS // 2]
     channels = list(curves.channels.items())[: _ROWS - len(predicted)]
@@ -82,12 +82,12 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
 
 
 def _mark(time: Array) -> str:
-    """How a signal is drawn: a single sample makes no line."""
+    """Return the format of a signal's curve: a line, or a dot for a single sample."""
     return "-" if time.size > 1 else "o"
 
 
 def _name(axes: Axes, name: str, label: str, what: str) -> None:
-    """The user's name and unit of a channel, or its symbol with the unit."""
+    """Label the axis with the user's name and unit of a channel, or with its symbol and unit."""
     symbol = f"{name[0]}{lowered(name[1:])}(t)"
     nameless = not label or label.startswith("(")  # a unit alone
     axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
@@ -107,7 +107,7 @@ def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: b
 
 
 def _frame(axes: Axes, *shown: Array | float) -> None:
-    """The limits of an axis about what is shown."""
+    """Set the limits of the vertical axis around the values that are shown."""
     low, high = (float(end([end(part) for part in shown])) for end in (np.min, np.max))
     if high == low:  # a constant is seen beside zero
         low, high = (min(low, 0.0), max(high, 0.0)) if high else (-1.0, 1.0)
@@ -127,7 +127,7 @@ def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> No
 
 @dataclass(frozen=True)
 class _Shown:
-    """The samples that are drawn, and at which of them (counted from the first of these) a record begins."""
+    """Holds the samples that are drawn, and those at which a record begins, counted from the first drawn."""
 
     samples: slice
     begins: NDArray[np.int64]
@@ -160,7 +160,7 @@ def _stretch(outputs: Sequence[Array]) -> slice:
 
 
 def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
-    """Each output with its simulation and its one-step prediction; below a single one its residuals.
+    """Draw each output with its simulation and its one-step prediction; below a single output its residuals.
 
     Records are parted: no curve goes from one to the next, and their borders are marked.
     """
@@ -204,7 +204,7 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
 def _plot_fit(
     axes: Axes, time: Array, panel: FitPanel, shown: _Shown, recorded: str, simulated: str, *, same: bool
 ) -> None:
-    """Curves of an output; one for prediction and simulation where these are the `same` in all panels."""
+    """Draw an output, its prediction and its simulation: one curve if the `same` in all panels."""
     axes.plot(time, shown.broken(panel.y), color=BLACK, linewidth=1.0, label=recorded)
     label = f"predicted one step ahead, and {simulated}" if same else "predicted one step ahead"
     axes.plot(time, shown.broken(panel.predicted), color=BLUE, linewidth=1.0, label=label)
@@ -213,7 +213,7 @@ def _plot_fit(
 
 
 def _coincide(panel: FitPanel, shown: slice) -> bool:
-    """Whether prediction and simulation are one curve to the eye, as where the noise is white."""
+    """Return whether prediction and simulation are one curve to the eye, as where the noise is white."""
     if panel.simulated is None:
         return False
     y, predicted, simulated = panel.y[shown], panel.predicted[shown], panel.simulated[shown]
@@ -222,9 +222,9 @@ def _coincide(panel: FitPanel, shown: slice) -> bool:
 
 
 def draw_residuals(page: Figure, curves: ResidualCurves, time_unit: str) -> None:
-    """Correlations of the residuals with themselves and with past inputs; 99 % bands of a right model.
+    """Draw residual autocorrelations and correlations with past inputs, with 99 % bands of a right model.
 
-    A row for every output, a column for every residual and every input.
+    Each output has a row, each residual and each input a column.
     """
     _, p, r = curves.cross_correlation.shape
     grid = page.subplots(p, p + r, sharex=True, sharey=True, squeeze=False)

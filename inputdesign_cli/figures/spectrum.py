@@ -37,7 +37,7 @@ _BESIDE = 1.1
 
 
 def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
-    """The density, or the powers of sinusoids, of one input; of several the matrix and its eigenvalues."""
+    """Draw the input spectrum: the density or line powers, or of several inputs matrix and eigenvalues."""
     if curves.spectrum.shape[1] > 1:
         _draw_matrix(page, curves, time_unit)
         return
@@ -76,7 +76,7 @@ def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> N
 
 
 def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
-    """Moduli of the entries above, eigenvalues below: where the power is, and in how many directions."""
+    """Draw the moduli of the entries of the spectrum above, its eigenvalues (power by direction) below."""
     w, r = curves.frequency, curves.spectrum.shape[1]
     entries = np.asarray(np.abs(curves.spectrum), dtype=float)
     pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
@@ -129,7 +129,7 @@ def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[
 
 
 def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> None:
-    """The gains of the plant above; below, the power of the input along each of its input directions."""
+    """Draw the gains of the plant above; below, the input power along each of its input directions."""
     w = curves.frequency
     upper, lower = page.subplots(2, 1, sharex=True)
     for i, (gain, power) in enumerate(zip(curves.gain.T, curves.power.T, strict=True)):
@@ -147,7 +147,7 @@ def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> No
 
 
 def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> None:
-    """What a unit of cost buys at each frequency, relative to the best: one on the support, never more."""
+    """Draw the relative worth of a unit of cost over frequency: one on the support, and never more."""
     axes = page.add_subplot()
     w, ratio, support = curves.frequency, curves.ratio, curves.support
     axes.plot(w, ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost")
@@ -168,7 +168,7 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
 
 
 def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> None:
-    """A power over frequency, the `number`th of its panel: a curve, or stems of `lines`."""
+    """Draw a power over frequency, the `number`th of its panel, as a curve or as stems of `lines`."""
     colour = PALETTE[number % MOST]
     if lines:
         axes.vlines(w, 0.0, values, color=colour, linewidth=1.0, alpha=0.6)
@@ -179,13 +179,13 @@ def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int
 
 
 def _plot_white(axes: Axes, level: float | None, label: str = "white, same power") -> None:
-    """The level of white excitation."""
+    """Draw the level of white excitation, if it is known."""
     if level is not None:
         axes.axhline(level, color=GREY, linestyle=DASHED, label=label)
 
 
 def _scale(axes: Axes, values: Array, usual: float) -> None:
-    """A logarithmic axis where the peak is far above what is usual, else one from zero."""
+    """Make the axis logarithmic where the peak is far above the `usual` value; else begin it at zero."""
     if float(values.max(initial=0.0)) > LOG_FROM * usual:
         _logarithmic(axes, values)
     else:
@@ -193,7 +193,7 @@ def _scale(axes: Axes, values: Array, usual: float) -> None:
 
 
 def _logarithmic(axes: Axes, values: Array) -> None:
-    """A logarithmic axis over the leading decades: zeros of a spectrum would stretch it without end."""
+    """Make the axis logarithmic over the leading decades; zeros of a spectrum would stretch it endlessly."""
     peak = float(values.max(initial=0.0))
     if peak > 0.0:
         log_axes(axes, "y", "mask")

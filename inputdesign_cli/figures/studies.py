@@ -29,7 +29,7 @@ _WIDE = 5.0  # costs beyond it are shown over their logarithm
 
 
 def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
-    """The worst ratio falls to one while the energy rises, over the samples."""
+    """Draw the worst ratio, which falls to one, and the energy, which rises, over the samples."""
     upper, lower = page.subplots(2, 1, sharex=True)
     upper.plot(curves.samples, curves.ratio, "o-", color=BLUE, markersize=4, label="after each part")
     upper.axhline(1.0, color=ORANGE, linestyle=DASHED, label="what is asked")
@@ -44,7 +44,7 @@ def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
 
 
 def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
-    """A histogram for each way on common bins; at one the true plant has what is asked."""
+    """Draw a histogram of the true ratio for each way, on common bins; up to one the requirement is met."""
     axes = page.add_subplot()
     everything = np.concatenate(list(curves.ratios.values()))
     low, top = min(float(everything.min()), 0.95), max(float(np.quantile(everything, _RATIOS)), 1.05)
@@ -71,7 +71,7 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
 
 
 def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
-    """Mean cost against the share of runs within r_adm, each with its spread; the oracle's at cost one."""
+    """Draw the share of runs within r_adm over the mean cost, both with spread; the oracle's cost is one."""
     axes = page.add_subplot()
     for (name, point), colour in zip(curves.points.items(), PALETTE, strict=False):
         cost, cheap, dear, share, low, high = point
@@ -90,7 +90,7 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
 
 
 def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
-    """A histogram for each input on common bins, with its mean as a vertical line."""
+    """Draw the histogram of the loss for each input on common bins, with its mean as a vertical line."""
     axes = page.add_subplot()
     top = max(float(np.quantile(loss, _LOSSES)) for loss in curves.losses.values())
     bins = np.linspace(0.0, top, _BINS + 1).tolist()

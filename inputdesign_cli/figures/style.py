@@ -34,10 +34,20 @@ from inputdesign_cli.outcome.results import Array
 FileType = Literal["png", "svg", "pdf"]
 FILE_TYPES: dict[str, FileType] = {"png": "png", "svg": "svg", "pdf": "pdf"}
 
-SIZE = (7.0, 4.5)  # inches
-NARROW = (5.0, 3.7)  # of a page, where text is to be as large on a phone
 DPI = 150
 TYPE_SIZE = 9.5  # points
+Width = Literal["page", "column", "phone"]
+# Width and height in inches, and the size of the text in points: of a page, of a column in a paper, and of a
+# page that may be read on a phone, where text is larger beside the curves.
+_SIZES: dict[Width, tuple[float, float, float]] = {
+    "page": (7.0, 4.5, TYPE_SIZE),
+    "column": (3.5, 2.6, 0.7 * TYPE_SIZE),
+    "phone": (5.0, 3.7, TYPE_SIZE),
+}
+_SIZES_OF_TEXT = (
+    *("font.size", "axes.titlesize", "axes.labelsize", "figure.titlesize"),
+    *("xtick.labelsize", "ytick.labelsize", "legend.fontsize"),
+)
 
 # Okabe and Ito's palette, which stays apart for colour-blind readers.
 BLACK = "#000000"
@@ -66,13 +76,6 @@ _RC: dict[Any, Any] = {
     "svg.fonttype": "none",  # text stays text
     "pdf.fonttype": 42,  # TrueType, as journals ask for
     "mathtext.default": "regular",
-    # One size for all text: titles, ticks and legends alike.
-    "font.size": TYPE_SIZE,
-    "axes.titlesize": TYPE_SIZE,
-    "axes.labelsize": TYPE_SIZE,
-    "figure.titlesize": TYPE_SIZE,
-    "xtick.labelsize": TYPE_SIZE,
-    "ytick.labelsize": TYPE_SIZE,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -81,7 +84,6 @@ _RC: dict[Any, Any] = {
     "axes.axisbelow": True,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
-    "legend.fontsize": TYPE_SIZE,
     # Names and units are the user's: no $ begins a formula; our symbols are typeset one by one.
     "text.parse_math": False,
 }
@@ -92,14 +94,14 @@ _LABELLED = ("1", "3")
 
 
 def lowered(*indices: str | int) -> str:
-    """Indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
+    """Return indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
     texts = [str(index) for index in indices]
     apart = "," if len(texts) > 1 and any(len(text) > 1 for text in texts) else ""
     return apart.join(texts).translate(_LOWERED)
 
 
 class _LogTicks(LogFormatterSciNotation):
-    """10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
+    """Writes 10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         formula = re.fullmatch(r"\$\\mathdefault\{(.*?)(?:\^\{(.*)\})?\}\$", super().__call__(x, pos))
@@ -112,7 +114,7 @@ _SYMBOL = re.compile(r"\br_(u|adm)\b")
 
 
 class Page(Figure):
-    """A figure that a notebook shows, whether pyplot has been imported or not."""
+    """Makes a figure that a notebook shows, whether pyplot has been imported or not."""
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
@@ -133,19 +135,18 @@ def rendered(
     paint: Callable[[Figure], object],
     file_type: FileType = "png",
     *,
-    narrow: bool = False,
+    width: Width = "page",
     seen: Callable[[Figure], object] | None = None,
 ) -> bytes:
     """Return the file of a figure that `paint` draws on an empty page; the same figure gives the same file.
 
-    A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves. `seen`
-    gets the page as it was laid out.
+    `seen` gets the page as it was laid out.
     """
     buffer = io.BytesIO()
-    with mpl.rc_context(_RC), warnings.catch_warnings():
+    with mpl.rc_context(_look(width)), warnings.catch_warnings():
         # A box stands for a letter of the user's that the font lacks; tables and pages have it.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        page = painted(paint, NARROW if narrow else SIZE)
+        page = painted(paint, width)
         for axes in page.axes:
             _strokes(axes)
         # Without a date and with ids that do not change, the same figure is the same file.
@@ -163,10 +164,15 @@ def rendered(
     return buffer.getvalue()
 
 
-def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE) -> Figure:
-    """The figure that `paint` draws on an empty page."""
-    with mpl.rc_context(_RC):
-        page = Page(figsize=size, dpi=DPI, layout="constrained")
+def _look(width: Width) -> dict[Any, Any]:
+    """Return the settings of a page, with one size for all text: titles, ticks and legends alike."""
+    return _RC | dict.fromkeys(_SIZES_OF_TEXT, _SIZES[width][2])
+
+
+def painted(paint: Callable[[Figure], object], width: Width = "page") -> Figure:
+    """Return the figure that `paint` draws on an empty page."""
+    with mpl.rc_context(_look(width)):
+        page = Page(figsize=_SIZES[width][:2], dpi=DPI, layout="constrained")
         paint(page)
         _typeset(page)
     return page
@@ -196,7 +202,7 @@ def _strokes(axes: Axes) -> None:
 
 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
-    """A logarithmic axis over the positive ones of `frequencies`, in rad per time unit."""
+    """Make the horizontal axis logarithmic over the positive `frequencies`, in rad per time unit."""
     positive = frequencies[frequencies > 0]
     if positive.size:
         log_axes(axes, "x")
@@ -206,7 +212,7 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
 
 
 def frequency_label(time_unit: str) -> str:
-    """What an axis of frequencies is called."""
+    """Return the label of an axis of frequencies."""
     return f"frequency ω (rad/{time_unit})"
 
 
@@ -235,7 +241,7 @@ def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
 
 
 def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
-    """Black or white, which stands out more on the colour of a value, drawn on white."""
+    """Return black or white, whichever stands out more on the colour of a value, drawn on white."""
     colour = cell.to_rgba(np.array(value))
     light = [float(channel) * opaque + 1.0 - opaque for channel in colour[:3]]
     # Relative luminance, and where black and white have the same contrast, by WCAG 2.
@@ -245,7 +251,7 @@ def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
 
 
 def marked(axes: Axes, x: Array, y: Array, *, color: str = BLUE, label: str = "") -> None:
-    """Rings around points of a curve, if there are any."""
+    """Draw rings around points of a curve, if there are any."""
     if x.size:
         (rings,) = axes.plot(x, y, "o", markersize=6, clip_on=False, zorder=5, label=label)
         rings.set(markerfacecolor="white", markeredgecolor=color, markeredgewidth=1.5)
@@ -254,7 +260,7 @@ def marked(axes: Axes, x: Array, y: Array, *, color: str = BLUE, label: str = ""
 def band(
     axes: Axes, x: Array, low: Array, high: Array | float, color: str, alpha: float | None, **more: Any
 ) -> None:
-    """A shade between two curves."""
+    """Draw a shade between two curves."""
     axes.fill_between(x, low, high, color=color, alpha=alpha, linewidth=0, **more)
 
 
@@ -270,7 +276,7 @@ def limiting_label(count: int) -> str:
 
 
 def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
-    """What is admitted, drawn alike wherever it is: a dashed line, and beyond it a shade.
+    """Draw the admitted error r_adm as a dashed line with a shade beyond it, alike in all figures.
 
     To be called last: the shade ends where the axis does.
     """
@@ -290,23 +296,23 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
 def stroke(number: int, colours: Sequence[str] = PALETTE) -> tuple[str, LineStyleType]:
-    """Colour and dashes of a curve by its number from zero: other dashes where the colours are used up."""
+    """Return colour and dashes of a curve by its number from zero; dashes change once colours run out."""
     again, place = divmod(number, len(colours))
     return colours[place], _DASHES[again % len(_DASHES)]
 
 
 def point(number: int) -> tuple[str, str]:
-    """Colour and marker of a set of points by its number from zero: no two of the first 42 are alike."""
+    """Return colour and marker of a set of points by its number from zero; the first 42 are distinct."""
     return PALETTE[number % len(PALETTE)], _MARKERS[number % len(_MARKERS)]
 
 
 def positive(values: Array) -> Array:
-    """`values` with gaps where a logarithmic axis has no place for them (an r_adm below zero, say)."""
+    """Return `values` with NaN where a logarithmic axis has no place for them (an r_adm below zero, say)."""
     return np.where(values > 0, values, np.nan)
 
 
 def labelled(*panels: Axes) -> list[Artist]:
-    """What has a label, in the order in which it was drawn; of equal labels the first."""
+    """Return the artists with a label, in the order in which they were drawn; of equal labels the first."""
     found: dict[str, Artist] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -315,7 +321,7 @@ def labelled(*panels: Axes) -> list[Artist]:
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
-    """A legend over the axes, where it cannot cover a curve: all that has a label, or `handles`."""
+    """Draw a legend over the axes, where it covers no curve: of all that has a label, or of `handles`."""
     page = axes.get_figure(root=True)
     assert page is not None
     handles = labelled(axes) if handles is None else handles
@@ -329,8 +335,8 @@ def _form(handles: Sequence[Artist], page: Figure) -> dict[str, Any]:
 
 
 def _columns(labels: Sequence[str], inches: float) -> int:
-    """The most columns of a legend, filled one after the other, that a page so wide has room for."""
-    room = inches * _LETTERS_PER_INCH
+    """Return the most columns of a legend, filled one after the other, for which the page is wide enough."""
+    room = inches * _LETTERS_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
     for columns in range(len(labels), 1, -1):
         shared = np.array_split([_width(label) for label in labels], columns)
         widest = [float(max(widths)) for widths in shared]
@@ -340,22 +346,23 @@ def _columns(labels: Sequence[str], inches: float) -> int:
 
 
 def _width(label: str) -> float:
-    """In letters of usual width: capitals are wider."""
+    """Return the width of a label in letters of usual width: capitals are wider."""
     return len(label) + _WIDER * sum(letter.isupper() for letter in label)
 
 
 def title_above(page: Figure, title: str) -> None:
-    """A title of the page, in as many lines as it takes; none if it is empty."""
+    """Draw the title of the page, in as many lines as it takes; none if it is empty."""
     if title:
         page.suptitle(_wrapped(page, title), x=0.01, ha="left")
 
 
 def _wrapped(page: Figure, title: str) -> str:
-    return textwrap.fill(title, max(int(page.get_figwidth() * _TITLE_PER_INCH), 1))
+    letters = page.get_figwidth() * _TITLE_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
+    return textwrap.fill(title, max(int(letters), 1))
 
 
 def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str = "") -> None:
-    """One legend for all panels of a page, above them: all that has a label, or `handles`."""
+    """Draw one legend for all panels of a page, above them: of all that has a label, or of `handles`."""
     handles = labelled(*page.axes) if handles is None else handles
     title, form = _wrapped(page, title), _form(handles, page)
     page.legend(handles=handles, loc="outside upper left", title=title, alignment="left", **form)

@@ -73,7 +73,7 @@ def _remove(root: Path, name: str) -> None:
 
 
 def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]]]:
-    """The figures that suit the sweep, each with what draws it: curves over a numeric key, a map over two.
+    """Return the names and drawing functions of a sweep's figures: curves over a numeric key, a map over two.
 
     Of three keys the curves are small multiples, a panel for each value of the third. Sweeps over more, or
     without two results, have none.
@@ -111,7 +111,7 @@ def _label(table: SweepTable, quantity: str) -> str:
 def _draw_panels(
     table: SweepTable, quantity: str, along: str, across: str | None, panels: str | None, page: Figure
 ) -> None:
-    """Curves over one key, a panel for each value of the third key, on common axes; the best point named."""
+    """Draw curves over one key, a panel for each value of the third, on common axes; name the best point."""
     values = list(dict.fromkeys(table.columns[panels])) if panels else [""]
     columns = min(len(values), COLUMNS)
     rows = -(-len(values) // columns)
@@ -143,9 +143,9 @@ def _draw_panels(
 def _draw_curves(
     axes: Axes, table: SweepTable, quantity: str, along: str, across: str | None, shown: NDArray[np.bool_]
 ) -> None:
-    """The quantity over one key, a curve for each value of the other, each with its bound; white if alone.
+    """Draw the quantity over one key, a curve with its bound for each value of the other; white if alone.
 
-    Of the points (n,) that are `shown`; what the scales depend on is asked of all.
+    Only points (n,) that are `shown` are drawn; the scales depend on all.
     """
     x, y = table.numbers(along), table.numbers(quantity)
     assert x is not None
@@ -173,7 +173,7 @@ def _draw_curves(
 
 
 def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
-    """The vertical axis: logarithmic over decades, from zero where that is near."""
+    """Scale the vertical axis: logarithmic over decades, from zero where that is near."""
     low, high = float(values.min()), float(values.max())
     if low > 0 and high > LOG_FROM * low and table.kind != "D":
         log_axes(axes, "y")
@@ -187,7 +187,7 @@ def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
 
 
 def bound_of(table: SweepTable) -> tuple[Array | None, str]:
-    """The bound (n,) on the objective over all designs of a kind, and what kind; None and "" without one."""
+    """Return the bound (n,) on the objective over all designs of a kind, and the kind; else None and ""."""
     for name, whatever in BOUNDS.items():
         values = table.numbers(name)
         if values is not None and np.isfinite(values).any():
@@ -196,7 +196,7 @@ def bound_of(table: SweepTable) -> tuple[Array | None, str]:
 
 
 def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Figure) -> None:
-    """The quantity in colour over two keys; points without a result stay hatched."""
+    """Draw the quantity in colour over two keys; points without a result stay hatched."""
     values = table.numbers(quantity)
     assert values is not None
     rows, columns = _ordered(table.columns[down]), _ordered(table.columns[along])
@@ -238,7 +238,7 @@ def _short(key: str | None) -> str:
 
 
 def _moment_entries(table: SweepTable) -> list[str]:
-    """The columns of R to draw: its upper triangle, or of a large R its diagonal; none without moments."""
+    """Return the columns of R to draw: upper triangle, or of a large R the diagonal; none without moments."""
     if table.numbers(_TRACE) is None:
         return []
     found = [name for name in table.columns if name.startswith(_PREFIX) and table.numbers(name) is not None]
@@ -248,7 +248,7 @@ def _moment_entries(table: SweepTable) -> list[str]:
 
 
 def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
-    """R11, R12, .. and the trace over a key, as in [eckhard-mse], Figures 1, 2; crosses without a result.
+    """Draw R11, R12, .. and the trace over a key ([eckhard-mse], Figures 1, 2); crosses without a result.
 
     The axis is logarithmic if the trace spans more than a decade and no entry is zero or negative.
     """
@@ -277,23 +277,23 @@ def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
 
 
 def _place(name: str) -> list[str]:
-    """Row and column of an entry, from 1."""
+    """Return row and column of an entry, from 1."""
     return name.removeprefix(_PREFIX).split("_")[1:]
 
 
 def key_label(key: str) -> str:
-    """What an axis over a key of the spec is called."""
+    """Return the label of an axis over a key of the spec."""
     return _NAMES.get(key, key)
 
 
 def curve(axes: Axes, x: Array, y: Array, **style: Any) -> None:
-    """A curve through the points in the order of x."""
+    """Draw a curve through the points in the order of x."""
     order = np.argsort(x, kind="stable")
     axes.plot(x[order], y[order], **style)
 
 
 def mark_failures(axes: Axes, where: Array) -> None:
-    """Crosses at the foot of the axes where a point has no result."""
+    """Draw crosses at the foot of the axes where a point has no result."""
     where = where[np.isfinite(where)]
     if not where.size:  # the layout would make room for a line without points
         return
@@ -302,7 +302,7 @@ def mark_failures(axes: Axes, where: Array) -> None:
 
 
 def scale_key(axes: Axes, key: str, x: Array) -> None:
-    """The scale and the name of the axis of a key: logarithmic for N and over decades.
+    """Set the scale and the label of the axis of a key: logarithmic for N and over decades.
 
     Up to a dozen points that stand apart have their ticks, and no others.
     """
@@ -321,7 +321,7 @@ def scale_key(axes: Axes, key: str, x: Array) -> None:
 
 
 def _apart(points: Array, *, logarithmic: bool) -> bool:
-    """Whether there is room for a number at each of the points."""
+    """Return whether there is room for a number at each of the points."""
     if not 1 < points.size <= _MOST_TICKS:
         return False
     place = np.log(points) if logarithmic else points
@@ -329,7 +329,7 @@ def _apart(points: Array, *, logarithmic: bool) -> bool:
 
 
 def plain_numbers(axis: Axis, ratio: float) -> None:
-    """Ticks of a logarithmic axis, written out: powers of ten, over few decades 2 and 5 times them too."""
+    """Set ticks of a logarithmic axis, written out: powers of ten, over few decades 2 and 5 times them."""
     subs = (1.0, 2.0, 5.0) if ratio < 10.0**_DECADES_IN_FULL else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs))
     axis.set_minor_locator(NullLocator())
@@ -337,7 +337,7 @@ def plain_numbers(axis: Axis, ratio: float) -> None:
 
 
 def draw_trade(trade: Trade, page: Figure) -> None:
-    """Ratios to what is asked, which stands at one, or the criterion."""
+    """Draw the ratios to what is asked, which stands at one, or the criterion, over the length."""
     axes = page.add_subplot()
     for number, (text, row) in enumerate(zip(trade.amplitudes, trade.values, strict=True)):
         name = f"amplitude {text}" if text else "best record"

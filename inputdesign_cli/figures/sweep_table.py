@@ -23,7 +23,7 @@ QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """A key that is varied, with its values as texts."""
+    """Holds a key that is varied, with its values as texts."""
 
     key: str
     values: tuple[str, ...]
@@ -31,7 +31,7 @@ class SweepAxis:
 
 @dataclass(frozen=True)
 class SweepContent:
-    """What `sweep.json` says of a sweep."""
+    """Holds the content of `sweep.json`."""
 
     verb: Literal["solve", "analyse", "simulate"]
     axes: tuple[SweepAxis, ...]
@@ -42,35 +42,35 @@ class SweepContent:
 
 @dataclass(frozen=True)
 class SweepTable:
-    """The content of `sweep.json` and the columns of `sweep.csv` as text."""
+    """Holds the content of `sweep.json` and the columns of `sweep.csv` as text."""
 
     summary: SweepContent
     columns: Mapping[str, list[str]]
 
     @property
     def axes(self) -> list[str]:
-        """The keys that were varied."""
+        """Return the keys that were varied."""
         return [axis.key for axis in self.summary.axes]
 
     @property
     def rows(self) -> int:
-        """The number of points."""
+        """Return the number of points."""
         return len(self.columns["status"])
 
     @property
     def kind(self) -> str:
-        """The objective that all points have in common, or nothing."""
+        """Return the objective that all points have in common; empty if there is none."""
         kinds = {kind for kind in self.columns.get("objective.kind", []) if kind}
         return kinds.pop() if len(kinds) == 1 else ""
 
     @property
     def maximised(self) -> bool:
-        """Whether more of the objective is better, which then has bounds from above."""
+        """Return whether more of the objective is better; it then has bounds from above."""
         return any(self.columns.get("objective.upper_bound", []))
 
     @property
     def best(self) -> tuple[str, str] | None:
-        """The quantity that the sweep is about and the point at which it is best; None without a result."""
+        """Return the quantity that the sweep is about and its best point; None without a result."""
         for name in QUANTITIES:
             values = self.numbers(name)
             if values is None or not np.isfinite(values).any():
@@ -89,7 +89,7 @@ class SweepTable:
         return [text == "true" for text in lower] if set(lower) <= {"true", "false"} else texts
 
     def numbers(self, name: str) -> Array | None:
-        """A column as numbers (n,), NaN where it is empty; None if it is missing or holds text."""
+        """Return a column as numbers (n,), NaN where it is empty; None if it is missing or holds text."""
         texts = self.columns.get(name)
         if texts is None:
             return None
@@ -101,7 +101,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Trade:
-    """The worst ratio to the requirement, or the criterion, over lengths (in `unit`) and amplitudes.
+    """Holds the worst ratio to the requirement, or the criterion, over lengths (in `unit`) and amplitudes.
 
     Args:
         amplitudes: their texts, one where only the length was varied.

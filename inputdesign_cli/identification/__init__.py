@@ -7,8 +7,9 @@ from inputdesign_cli.identification.directed import (
     that_matter as that_matter,
 )
 from inputdesign_cli.identification.earlier import Earlier as Earlier
-from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
 from inputdesign_cli.identification.estimators import (
+    BatchEstimate as BatchEstimate,
+    Estimate as Estimate,
     fit_batch as fit_batch,
     identify as identify,
     information_begun_anywhere as information_begun_anywhere,

@@ -40,26 +40,20 @@ Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feed
 
 @dataclass(frozen=True)
 class ScoreTest:
-    """One chi-squared test.
-
-    Attributes:
-        probability: of a statistic as large, with `freedom` degrees of freedom, if the model is right; see
-            `White.probability`.
-        output: of which residuals are explained most; `source`, by which input or other residual.
-    """
+    """The result of one chi-squared score test."""
 
     name: str  # of the test
     fault: Fault  # what is wrong if it fails
     statistic: float
     freedom: int
-    probability: float
+    probability: float  # of a statistic as large if the model is right, see `White.probability`
     lag: int | None  # of past inputs or residuals, where they explain most; of trends None
-    output: int = 0
-    source: int = 0
+    output: int = 0  # of which residuals are explained most
+    source: int = 0  # by which input or other residual
 
 
 class Regressors(NamedTuple):
-    """What a test tries: columns (p, N, m) for every output, and their lags if they have any."""
+    """The regressors of a test: columns (p, N, m) for every output, and their lags if they have any."""
 
     name: str
     fault: Fault
@@ -68,7 +62,7 @@ class Regressors(NamedTuple):
     of_residuals: bool = False
 
     def white(self, white: White) -> Array:
-        """Return columns ((N + M) p, p m), each in one output and zero in others, in units of the noise."""
+        """Return regressors as columns ((N + M) p, p m) in units of the noise, each for one output alone."""
         p, samples, m = self.columns.shape
         found = np.zeros((p, m, samples, p))
         for output, own in enumerate(self.columns):
@@ -76,7 +70,7 @@ class Regressors(NamedTuple):
         return white.columns(found.reshape(p * m, samples, p))
 
     def means(self, white: White) -> Array:
-        """Return the means of the scores (p m,): not zero of past residuals that unknown starts correlate."""
+        """Return the means of the scores as (p m,): nonzero if unknown starts correlate past residuals."""
         p, _, m = self.columns.shape
         if not self.of_residuals:
             return np.zeros(p * m)
@@ -89,19 +83,15 @@ class Regressors(NamedTuple):
 
 
 class Score(NamedTuple):
-    """What regressors explain of residuals once estimated parameters and starts are taken off.
+    """The part of residuals that regressors explain beyond estimated parameters and starts."""
 
-    Attributes:
-        statistic: chi-squared where the model is right, along orthonormal `directions` ((N + M) p, freedom).
-    """
-
-    statistic: float
-    directions: Array
+    statistic: float  # chi-squared where the model is right
+    directions: Array  # ((N + M) p, freedom), orthonormal, of the regressors
     sizes: Array  # (m,), of each regressor alone, in standard deviations up to a common factor
 
 
 def score(white: White, columns: Array, means: Array) -> Score:
-    """Return the score of regressors ((N + M) p, m), whose scores have these means (m,) to begin with."""
+    """Return the score of regressors ((N + M) p, m), whose scores have the means (m,) under the model."""
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     regressors = white.unexplained(columns / norms)
     scores = regressors.T @ white.residuals - white.mean_left(columns / norms, means / norms)
@@ -132,7 +122,7 @@ def score_tests(
 
 
 def tested(white: White, tried: Regressors) -> ScoreTest | None:
-    """Return the test of regressors; None where the estimate explains all of them."""
+    """Return the test of regressors, or None if the estimate explains all of them."""
     found = score(white, tried.white(white), tried.means(white))
     freedom = found.directions.shape[1]
     if not freedom:
@@ -159,7 +149,7 @@ def failed(
     """Return the tests that refute the model, each at its share of the level of its group (Bonferroni).
 
     Args:
-        looks: how often the tests are repeated as data come in; the looks share the level as well.
+        looks: number of times that the tests are repeated as data come in; they share the level as well.
     """
     groups = ((directed, "one parameter"), (tests, "many signals"), (shifts, "level shift"))
     return tuple(
@@ -208,8 +198,8 @@ def robust_white(
 def future_tests(records: Records, theta: Array, white: White) -> tuple[ScoreTest, ...]:
     """Return for every input the test whether its future explains prediction errors.
 
-    In open loop no input knows them beforehand. One does that answers the outputs, or that was logged late.
-    Whatever past inputs explain is taken off, since an input is foretold by its own past.
+    In open loop no input anticipates them. An input that answers the outputs, or was logged late, does.
+    Whatever past inputs explain is taken off, since the past of an input predicts the input itself.
     """
     channels = records.u.shape[1] + records.y.shape[1]
     last = min(_AHEAD, max(records.samples // (_SAMPLES_A_DIRECTION * channels), 1))
@@ -225,7 +215,7 @@ def future_tests(records: Records, theta: Array, white: White) -> tuple[ScoreTes
 
 
 def past_inputs(records: Records, theta: Array, *, feedback: bool) -> list[Regressors]:
-    """Return past inputs at lags of the structure, and sums of them over ever longer runs of lags."""
+    """Return past inputs at lags of the structure, and their sums over ever longer runs of lags."""
     n, first = records.samples, int(feedback)
     u = records.whitened(theta, records.u)
     most = max(n // _SAMPLES_A_DIRECTION, 2) // u.shape[2]
@@ -238,7 +228,7 @@ def past_inputs(records: Records, theta: Array, *, feedback: bool) -> list[Regre
 
 
 def past_residuals(records: Records, white: White) -> list[Regressors]:
-    """Return past residuals at few lags and at many."""
+    """Return two sets of past residuals, at few lags and at many."""
     n, p = records.y.shape
     most = max(max(n // _SAMPLES_A_DIRECTION, 2) // p, 1)
     few, many = (_runs(1, min(lags, most) + 1) for lags in (_FEW, _LAGS))
@@ -250,7 +240,7 @@ def past_residuals(records: Records, white: White) -> list[Regressors]:
 
 
 def _trend(records: Records, theta: Array) -> Regressors:
-    """Return powers of time and slow waves."""
+    """Return the regressors of a drift: powers of time and slow cosines."""
     time = np.concatenate([np.linspace(-1.0, 1.0, length) for length in records.lengths])
     slow = [time**power for power in range(_TRENDS)]
     slow += [np.cos(0.5 * np.pi * k * (1.0 + time)) for k in range(1, _WAVES + 1)]
@@ -258,7 +248,7 @@ def _trend(records: Records, theta: Array) -> Regressors:
 
 
 def _runs(first: int, last: int, *, growth: float = 1.0) -> list[tuple[int, int]]:
-    """Return lags one by one, or in ever longer runs: the first of each, and one past its last."""
+    """Return the first lag of each run, and one past its last; runs are single lags, or grow."""
     runs: list[tuple[int, int]] = []
     begin, width = first, 1.0
     while begin < last:

@@ -23,7 +23,7 @@ _SAMPLES_A_PARAMETER = 3
 
 
 def signal_name(letter: str, channel: int, channels: int) -> str:
-    """Return how the signal of a channel is called in messages: `u2`, or `u` where it is the only one."""
+    """Return the name of a channel's signal in messages: `u2`, or `u` where it is the only one."""
     return letter if channels == 1 else f"{letter}{channel + 1}"
 
 
@@ -44,7 +44,7 @@ def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1
 
 
 def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
-    """No channel keeps one value throughout.
+    """Check that no channel keeps one value throughout.
 
     Args:
         names: of the parameters, for the diagnostic.
@@ -72,7 +72,7 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
 
 
 def check_noisy(covariance: Array, y: Array) -> None:
-    """Check residuals of this `covariance` (p, p): of y (n, p) they are more than rounding, and independent.
+    """Check that residuals of this `covariance` (p, p) exceed rounding of y (n, p) and are independent.
 
     Raises:
         SpecError: `noise-free-data`.
@@ -101,7 +101,7 @@ def check_noisy(covariance: Array, y: Array) -> None:
 
 
 def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array) -> Array:
-    """Return L (k, k), lower triangular, with M = L L^T the information matrix of the data.
+    """Return the triangular factor L (k, k) of the information matrix of the data, M = L L^T.
 
     Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
     common and mean no lack of excitation. So M is never formed, and directions count as undetermined only

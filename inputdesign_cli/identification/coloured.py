@@ -31,17 +31,17 @@ class ColouredKind(Kind):
 
     @property
     def recent(self) -> int:
-        """Return the lag up to which the structure looks at the inputs."""
+        """Return the largest lag at which inputs act directly on the plant."""
         return self.plant.recent
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
-        """Return `explaining` of the plant, with False for C and D (k,)."""
+        """Return the mask (k,) `explaining` of the plant, with False for C and D."""
         return np.concatenate([self.plant.explaining, np.zeros(len(self.model.own_parameters), dtype=bool)])
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """Return `whitening` of the plant, with True for C and D (k,)."""
+        """Return the mask (k,) `whitening` of the plant, with True for C and D."""
         return np.concatenate([self.plant.whitening, np.ones(len(self.model.own_parameters), dtype=bool)])
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -61,39 +61,39 @@ class ColouredKind(Kind):
         return errors, psi
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """Return the starts of the plant, filtered, and the effect of noise before the record through C/D."""
+        """Return the filtered starts of the plant, and the effect of noise before the record through C/D."""
         raw = self.plant.starts(theta[: self._first], samples, late, free=free)
         filters = self.model.at(theta).inverse_filters
         return tuple(start.through(C, D) for start, (D, C) in zip(raw, filters, strict=True))
 
     def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
         """Return the parameters on which the starts depend: in the plant, and all of C and D."""
-        own = np.arange(self._first, len(self.names))
+        own = np.arange(self._first, len(self.model.names))
         return np.concatenate([self.plant.in_starts(late, free=free), own])
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return the step of the plant, or that of a coefficient of C and D."""
+        """Return the differentiation step of a parameter of the plant, or of a coefficient of C and D."""
         if index < self._first:
             return self.plant.start_step(theta[: self._first], index, samples)
         return super().start_step(theta, index, samples)
 
     def lateness(self, theta: Array) -> int:
-        """Return the lateness of the plant."""
+        """Return the number of samples in which earlier inputs act on the plant; see `Kind`."""
         return self.plant.lateness(theta[: self._first])
 
     @property
     def instants(self) -> float | None:
-        """Return the sampling instants of the plant."""
+        """Return the time between the sampling instants of the plant."""
         return self.plant.instants
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
+        """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         raw = self.plant.whitened(theta[: self._first], signals)
         filters = self.model.at(theta).inverse_filters
         return np.array([filtered(*own, x, axis=0) for own, x in zip(filters, raw, strict=True)])
 
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta with a stable predictor."""
+        """Return theta, changed where its predictor would be unstable."""
         out = theta.copy()
         out[: self._first] = self.plant.stabilised(theta[: self._first], samples)
         for columns in self._monic:
@@ -103,7 +103,7 @@ class ColouredKind(Kind):
         return out
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Return the starts of the plant, each with C and D from its residuals, and the `given` one."""
+        """Return the starting points of the plant, with C and D from its residuals, and the `given` one."""
         known = reduce(np.convolve, {tuple(p): p for p in self.model.fixed}.values())
         clear = [(_clear(known, u), _clear(known, y)) for u, y in parts]
         found = self.plant.starting_points(clear, None if given is None else given[: self._first])
@@ -131,7 +131,7 @@ class ColouredKind(Kind):
         return replace(self, plant=self.plant.holding(known[: self._first]))
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions of the plant; the tests of many signals look at C and D."""
+        """Return the extensions of the plant; the tests with many regressors cover C and D."""
         found, here = [], self.model.at(theta)
         for one in self.plant.extensions(theta[: self._first], feedback=feedback):
             larger = replace(here, plant=one.model)
@@ -149,7 +149,7 @@ class ColouredKind(Kind):
 
     @cached_property
     def _monic(self) -> list[NDArray[np.int64]]:
-        """Return where the coefficients of each C, and of each D that is estimated, stand in theta."""
+        """Return the indices in theta of the coefficients of each C, and of each D that is estimated."""
         groups: dict[tuple[str, tuple[tuple[int, int], ...]], list[int]] = {}
         for index, parameter in enumerate(self.model.own_parameters, start=self._first):
             if self.model.below(parameter.letter, parameter.places[0][0])[0] is not None:
@@ -158,5 +158,5 @@ class ColouredKind(Kind):
 
 
 def _clear(known: Array, signals: Array) -> Array:
-    """Return signals (N, ..) through a polynomial, without the samples that it begins with."""
+    """Return signals (N, ..) filtered by a polynomial, without its first samples, whose past is unknown."""
     return filtered(known, [1.0], signals, axis=0)[known.size - 1 :]

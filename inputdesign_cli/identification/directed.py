@@ -41,40 +41,27 @@ _LEAST = 1e-300
 
 @dataclass(frozen=True)
 class Alternative:
-    """The model with one additional parameter, which is zero in the model.
+    """The model with one additional parameter, which is zero in the model."""
 
-    Attributes:
-        name: of the parameter; `phrase`, what it is, for a sentence.
-        slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
-            each state that a plant may be in.
-        echo: (lags, p, p), how `column` responds to past errors; None if it does not.
-        estimated: returns the larger model from the same data, and the statistic of its likelihood ratio;
-            None if no larger model is estimated.
-    """
-
-    name: str
-    phrase: str
+    name: str  # of the parameter
+    phrase: str  # what it is, for a sentence
     fault: Fault  # what is wrong if it is missing
     column: NDArray[np.float64]  # (N, p), minus the derivative of the prediction errors with respect to it
-    slopes: Callable[[Model, ArrayLike], ComplexArray]
+    slopes: Callable[[Model, ArrayLike], ComplexArray]  # dG by it at (n,), of each state, (states, n, p, r)
     lag: bool = False  # whether it is a pole or a dead time of the plant
-    echo: NDArray[np.float64] | None = None
-    estimated: Callable[[], tuple[Model, float]] | None = None
+    echo: NDArray[np.float64] | None = None  # (lags, p, p), how `column` responds to past errors, if it does
+    estimated: Callable[[], tuple[Model, float]] | None = None  # larger model, its likelihood ratio
 
 
 @dataclass(frozen=True)
 class Directed:
-    """One parameter more than the model has.
-
-    Attributes:
-        alternatives: the parameters that act alike on these data where they are small, the likeliest first.
-        size: the first of them, to first order; `deviation`, its standard deviation.
-    """
+    """The test of one parameter that the model does not have, and its estimate."""
 
     test: ScoreTest  # whether these data ask for it
+    # That act alike on these data where they are small, the likeliest first.
     alternatives: tuple[Alternative, ...]
-    size: float
-    deviation: float
+    size: float  # of the first of them, to first order
+    deviation: float  # its standard deviation
     following: Array  # (k,), how the parameters of the model change with it, to first order
     larger: Model | None = None  # the estimate of the larger model, where it was looked for
 
@@ -89,13 +76,13 @@ class Directed:
         return any(alternative.lag for alternative in self.alternatives)
 
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """Return how G of the estimated `model` changes if the parameter is estimated, (states, n, p, r)."""
+        """Return the change (states, n, p, r) of G of the estimated `model` if the parameter is estimated."""
         if self.larger is not None:
             return np.asarray(self.larger.plant_at(w) - model.plant_at(w))[None]
         return self.size * self.slope(model, w)
 
     def slope(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """Return the derivative of G by the parameter, the others following: (states, n, p, r)."""
+        """Return the derivative (states, n, p, r) of G by the parameter if the others follow."""
         others = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
         return np.asarray(others + self.alternatives[0].slopes(model, w))
 
@@ -107,7 +94,7 @@ _Tried = tuple[Alternative, Array, Array]
 def directed_tests(
     white: White, alternatives: Sequence[Alternative], parameters: int
 ) -> tuple[Directed, ...]:
-    """Return the test of every alternative; alternatives that these data cannot distinguish share one.
+    """Return the test of every alternative; alternatives that these data cannot distinguish share one test.
 
     Args:
         parameters: k of the model.
@@ -156,7 +143,7 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
 
 
 def _score(white: White, tried: _Tried) -> tuple[Score, float]:
-    """Return the score of a regressor, and the mean of it in its standard deviations."""
+    """Return the score of a regressor, and its mean in standard deviations of the score."""
     alternative, column, along = tried
     mean = np.zeros(1)
     if alternative.echo is not None:
@@ -193,13 +180,13 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
     point, others = evaluate(records, theta), np.arange(theta.size) != index
     slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
     cost = point.cost - float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
-    ratio = float(point.near.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
+    ratio = float(point.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
     return model.at(found.theta[0]), ratio
 
 
 @dataclass(frozen=True)
 class Moves:
-    """What a parameter more does to G at n frequencies, in units of the admissible error."""
+    """The change of G at n frequencies by an added parameter, in units of the admissible error."""
 
     estimated: Array  # (n,), how far G moves if the parameter is estimated along
     deviation: Array  # (n,), the standard deviation of that
@@ -236,8 +223,8 @@ class Moves:
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
     """Return the indices of the parameters that speak against a verdict of |error of G| <= r_adm.
 
-    It is neither enough nor necessary that the parameter is beyond chance: what counts is that it exists and
-    that G is beyond r_adm, after the estimated move and with its uncertainty.
+    It is neither enough nor necessary that the parameter is significant. It must exist, and G must be beyond
+    r_adm after the estimated move and with its uncertainty.
     """
     # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
     # G by more than is admitted, at a level that is shared among all that would. What is not a number is no

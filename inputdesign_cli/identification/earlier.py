@@ -30,13 +30,13 @@ class Earlier:
 
     @property
     def rows(self) -> Array:
-        """Return R (k, k) with R^T R the information."""
+        """Return a square root R (k, k) of the information, R^T R."""
         scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         values, vectors = np.linalg.eigh(self.information / np.outer(scale, scale))
         return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale)
 
     def slope(self, theta: Array) -> Array:
-        """Return half the gradient (k,) of q."""
+        """Return half the gradient (k,) of q at theta."""
         return np.asarray(self.information @ (theta - self.theta))
 
     def q(self, theta: Array) -> float:
@@ -44,7 +44,7 @@ class Earlier:
         return float(np.sum((self.rows @ (theta - self.theta)) ** 2))
 
     def is_of_these_data(self, theta: Array, factor: Array) -> bool:
-        """Return whether the estimate is of these data: it has half of the information and moves nothing.
+        """Return whether the estimate is of these data: it has half of the information, and theta stays.
 
         Other data of the same length have another input or another noise, and move theta by a deviation.
 

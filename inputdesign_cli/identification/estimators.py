@@ -6,40 +6,43 @@ A new kind of model registers what it supplies with `estimator`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import singledispatch
+from dataclasses import dataclass, replace
+from functools import cached_property, singledispatch
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+import scipy
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.identification.checks import check_length, check_varying
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying, factor_of_data
 from inputdesign_cli.identification.coloured import ColouredKind
+from inputdesign_cli.identification.directed import alternative
 from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.estimate import (
-    BatchEstimate,
-    Estimate,
-    concluded,
-    information_of,
-    noise_of,
-)
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import Kind, Starts
 from inputdesign_cli.identification.polynomial_rows import FromRest
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.records import (
+    Point,
     RecordProblem,
     Records,
     centred,
     evaluate,
     inverses,
     longest,
+    shares,
     split,
 )
 from inputdesign_cli.identification.reparametrised import ReparametrisedKind
-from inputdesign_cli.identification.search import Search, from_rest_or_free, search
+from inputdesign_cli.identification.search import Rival, Search, from_rest_or_free, search
 from inputdesign_cli.identification.state_space import StateSpaceKind
+from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.transfer_matrix import TransferKind
+from inputdesign_cli.identification.variations import variations
+from inputdesign_cli.information.coordinates import triangular_factor
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -56,11 +59,87 @@ Lengths = Sequence[int] | None
 
 # Numbers that unknown starts may take up: inputs of long dead times are taken for known beyond.
 _MOST = 2e7
+# Parameters this share apart are the same to rounding.
+_LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
+
+
+class Ended(NamedTuple):
+    """The end of a search: whether it settled, after `steps` from the best of `starts`, and other minima."""
+
+    converged: bool
+    steps: int
+    starts: int
+    rivals: tuple[Rival, ...]
+
+
+class Begun(NamedTuple):
+    """The start of the records: at rest, or unknown."""
+
+    free: bool  # whether unknown starts and levels were estimated along with theta
+    rest_refuted: bool  # whether the records say that they do not begin at rest about zero
+    first: Array  # (records, p), the first residuals if each record began at rest about zero
+
+
+class Simulation(NamedTuple):
+    """The response of the model to the inputs and the start of each record."""
+
+    outputs: Array  # (samples, p)
+    fit: tuple[float | None, ...]  # per cent of the rms of y that it explains, by output; None if unstable
+
+
+class Agreement(NamedTuple):
+    """The agreement of the data with an earlier estimate that is combined with them."""
+
+    differing: float  # the probability that two estimates of one system differ as much
+    alike: float  # the probability that one from other data agrees as closely
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A prediction-error estimate of a model with p outputs, r inputs and k parameters."""
+
+    names: tuple[str, ...]  # (k,)
+    theta: Array  # (k,)
+    factor: Array  # L (k, k), lower triangular, L L^T the information
+    noise: Array  # (p, p) covariance of e; of white noise on the samples where the model knows no other
+    errors: Array  # (samples, p) prediction errors at theta
+    lengths: tuple[int, ...]  # the samples of each of the records, which follow each other
+    search: Ended
+    start: Begun
+    simulation: Simulation
+    prior: Agreement | None  # None without an earlier estimate
+    tests: Tests
+
+    def with_rivals(self, rivals: tuple[Rival, ...]) -> Estimate:
+        """Return the estimate with other rivals."""
+        return replace(self, search=self.search._replace(rivals=rivals))
+
+    @cached_property
+    def information(self) -> Array:
+        """Return the information matrix (k, k) of the parameters."""
+        return self.factor @ self.factor.T
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Return the covariance (k, k) from the factor: the information may be singular to rounding."""
+        half = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.factor)), lower=True)
+        return np.asarray(half.T @ half)
+
+
+@dataclass(frozen=True)
+class BatchEstimate:
+    """Prediction-error estimates of many records."""
+
+    theta: Array  # (runs, k)
+    noise: NDArray[np.float64]  # (runs, p, p) covariance of e, unbiased to first order
+    information: NDArray[np.float64]  # (runs, k, k), whose inverse is the covariance of theta
+    converged: NDArray[np.bool_]  # (runs,)
+    steps: NDArray[np.int64]  # (runs,)
 
 
 @singledispatch
 def estimator(model: Model, step: float) -> Kind:
-    """Return what models of this kind supply to be estimated, from samples `step` apart.
+    """Return the structure of the estimator for models of this kind, from samples `step` apart.
 
     Models in discrete time have their own step.
 
@@ -121,8 +200,8 @@ def identify(
             `not-exciting`.
     """
     kind, inputs, outputs = estimator(model, step), np.asarray(u, dtype=float), np.asarray(y, dtype=float)
-    check_length(len(outputs), len(kind.names), kind.recent, outputs=kind.outputs)
-    check_varying(kind.names, inputs, outputs)
+    check_length(len(outputs), len(kind.model.names), kind.recent, outputs=kind.model.outputs)
+    check_varying(kind.model.names, inputs, outputs)
     parts = tuple(split(inputs, outputs, lengths))
 
     def searched(records: Records, known: Array | None) -> Search:
@@ -131,8 +210,8 @@ def identify(
             begin = Starts(start[None], 1)
         else:
             begin = kind.starting_points(centred(chosen) if records.free else chosen, start)
-        others = [theta[None] for theta in (known, earlier and earlier.theta) if theta is not None]
-        points = np.concatenate([begin.points, *others])
+        others = [] if earlier is None else [earlier.theta[None]]
+        points = np.concatenate([begin.points, *([] if known is None else [known[None]]), *others])
         tell(Counted("starting points followed to a minimum", 0, len(points)))
         return search(records, points, starts=begin.tried + (earlier is not None))
 
@@ -154,7 +233,7 @@ def fit_batch(
     """
     kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
-    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.names)))
+    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.model.names)))
     return _fitted(kind, inputs, outputs, np.array(begin))
 
 
@@ -171,7 +250,7 @@ def _fitted(kind: Kind, u: Array, y: Array, start: Array) -> BatchEstimate:
 
 @_fitted.register
 def _(kind: PolynomialKind, u: Array, y: Array, start: Array) -> BatchEstimate:
-    """Return the estimates from records at rest, noise as well, all in one go."""
+    """Return the estimates from records that begin at rest, noise as well, all in one pass."""
     problem = FromRest.of(kind.model, u, y)
     found = minimise(problem, start)
     sums = problem.sums(found.theta)
@@ -217,3 +296,124 @@ def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) ->
     late = records.kind.lateness(model.theta)
     free = records.begun_freely(late if late * u.shape[1] * y.shape[1] * y.size <= _MOST else 0)
     return information_of(free, evaluate(free, model.theta), model.covariance)
+
+
+def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: bool) -> Estimate:
+    """Return the estimate with its covariance and the tests of its residuals.
+
+    Args:
+        found: where the search ended.
+        y: (samples, p), the outputs as measured.
+        experiments: the samples of each experiment.
+        feedback: whether u(t) depends on y(t).
+
+    Raises:
+        SpecError: `noise-free-data` or `not-exciting`.
+    """
+    records, point, kind, theta = found.records, found.point, found.records.kind, found.point.theta
+    noise = noise_of(records, point)
+    check_noisy(noise, records.y)
+    factor, earlier = factor_at(records, point, noise), records.earlier
+    simulation = _simulation(records, point, y)
+    known = None if kind.continuous or None in simulation.fit else simulation.outputs
+    larger = [alternative(one, records) for one in kind.extensions(theta, feedback=feedback)]
+    alternatives = [*larger, *variations(records, theta, known)]
+    prior = None
+    if earlier is not None:
+        prior = Agreement(earlier.agreement(theta, factor), earlier.likeness(theta, factor))
+    return Estimate(
+        kind.model.names,
+        np.asarray(theta, dtype=float),
+        _over_minima(found, factor, noise),
+        noise,
+        point.errors,
+        records.lengths,
+        Ended(found.converged, found.steps, found.starts, found.rivals),
+        Begun(records.free, found.rest_refuted, found.first),
+        simulation,
+        prior,
+        tests_of(records, point, noise, alternatives, experiments=experiments, feedback=feedback),
+    )
+
+
+def _simulation(records: Records, point: Point, y: Array) -> Simulation:
+    """Return the simulated outputs: the outputs less the part that prediction errors cause."""
+    kind, ends = records.kind, np.cumsum(records.lengths)[:-1]
+    model = kind.model.at(point.theta)
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        noise = [
+            model.simulate(0.0 * u, e, 1.0)[1]
+            for (u, _), e in zip(records.parts, np.split(point.errors, ends), strict=True)
+        ]
+    outputs = y - np.concatenate(noise)
+    varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, ends)])
+    with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
+        left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)
+    able = kind.simulates(point.theta)
+    fit = (float(100.0 * (1.0 - x)) if runs else None for x, runs in zip(left, able, strict=True))
+    return Simulation(outputs, tuple(fit))
+
+
+def noise_of(records: Records, point: Point) -> Array:
+    """Return the covariance (p, p) of e, corrected for the parameters of every output and unknown starts."""
+    samples, outputs = point.errors.shape
+    own = shares(np.any(records.from_rest(point.theta)[1], axis=1))
+    left = np.sqrt(np.maximum(samples - own - point.unknowns / outputs, 1.0))
+    every = point.all_errors
+    return np.asarray(every.T @ every / np.outer(left, left))
+
+
+def factor_at(records: Records, point: Point, noise: Array) -> Array:
+    """Return the triangular factor of the information matrix of records about the parameters.
+
+    Raises:
+        SpecError: `not-exciting`.
+    """
+    # What is known besides the data counts as further rows.
+    known = np.zeros((0, point.theta.size)) if records.earlier is None else records.earlier.rows
+    root = np.linalg.cholesky(_weights(records, noise)).T
+    last = _LAST_DIGITS * np.resize([1.0, -1.0], point.theta.size)
+    rows, again = (
+        np.concatenate([(psi @ root.T).reshape(len(psi), -1).T, known])
+        for psi in (point.all_psi, records.at(point.theta * (1.0 + last)).all_psi)
+    )
+    return factor_of_data(records.kind.model.names, point.theta, rows, again)
+
+
+def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
+    """Return the information of a mixture if minima beyond sampling instants are about as likely.
+
+    The weight of each is its likelihood times the square root of the determinant of its covariance (Laplace's
+    method, [tierney-kadane-1986]). The covariance is that of the mixture about the estimate.
+
+    Args:
+        factor: L (k, k) of the best minimum alone, its information L L^T.
+    """
+    logarithms, spreads = [0.0], [np.eye(len(factor))]
+    for point, excess in found.beside:
+        try:
+            own = factor_at(found.records, point, noise)
+        except SpecError:  # what determines nothing there has no covariance to count
+            continue
+        # In units of the best minimum's own deviations.
+        half = scipy.linalg.solve_triangular(own, factor, lower=True)
+        away = factor.T @ (point.theta - found.point.theta)
+        spreads.append(half.T @ half + np.outer(away, away))
+        smaller = np.sum(np.log(np.abs(np.diag(factor) / np.diag(own))))
+        logarithms.append(float(smaller - 0.5 * excess))
+    if len(logarithms) == 1:
+        return factor
+    weights = np.exp(np.array(logarithms) - max(logarithms))
+    mixture = np.tensordot(weights, spreads, 1) / np.sum(weights)
+    rows = scipy.linalg.solve_triangular(np.linalg.cholesky(mixture), factor.T, lower=True)
+    return triangular_factor(rows)[0]
+
+
+def information_of(records: Records, point: Point, noise: Array) -> Array:
+    """Return the information matrix (k, k): the sum over the samples of psi noise^-1 psi^T."""
+    return replace(point.of_errors, weights=_weights(records, noise)).hessian
+
+
+def _weights(records: Records, noise: Array) -> Array:
+    """Return the weights W (p, p): the inverse of the noise, which may be no more than rounding."""
+    return inverses((noise + records.rounding)[None])[0][0]

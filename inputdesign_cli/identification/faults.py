@@ -47,7 +47,7 @@ _LAGS, _BETTER, _GOOD = (-2, -1, 1, 2), 0.1, 0.3
 
 
 class Spikes(NamedTuple):
-    """Samples whose errors in one output hold the `share` of the sum of squares there."""
+    """The samples whose errors in one output hold the `share` of the sum of squares there."""
 
     output: int
     samples: tuple[int, ...]
@@ -55,7 +55,7 @@ class Spikes(NamedTuple):
 
 
 class Frozen(NamedTuple):
-    """Output `output` stands still for `length` samples from `first` on."""
+    """A stretch in which output `output` stands still for `length` samples from `first` on."""
 
     output: int
     first: int
@@ -77,7 +77,7 @@ class Shift(NamedTuple):
 
 
 def spikes(errors: Array) -> list[Spikes]:
-    """Of prediction errors (samples, p): output by output, where few hold most of the sum of squares."""
+    """Return the spikes of prediction errors (samples, p): a few samples with most of the sum of squares."""
     found = []
     for output, e in enumerate(errors.T):
         spread = float(np.median(np.abs(e))) / _NORMAL
@@ -92,9 +92,9 @@ def spikes(errors: Array) -> list[Spikes]:
 
 
 def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spikes]:
-    """Of outputs (N, p) of inputs that repeat, by how each of the periods that count differs from the others.
+    """Return the spikes of outputs (N, p) of inputs that repeat, as differences between the periods.
 
-    Medians of the periods, and over them, so that neither a spike nor a level that drifts counts elsewhere.
+    Medians of the periods, and over them, keep a spike or a drifting level from counting elsewhere.
 
     Args:
         repeats: see `Periods.parts`.
@@ -124,7 +124,7 @@ def frozen(
         resolution: (p,), the step in which each output is recorded.
         u: (samples, r).
         errors: (samples, p), of prediction.
-        apart: (samples, p), the record less what the model simulates.
+        apart: (samples, p), the record less the simulation by the model.
         simulated: (samples, p).
         lengths: of the stretches without gaps.
     """
@@ -147,7 +147,7 @@ def frozen(
 
 
 def resolution_of(y: Array) -> Array:
-    """(p,): the step in which outputs y (n, p), NaN where missing, are recorded; little for plain noise."""
+    """Return the resolution (p,) of outputs y (n, p), NaN where missing; it is small for plain noise."""
     found = np.zeros(y.shape[1])
     for output, x in enumerate(y.T):
         steps = np.abs(np.diff(x[~np.isnan(x)]))
@@ -158,7 +158,7 @@ def resolution_of(y: Array) -> Array:
 
 
 def _likely(errors: Array, d: float) -> float:
-    """Return the largest probability that a sample falls into the cell of the last one."""
+    """Return the largest probability that a sample falls into the same cell as the last one."""
     if len(errors) < _FEWEST or not np.any(errors):
         return 1.0
     white = Whitening.of(errors, (len(errors),)).through(errors[None])
@@ -171,7 +171,7 @@ def _spread(x: NDArray[np.float64]) -> float:
 
 
 def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: Sequence[int]) -> list[Shift]:
-    """By input, the shift of u (n, m), y (n, p) or r (n, m) by which they obey u = r - C y, if one is better.
+    """Return by input the shift of u (n, m), y (n, p) or r (n, m) that makes u = r - C y hold much better.
 
     Args:
         lengths: of the stretches without gaps; levels are taken away from each.
@@ -192,7 +192,7 @@ def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: S
 def _left(
     controller: TransferMatrix, i: int, parts: Sequence[tuple[Array, ...]], letter: str, lag: int
 ) -> float:
-    """Return the rms of q u - q r + P y of an input over that of q u, the signals of a letter moved."""
+    """Return the rms of q u - q r + P y relative to q u, with the signals of one letter shifted."""
     most = max(map(abs, _LAGS))
     P, q = controller.numerator[i], controller.denominator[i]
     memory = max(P.shape[1], len(q)) - 1

@@ -51,16 +51,12 @@ _Found = tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[n
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """An estimate of G at n frequencies.
-
-    Attributes:
-        radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
-        noise: (n, p): the spectrum of the unexplained part of y; for white noise it is the variance.
-    """
+    """An estimate of G at n frequencies."""
 
     frequency: Array  # (n,), rad/sample
     G: ComplexArray  # (n, p, r)
-    radius: NDArray[np.float64]
+    radius: NDArray[np.float64]  # (n, p, r): of the disc about G that holds the true one with 95 %
+    # (n, p): the spectrum of the unexplained part of y, for white noise its variance.
     noise: NDArray[np.float64]
     coherence: NDArray[np.float64]  # (n, p): the share of the spectrum of y that the inputs explain
     method: Method  # how it was estimated
@@ -121,7 +117,7 @@ def found_period(x: Array) -> int:
 
 
 def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.int64]:
-    """Return samples until the response to a pulse first has a tenth of its largest value, (p, r); else 0.
+    """Return the samples (p, r) until a pulse response first has a tenth of its largest value, otherwise 0.
 
     Args:
         samples: of the record; later responses are not looked for.
@@ -136,7 +132,7 @@ def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.in
 
 
 def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
-    """What outputs have at odd and even harmonics that one input (N, 1) which repeats does not excite.
+    """Return the output power at odd and even harmonics that one repeating input (N, 1) does not excite.
 
     Empty where it does not repeat, or excites all of a kind.
     """
@@ -165,7 +161,7 @@ def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
 
 
 def _local_polynomial(records: _Records) -> FrequencyResponse | None:
-    """Return the response at lines of the longest record, not a number where inputs are not separable."""
+    """Return the response at lines of the longest record, NaN where inputs are not separable."""
     (_, u, y), longest = records[0], max(len(y) for *_, y in records)
     window = _window(records)
     if min(len(y) for *_, y in records) < 2 * window + 4:
@@ -183,38 +179,38 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
     if last > _MOST_FREQUENCIES:
         lines = np.unique(np.geomspace(1, last, _MOST_FREQUENCIES).round())
     frequency = np.asarray(2.0 * np.pi * lines / longest)
-    found = []
+    found: list[_Found] = []
     for w in frequency:
         one = _at(w, transformed, window, u.shape[1], _PARABOLA)
         if one is None:
             unknown, each = np.full((y.shape[1], u.shape[1]), np.nan), np.full(y.shape[1], np.nan)
             found.append((unknown + 0j, unknown, each, each))
             continue
-        G, radius, *more = one
+        G, radius, noise, coherence = one
         # What a parabola may be off where G bends: as much as a line is off it, beyond the noise.
         straight = _at(w, transformed, window, u.shape[1], _PARABOLA - 1)
         apart = 0.0 if straight is None else np.abs(G - straight[0]) ** 2
-        found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), *more))
-    each = (np.array(values) for values in zip(*found, strict=True))
-    return FrequencyResponse(frequency, *each, "local_polynomial")
+        found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), noise, coherence))
+    responses, discs, spectra, shares = (np.array(values) for values in zip(*found, strict=True))
+    return FrequencyResponse(frequency, responses, discs, spectra, shares, "local_polynomial")
 
 
 def _usable(found: FrequencyResponse | None) -> FrequencyResponse | None:
-    """Return the response where it is a number; None if it is nowhere."""
+    """Return the response at its finite frequencies; None if there are none."""
     if found is None or not np.any(at := np.all(np.isfinite(found.noise), axis=1)):
         return None
-    every = (found.frequency, found.G, found.radius, found.noise, found.coherence)
-    return FrequencyResponse(*(values[at] for values in every), found.method)
+    G, radius, noise, coherence = found.G[at], found.radius[at], found.noise[at], found.coherence[at]
+    return FrequencyResponse(found.frequency[at], G, radius, noise, coherence, found.method)
 
 
 def _window(records: _Records) -> int:
-    """Return how many lines of each record the parabolas are fitted to."""
+    """Return the number of lines of each record that the parabolas are fitted to."""
     unknowns = _PARABOLA * (records[0][1].shape[1] + len(records))
     return -(-(unknowns + _FREEDOM) // len(records)) + 1
 
 
 def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse | None:
-    """The response, output by output, to inputs that are delayed first; what lies before them is left out."""
+    """Return the response to delayed inputs, output by output, without the samples that lie before them."""
     found, begin = [], int(delays.max())
     for i, late in enumerate(delays):
         moved = []
@@ -228,12 +224,12 @@ def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse 
         turned = np.exp(-1j * np.outer(one.frequency, late))[:, None]
         found.append((one.G * turned, one.radius, one.noise, one.coherence))
         frequency = one.frequency
-    each = (np.concatenate(values, axis=1) for values in zip(*found, strict=True))
-    return FrequencyResponse(frequency, *each, "local_polynomial")
+    G, radius, noise, coherence = (np.concatenate(values, axis=1) for values in zip(*found, strict=True))
+    return FrequencyResponse(frequency, G, radius, noise, coherence, "local_polynomial")
 
 
 def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> _Found | None:
-    """Return what polynomials of some terms say at w; None if inputs are not separable."""
+    """Return the local estimate at w from polynomials of some terms; None if inputs are not separable."""
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):
         last = (lines.size - 1) // 2
@@ -273,5 +269,5 @@ def _coherence(explained: NDArray[np.float64], noise: NDArray[np.float64]) -> ND
 
 
 def _radius(variance: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:
-    """|error|^2 over its estimated variance is of the F distribution with 2 and 2 `freedom` degrees."""
+    """Return the radius of confidence: |error|^2 / variance follows F with 2 and 2 `freedom` degrees."""
     return np.asarray(np.sqrt(variance * scipy.special.fdtri(2, 2 * freedom, CONFIDENCE)))

@@ -40,20 +40,20 @@ class Problem(Protocol):
         """Return the number of prediction errors of a run."""
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
-        """Cost (runs,), half its Hessian to first order (runs, k, k), minus half its gradient (runs, k).
+        """Return cost (runs,), half its first-order Hessian (runs, k, k), minus half its gradient (runs, k).
 
         A cost that overflows is infinite.
         """
 
     def stabilised(self, theta: Array) -> Array:
-        """Return theta (runs, k), moved where its predictor would be unstable; a copy."""
+        """Return a copy of theta (runs, k), changed where its predictor would be unstable."""
 
     def kept(self, runs: NDArray[np.bool_]) -> Self:
         """Return the same problem with some of its runs only."""
 
 
 class Minimum(NamedTuple):
-    """Where the search ended: theta (runs, k), cost (runs,), the Hessian of `Problem.at` there."""
+    """The end of the search: theta (runs, k), cost (runs,), and the Hessian of `Problem.at` there."""
 
     theta: Array
     cost: Array
@@ -62,7 +62,7 @@ class Minimum(NamedTuple):
     steps: NDArray[np.int64]
 
     def and_of(self, other: Minimum, runs: NDArray[np.bool_] | slice = slice(None)) -> Minimum:
-        """Return these runs, then some `runs` of another."""
+        """Return these runs, followed by some `runs` of another minimum."""
         return Minimum(*(np.concatenate([mine, its[runs]]) for mine, its in zip(self, other, strict=True)))
 
 
@@ -70,8 +70,8 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
     """Minimise the cost of every run from `start` (runs, k), in `most` steps at most.
 
     Args:
-        idle: a run has settled as well where ten steps take less than this off -2 log likelihood, or where
-            no step however short takes anything; at zero it has not, and is given up.
+        idle: the decrease of -2 log likelihood in ten steps below which a run has settled. It has settled as
+            well where no step, however short, decreases the cost. At zero such a run is given up.
     """
     theta = problem.stabilised(start)
     runs = theta.shape[0]
@@ -124,7 +124,7 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
 
 
 def best_run(found: Minimum) -> int:
-    """Of several starts of one record the run of least cost; one that settled, if it is as good."""
+    """Return the run of least cost, of several starts of one record; a settled one if it is as good."""
     best = int(np.argmin(np.where(np.isfinite(found.cost), found.cost, np.inf)))
     settled = found.converged & (found.cost <= found.cost[best] * (1 + 1e-6))
     if np.any(settled):
@@ -133,7 +133,7 @@ def best_run(found: Minimum) -> int:
 
 
 def _step(hessian: NDArray[np.float64], slope: Array, damping: Array) -> tuple[Array, Array]:
-    """(H + damping diag H)^-1 g (runs, k) in scaled coordinates, and the gain that it promises (runs,)."""
+    """Return the step (H + damping diag H)^-1 g (runs, k), scaled, and the gain that it promises (runs,)."""
     k = slope.shape[1]
     scale = np.sqrt(np.maximum(np.einsum("rii->ri", hessian), 1e-300))
     scaled = hessian / (scale[:, :, None] * scale[:, None, :])

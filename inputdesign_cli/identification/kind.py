@@ -18,36 +18,32 @@ from inputdesign_cli.plant.model import Listed
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""
 
-# Of a parameter, or of one, for central differences.
+# Step of central differences, times max(|theta|, 1).
 _STEP = 1e-6
+FADED = 2000
+"""Samples after which noise that fades has faded."""
 
 
 class Starts(NamedTuple):
-    """Where a search begins: points (n, k), and how many points were tried."""
+    """The starting points (n, k) of a search, and the number of points that were tried."""
 
     points: Array
     tried: int
 
     def and_given(self, given: Array | None) -> Starts:
-        """Return the starts after the `given` one (k,), if any."""
+        """Return the starts, preceded by the `given` one (k,) if there is one."""
         if given is None:
             return self
         return Starts(np.concatenate([given[None], self.points.reshape(-1, given.size)]), self.tried + 1)
 
 
 class Extension(NamedTuple):
-    """An additional parameter of a structure.
+    """An additional parameter of a structure."""
 
-    Attributes:
-        model: the larger model, whose new parameter is zero. If the model has other parameters than its
-            coefficients, this is the model of the coefficients.
-        name: of the new parameter; `what` it is.
-    """
-
-    model: Listed
+    model: Listed  # the larger model, whose new parameter is zero, by its coefficients
     kind: Kind  # of the larger model; in place of `model`, it may be behind a hold
-    name: str
-    what: str
+    name: str  # of the new parameter
+    what: str  # it is
     nested: bool = True  # whether that structure has no further freedom than the one parameter
 
 
@@ -62,23 +58,13 @@ class Kind(ABC):
     model: Model
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names (k,) of the parameters."""
-        return self.model.names
-
-    @property
-    def outputs(self) -> int:
-        """Return the number of outputs p."""
-        return self.model.outputs
-
-    @property
     def continuous(self) -> bool:
         """Return whether frequencies of the model are in rad per time unit."""
         return self.model.continuous
 
     @property
     def recent(self) -> int:
-        """Return the lag up to which the structure looks at the inputs; of others they act through poles."""
+        """Return the largest lag at which an input enters directly; older inputs act through the poles."""
         return 0
 
     @property
@@ -108,11 +94,11 @@ class Kind(ABC):
         """Return the parameters on which the starts depend."""
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return by how much a parameter is moved to differentiate the starts."""
+        """Return the step of a parameter in the numerical derivative of the starts."""
         return _STEP * max(abs(float(theta[index])), 1.0)
 
     def lateness(self, theta: Array) -> int:
-        """Return the samples in which inputs from before a record act by other ways than the states."""
+        """Return the number of samples in which inputs before a record act other than through the states."""
         return 0
 
     @property
@@ -132,16 +118,16 @@ class Kind(ABC):
         return np.array(found).reshape(-1, 2, theta.size)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
-        return np.repeat(signals[None], self.outputs, axis=0)
+        """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
+        return np.repeat(signals[None], self.model.outputs, axis=0)
 
     @abstractmethod
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta (k,) with a stable predictor."""
+        """Return theta (k,), changed where its predictor would be unstable."""
 
     @abstractmethod
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Return starting points: made from records at rest about zero, and the `given` one (k,)."""
+        """Return starting points from records at rest about zero, and the `given` one (k,)."""
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
         """Return the kind with starting points that keep `known` parameters (k,), if they can do that."""
@@ -156,18 +142,19 @@ class Kind(ABC):
         return ()
 
     def echoes(self, theta: Array, samples: int) -> NDArray[np.float64]:
-        """Return how gradients respond to past errors (k, samples, p, p), by parameter, lag, output, error.
+        """Return the responses of gradients to past errors, (k, lags, p, p): parameter, lag, output, error.
 
-        They are zero of parameters of the plant alone, and where the response does not fade: it is not the
-        noise model that holds such a plant.
+        They are zero for parameters of the plant alone. They count as zero if the response does not fade: it
+        is not the noise model that holds this plant.
         """
-        found = np.zeros((theta.size, samples, self.outputs, self.outputs))
+        samples = min(samples, FADED)
+        found = np.zeros((theta.size, samples, self.model.outputs, self.model.outputs))
         if not np.any(self.whitening):
             return found
         u = np.zeros((samples, self.model.inputs))
         with np.errstate(over="ignore", invalid="ignore"):
-            for j in range(self.outputs):
-                e = np.outer(np.arange(samples) == 0, np.arange(self.outputs) == j).astype(float)
+            for j in range(self.model.outputs):
+                e = np.outer(np.arange(samples) == 0, np.arange(self.model.outputs) == j).astype(float)
                 y = sum(self.model.at(theta).simulate(u, e, 1.0))
                 found[..., j] = self.errors_and_gradient(theta, u, np.asarray(y))[1]
             early, late = (np.abs(part) for part in np.array_split(found, 2, axis=1))
@@ -175,10 +162,10 @@ class Kind(ABC):
         return np.where(fades[:, None, None, None], found, 0.0)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
-        """Return which outputs are stable, so that they can be simulated."""
-        return (True,) * self.outputs
+        """Return whether each output is stable, so that it can be simulated."""
+        return (True,) * self.model.outputs
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:
-    """Return the samples of a record in which inputs before it act through a dead time; none without one."""
+    """Return the number of samples in which inputs before a record act through a dead time; 0 without one."""
     return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0

@@ -38,20 +38,15 @@ _SETTLED, _UNSURE = 3.0, 0.5
 
 @dataclass(frozen=True)
 class LevelShift:
-    """The likeliest shift of an output.
-
-    Attributes:
-        begins, ends: between these samples it likely begins and has settled, the last left out.
-        test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-    """
+    """The likeliest shift of an output."""
 
     output: int  # from zero
     sample: int  # likely the first of it, counted through all records
     lag: float  # the time constant by which it is smooth, in samples; zero of a step
-    begins: int
-    ends: int
+    begins: int  # likely not before this sample
+    ends: int  # likely settled from this sample on
     rises: bool  # whether the output is larger after it
-    test: ScoreTest
+    test: ScoreTest  # of the likelihood ratio, which counts every sample, lag and output that was tried
     score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
     looks: int
     alone: bool  # whether it explains more than a line through its record, or single samples next to it
@@ -65,7 +60,7 @@ class LevelShift:
 def level_shifts(
     records: Records, point: Point, white: White
 ) -> tuple[LevelShift | None, tuple[LevelShift, ...], White]:
-    """Return the likeliest shift, all that refute a model without them, and the estimate without these.
+    """Return the likeliest shift, all shifts that refute the model, and the estimate with these removed.
 
     The first is None in records that are too short for any.
     """
@@ -87,7 +82,7 @@ def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
 
 
 def _by_chance(statistics: Sequence[float], looks: int) -> float:
-    """Return the probability of a sum of statistics as large, each the largest of `looks`."""
+    """Return the probability of a sum of statistics as large by chance, each the largest of `looks`."""
     size = len(statistics)
     return min(float(looks) ** size * float(scipy.special.chdtrc(size, sum(statistics))), 1.0)
 
@@ -115,7 +110,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
     power = float(white.residuals @ white.residuals) / outputs
     share = min(score * white.variance / power, _MOST_EXPLAINED)
-    statistic = -float(np.log1p(-share)) * point.near.freedom / outputs
+    statistic = -float(np.log1p(-share)) * point.freedom / outputs
     looks = sum(length for _, length in stretches) * outputs * len(lags)
     test = ScoreTest("level_shift", "shift", statistic, 1, _by_chance([statistic], looks), None, output)
     begin, length = next(one for one in stretches if sample < sum(one))
@@ -125,18 +120,18 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
 
 
 def _stretches(records: Records) -> list[tuple[int, int]]:
-    """Return where each record begins, and its samples; too short ones are passed over."""
+    """Return the first sample and the number of samples of each record; too short ones are passed over."""
     begins = np.cumsum([0, *records.lengths])[:-1].tolist()
     return [one for one in zip(begins, records.lengths, strict=True) if one[1] > 2 * _FEWEST]
 
 
 def _smooth(samples: int, lag: float) -> Array:
-    """Return a step at the first sample behind a lag (samples,)."""
+    """Return the response (samples,) of a lag to a step at the first sample."""
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
 def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> NDArray[np.float64]:
-    """(p, n, m): steps behind lags, and a single sample, in errors of each output in the longest record."""
+    """Return the responses (p, n, m) to lagged steps and to a pulse, in errors of the longest record."""
     at, length = int(np.argmax(records.lengths)), records.longest
     begin = sum(records.lengths[:at])
     every = np.zeros((records.samples, len(lags) + 1))
@@ -149,10 +144,10 @@ def _responses(records: Records, theta: Array, lags: Sequence[float], white: Whi
 
 
 def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:
-    """Return statistics (n,) of a response (n,) that begins at every sample of a record, and their signs.
+    """Return score statistics (n,) of a response (n,) begun at every sample of a record, and their signs.
 
-    A score is what residuals and response have in common; what the estimate explains of the response is
-    taken off its power.
+    A score is the correlation of residuals and response. The power of the response counts without the part
+    that the estimate explains.
 
     Args:
         begin: of the record; `response`, in the errors of one output.
@@ -161,7 +156,7 @@ def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Arr
     rows = slice(begin * outputs, (begin + size) * outputs)
 
     def common(signals: Array) -> Array:
-        """Return products of the response, begun at every sample, with signals (n p, m), as (n, m)."""
+        """Return products (n, m) of the response, begun at every sample, with signals (n p, m)."""
         own = np.einsum("npm,p->nm", signals.reshape(size, outputs, -1), white.root[:, output])
         return np.asarray(scipy.signal.fftconvolve(own[::-1], response[:, None], axes=0)[:size][::-1])
 
@@ -175,7 +170,7 @@ def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Arr
 
 
 def _of_line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
-    """Return the statistic of a line through one record of an output."""
+    """Return the test statistic of a straight line through one record of an output."""
     column = _column(records, theta, white, begin, np.linspace(-1.0, 1.0, length), output)
     left = white.unexplained(column)[:, 0]
     power = float(left @ left)
@@ -185,7 +180,7 @@ def _of_line(records: Records, theta: Array, white: White, begin: int, length: i
 
 
 def _column(records: Records, theta: Array, white: White, begin: int, signal: Array, output: int) -> Array:
-    """((N + M) p, 1): a signal (n,) in one output from a sample on, as errors in units of the noise."""
+    """Return the errors ((N + M) p, 1) by a signal (n,) in one output, in units of the noise."""
     every, own = np.zeros((records.samples, 1)), np.zeros((1, *records.y.shape))
     every[begin : begin + len(signal), 0] = signal
     own[0, :, output] = records.whitened(theta, every)[output, :, 0]

@@ -33,21 +33,17 @@ _OF_THE_SHARE = 9.0 / 6.0 * 3.0 / 2.0
 
 @dataclass(frozen=True)
 class SilentLines:
-    """The power of p outputs at `lines` lines without excitation.
-
-    Attributes:
-        beyond: (lines, p) mean squares of the transforms that are beyond the noise, over neighbouring lines.
-    """
+    """The power of p outputs at `lines` lines without excitation."""
 
     lines: int
     over_noise: Array  # (p,) mean of the power there over that of the noise; about one for noise alone
     probability: Array  # (p,) that noise alone has as much, by an F test over all lines
     rms: Array  # (p,) of the part beyond the noise
-    beyond: NDArray[np.float64]
+    beyond: NDArray[np.float64]  # (lines, p) mean squares beyond the noise, over neighbours
 
 
 def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> SilentLines | None:
-    """From transforms (blocks, periods, lines, p) of outputs; None without lines or without scatter.
+    """Return the power at silent lines from transforms (blocks, periods, lines, p); None without scatter.
 
     Args:
         shape: (lines, p) of the spectrum of the noise, up to a factor; None: that of the scatter, smoothed.
@@ -78,7 +74,7 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
 
 
 def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return means over neighbouring lines (lines, p), at the ends over equally many nearest ones."""
+    """Return means over neighbouring lines (lines, p), near the ends over equally many nearest ones."""
     window = min(_NEIGHBOURS, len(noise))
     sums = np.concatenate([np.zeros((1, noise.shape[1])), np.cumsum(noise, axis=0)])
     first = np.clip(np.arange(len(noise)) - window // 2, 0, len(noise) - window)
@@ -88,7 +84,7 @@ def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
 def response_error(
     found: PeriodicResponse, period: int, kept: int, odd: SilentLines, harmonics: NDArray[np.int_]
 ) -> NDArray[np.float64]:
-    """Return the errors (L, p, r) of G at the excited lines: added part and change of gain, in mean square.
+    """Return the mean-square errors (L, p, r) of G at the excited lines: added part and change of gain.
 
     Args:
         found: the response, from `kept` periods of `period` samples in all.
@@ -131,10 +127,10 @@ def cubes(
     *,
     repeats: int = 1,
 ) -> Cubes:
-    """Return the cubes from records (N, r) and (N, p) with odd harmonics (n,) that are silent.
+    """Return the cubes from records (N, r) and (N, p) whose odd harmonics (n,) `silent` are not excited.
 
     Args:
-        model: a rough G at the lines of `found` and at the silent ones, which the measured one is carried by.
+        model: a rough G at the lines of `found` and at the silent ones, to interpolate the measured one.
         shape: (n, p) of the spectrum of the noise at the silent lines, up to a factor.
         repeats: see `Periods.parts`.
     """
@@ -175,7 +171,7 @@ def _carried(
     model_there: ComplexArray,
     there: NDArray[np.int_],
 ) -> ComplexArray:
-    """G (n, p, r) at harmonics between lines; what it is over the model turns less than it does itself."""
+    """Return G (n, p, r) interpolated between lines as a ratio to the model, whose phase turns less."""
     carried = np.empty_like(model_there)
     for i, j in np.ndindex(G.shape[1:]):
         usable = bool(np.all(np.abs(model[:, i, j]) > 1e-3 * np.abs(G[:, i, j])))
@@ -187,7 +183,7 @@ def _carried(
 def _fitted(
     cubed: ComplexArray, Y: ComplexArray, shape: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(candidates, p): the factor of each cube (candidates, n, p, blocks), and how likely noise has as much.
+    """Return factors (candidates, p) of cubes (candidates, n, p, blocks), and their probabilities by chance.
 
     Args:
         Y: (blocks, periods, n, p).

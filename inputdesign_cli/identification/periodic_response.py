@@ -7,6 +7,7 @@ their phases, so that the matrix U of inputs by blocks has an inverse at every l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -25,7 +26,7 @@ _MOST_DEGREE, _CERTAIN = 3, 1e-4
 
 @dataclass(frozen=True)
 class Periods:
-    """How a record repeats: equal blocks of whole periods, of which the first few are transient."""
+    """The periods of a record: equal blocks of whole periods, of which the first few are transient."""
 
     period: int  # samples
     blocks: int = 1  # as many as inputs
@@ -40,20 +41,20 @@ class Periods:
         return self.each(samples) - self.skip
 
     def transforms(self, signal: NDArray[np.float64], repeats: int = 1) -> ComplexArray:
-        """(.., blocks, kept, harmonics, channels) of signals (.., N, channels): of exp(jwt) its amplitude."""
+        """Return amplitudes (.., blocks, kept, harmonics, channels) of signals (.., N, channels)."""
         return np.asarray(np.fft.rfft(self.parts(signal, repeats), axis=-2) / self.period)
 
     def means(self, signal: NDArray[np.float64], harmonics: NDArray[np.int_]) -> ComplexArray:
-        """Return the means over the periods that count, (.., L, channels, blocks)."""
+        """Return the transforms at harmonics of the mean period, (.., L, channels, blocks)."""
         found = np.fft.rfft(self.parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
         return np.asarray(np.moveaxis(found, -3, -1))
 
     def parts(self, signal: NDArray[np.float64], repeats: int = 1) -> NDArray[np.float64]:
-        """(.., blocks, kept, period, channels): what counts of signals, cut into periods; the end fits.
+        """Return the periods of signals that count, (.., blocks, kept, period, channels), to the end.
 
         Args:
-            repeats: how many records of equal length with the same input follow each other; of all of them
-                the periods that count stand one after the other.
+            repeats: number of records of equal length with the same input that follow each other. Their
+                periods that count stand one after the other.
         """
         if repeats > 1:
             return np.concatenate([self.parts(one) for one in np.split(signal, repeats, axis=-2)], axis=-3)
@@ -66,15 +67,11 @@ class Periods:
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """G (L, p, r) at harmonics, with its uncertainty from the scatter of the periods.
-
-    Attributes:
-        deviation: (L, p, r): standard deviations of the entries, |error|^2 being their variance.
-    """
+    """G (L, p, r) at harmonics, with its uncertainty from the scatter of the periods."""
 
     harmonics: NDArray[np.int_]
     G: ComplexArray
-    deviation: NDArray[np.float64]
+    deviation: NDArray[np.float64]  # (L, p, r): of the entries, |error|^2 being their variance
     noise: NDArray[np.float64]  # (L, p): the spectrum of the noise; for white noise it is the variance
     explained: NDArray[np.float64]  # (L, p): mean squares of the part that the inputs explain, per line
     freedom: int  # degrees of freedom of each variance, counted as complex numbers
@@ -89,7 +86,7 @@ def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
 
 
 def differing(u: Array, periods: Periods, *, repeats: int = 1) -> float:
-    """Return the share of the power of inputs (N, r) by which periods of all records differ."""
+    """Return the share of the power of inputs (N, r) by which the periods of all records differ."""
     lines = periods.transforms(u, repeats)[:, :, 1:]
     other = float(np.sum(np.abs(lines - lines.mean(axis=1, keepdims=True)) ** 2))
     return other / max(float(np.sum(np.abs(lines) ** 2)), 1e-300)
@@ -98,7 +95,7 @@ def differing(u: Array, periods: Periods, *, repeats: int = 1) -> float:
 def excited_lines(
     u: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
 ) -> NDArray[np.bool_]:
-    """(L,): whether inputs (N, r) have more at harmonics than rounding, or noise, leaves of the others."""
+    """Return whether inputs (N, r) exceed rounding and noise at each of the harmonics, (L,)."""
     U = periods.transforms(u, repeats)
     mean = np.moveaxis(U.mean(axis=1), 0, -1)  # (harmonics, r, blocks)
     size = np.sqrt(np.mean(np.abs(mean[1:]) ** 2, axis=(0, 2)))
@@ -116,7 +113,7 @@ def excited_lines(
 
 
 def response_at(U: ComplexArray, Y: ComplexArray) -> ComplexArray:
-    """G (.., L, p, r) from the means of inputs (L, r, r) and outputs (.., L, p, r), inputs by blocks."""
+    """Return G (.., L, p, r) from means of inputs (L, r, r) and outputs (.., L, p, r), inputs by blocks."""
     return np.asarray(Y @ np.linalg.inv(U))
 
 
@@ -140,8 +137,7 @@ def periodic_response(
     return PeriodicResponse(harmonics, G, np.sqrt(variance), periods.period * scatter, explained, freedom)
 
 
-@dataclass(frozen=True)
-class PeriodDrift:
+class PeriodDrift(NamedTuple):
     """Polynomials in time that outputs (N, p) drift along.
 
     A ramp is the same in every period, but for its level, so that their scatter does not show it. It adds to
@@ -158,8 +154,8 @@ def period_drift(
 ) -> PeriodDrift | None:
     """Return the drift of outputs (N, p) beyond chance, record by record, or None if nothing drifts.
 
-    The mean of a period has the variance Phi(0) / period. A degree counts if the means have more of the
-    orthogonal polynomial of that degree than chance has with 1e-4 for all outputs, records and degrees.
+    The mean of a period has the variance Phi(0) / period. A degree counts if the
+    means have more of its orthogonal polynomial than by chance, at 1e-4 for all outputs, records and degrees.
 
     Args:
         time: (N,), at which samples were taken, in any unit.
@@ -170,35 +166,31 @@ def period_drift(
     rare = 0.5 * _CERTAIN / (_MOST_DEGREE * repeats * y.shape[1])
     far = -float(scipy.special.ndtri(rare)) * np.sqrt(noise / periods.period)
     for one, at in zip(np.split(y, repeats), np.split(time, repeats), strict=True):
-        powers, triangle, along = _along(one, at, periods, _MOST_DEGREE)
-        beyond = np.abs(along[1:]) > far
-        degree = np.max(beyond * np.arange(1, len(along))[:, None], axis=0, initial=0)
-        kept = np.where(np.arange(len(along))[:, None] <= degree, along, 0.0)
-        curves.append(_curve(powers, triangle, kept))
+        polynomials, along = _along(one, at, periods, _MOST_DEGREE)
+        order = np.arange(len(along))[:, None]
+        degree = np.max((np.abs(along) > far) * order, axis=0)
+        curves.append(polynomials @ np.where(order <= degree, along, 0.0))
         degrees.append(degree)
     most = np.max(degrees, axis=0)
     return PeriodDrift(np.concatenate(curves), most) if np.any(most) else None
 
 
 def line_of_periods(y: Array, periods: Periods) -> Array:
-    """Return the lines (N, p) about zero that fit the means of the periods of outputs (N, p)."""
-    return _curve(*_along(y, np.arange(float(len(y))), periods, 1))
+    """Return the straight lines (N, p) about zero that fit the means of the periods of outputs (N, p)."""
+    polynomials, along = _along(y, np.arange(float(len(y))), periods, 1)
+    return np.asarray(polynomials @ along)
 
 
-def _along(y: Array, time: Array, periods: Periods, most: int) -> tuple[Array, Array, Array]:
-    """Powers of time (N, m), the triangle (m, m) that orthogonalises their means, and what y has of each."""
+def _along(y: Array, time: Array, periods: Periods, most: int) -> tuple[Array, Array]:
+    """Return polynomials (N, m) of time, orthonormal as means up to a level, and their coefficients in y."""
     scaled = (time - time.mean()) / max(float(np.ptp(time)), np.finfo(float).tiny)
     count = periods.blocks * periods.kept(len(y))
     powers = scaled[:, None] ** np.arange(min(most + 1, count))
-    basis, triangle = np.linalg.qr(_means(powers, periods))
-    return powers, triangle, np.asarray(basis.T @ _means(y, periods))
 
+    def means(signals: Array) -> Array:
+        return np.asarray(periods.parts(signals).mean(axis=2).reshape(-1, signals.shape[1]))
 
-def _means(signals: Array, periods: Periods) -> Array:
-    """(blocks * kept, channels)."""
-    return np.asarray(periods.parts(signals).mean(axis=2).reshape(-1, signals.shape[1]))
-
-
-def _curve(powers: Array, triangle: Array, along: Array) -> Array:
-    weights = np.linalg.solve(triangle, along)
-    return np.asarray(powers[:, 1:] @ weights[1:])
+    basis, triangle = np.linalg.qr(means(powers))
+    weights = np.linalg.inv(triangle)
+    weights[0] = 0.0
+    return powers @ weights, np.asarray(basis.T @ means(y))

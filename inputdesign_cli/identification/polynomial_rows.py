@@ -82,11 +82,11 @@ class Row:
 
     @property
     def memory(self) -> int:
-        """Return how far back the regression looks, recursions aside."""
+        """Return the largest lag of the regression, recursions aside."""
         return max(one.lags.stop for one in (self.a, *self.b)) - 1
 
     def whitening(self, theta: Array) -> tuple[Array, Array]:
-        """Return D and C, (order + 1,) each, at parameters (k,)."""
+        """Return the coefficients of D and C, (order + 1,) each, at parameters (k,)."""
         return self.d.polynomial(theta[None])[0], self.c.polynomial(theta[None])[0]
 
 
@@ -95,35 +95,47 @@ def rows_of(model: PolynomialModel) -> tuple[Row, ...]:
     return tuple(Row.of(model, output) for output in range(model.outputs))
 
 
-def errors_and_sources(
-    row: Row, theta: Array, u: NDArray[np.float64], y: Array
-) -> tuple[Array, list[tuple[Coefficients, Array]]]:
-    """Return epsilon (runs, N) of one output, and signals (runs, N) of which psi of coefficients are delays.
+def owners(rows: Sequence[Row]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the output (among these rows) and the index in theta of each coefficient, (m,)."""
+    columns = np.concatenate([one.columns for row in rows for one in row.all])
+    return np.repeat(np.arange(len(rows)), [row.size for row in rows]), columns
+
+
+def errors_and_gradients(
+    rows: Sequence[Row], theta: Array, u: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return errors epsilon (runs, p, N), and gradients psi (runs, m, N) of every coefficient in its output.
 
     Args:
-        row: of the output.
+        rows: one an output.
         theta: (runs, k).
-        u: (runs, r, N), all inputs of the model.
-        y: (runs, N), the output.
+        u, y: (runs, r, N), all inputs of the model, and (runs, p, N).
     """
-    A, C, D = (one.polynomial(theta) for one in (row.a, row.c, row.d))
-    v, sources = _multiplied(A, y), []
-    for j, b, f in zip(row.inputs, row.b, row.f, strict=True):
-        B, F = b.polynomial(theta), f.polynomial(theta)
-        x = _divided(F, u[:, j])
-        v = v - _multiplied(B, x)
-        through = _multiplied(D, _divided(C, x))
-        sources += [(b, through)]
-        sources += [(f, _multiplied(-B, _divided(F, through)))] if f.lags else []
-    shaped = _divided(C, v)
-    errors = _multiplied(D, shaped)
-    sources += [(row.a, _multiplied(-D, _divided(C, y)))] if row.a.lags else []
-    sources += [(row.c, _divided(C, errors))] if row.c.lags else []
-    return errors, sources + ([(row.d, -shaped)] if row.d.lags else [])
+    samples, number = y.shape[2], 0
+    errors, psi = np.empty(y.shape), np.zeros((len(theta), sum(row.size for row in rows), samples))
+    for i, row in enumerate(rows):
+        A, C, D = (one.polynomial(theta) for one in (row.a, row.c, row.d))
+        v, of_b, of_f = _multiplied(A, y[:, i]), [], []
+        for j, b, f in zip(row.inputs, row.b, row.f, strict=True):
+            B, F = b.polynomial(theta), f.polynomial(theta)
+            x = _divided(F, u[:, j])
+            v = v - _multiplied(B, x)
+            of_b.append(_multiplied(D, _divided(C, x)))
+            of_f.append(_multiplied(-B, _divided(F, of_b[-1])) if f.lags else x)
+        shaped = _divided(C, v)
+        errors[:, i] = _multiplied(D, shaped)
+        of_a = _multiplied(-D, _divided(C, y[:, i])) if row.a.lags else shaped
+        of_c = _divided(C, errors[:, i]) if row.c.lags else shaped
+        # Signals of which the gradients are delays.
+        for one, source in zip(row.all, (of_a, *of_b, of_c, -shaped, *of_f), strict=True):
+            for lag in one.lags:
+                psi[:, number, lag:] = source[:, : samples - lag]
+                number += 1
+    return errors, psi
 
 
 def _multiplied(polynomials: Array, x: Array) -> Array:
-    """Return sum_i p_i x(t - i) for polynomials (runs, order + 1) and signals (runs, N)."""
+    """Return sum_i p_i x(t - i) for polynomials p (runs, order + 1) and signals x (runs, N)."""
     out = polynomials[:, :1] * x
     for lag in range(1, min(polynomials.shape[1], x.shape[1])):
         out[:, lag:] += polynomials[:, lag, None] * x[:, :-lag]
@@ -131,7 +143,7 @@ def _multiplied(polynomials: Array, x: Array) -> Array:
 
 
 def _divided(monic: Array, x: Array) -> Array:
-    """Return x / D for monic polynomials D (runs, order + 1) and signals (runs, N).
+    """Return x / D for monic polynomials D (runs, order + 1) and signals x (runs, N).
 
     All runs, one after the other, are a triangular system with few diagonals.
     """
@@ -147,21 +159,18 @@ def _divided(monic: Array, x: Array) -> Array:
 
 @dataclass(frozen=True)
 class FromRest:
-    """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`.
-
-    Attributes:
-        u, y: (runs, r, N), (runs, p, N).
-    """
+    """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`."""
 
     rows: tuple[Row, ...]  # one an output
-    u: NDArray[np.float64]
-    y: NDArray[np.float64]
+    u: NDArray[np.float64]  # (runs, r, N)
+    y: NDArray[np.float64]  # (runs, p, N)
     skipped: int = 0  # how many errors at the begin of each do not count
 
     @classmethod
     def of(cls, model: PolynomialModel, u: Array, y: Array, skipped: int = 0) -> FromRest:
         """Return the problem of fitting a model to records u (runs, N, r), y (runs, N, p)."""
-        return cls(rows_of(model), *(np.ascontiguousarray(x.swapaxes(1, 2)) for x in (u, y)), skipped)
+        inputs, outputs = (np.ascontiguousarray(x.swapaxes(1, 2)) for x in (u, y))
+        return cls(rows_of(model), inputs, outputs, skipped)
 
     @property
     def errors(self) -> int:
@@ -191,44 +200,27 @@ class FromRest:
     def sums(self, theta: Array) -> Sums:
         """Return the sums from which the cost and its derivatives at theta (runs, k) are computed."""
         size = max(_NUMBERS_AT_ONCE // self.y[0].size, 1)
-        some = [slice(first, first + size) for first in range(0, len(theta), size)]
-        found = [self._products(theta[one], self.u[one], self.y[one]) for one in some]
-        columns = np.concatenate([one.columns for row in self.rows for one in row.all])
-        owner = np.repeat(np.arange(len(self.rows)), [row.size for row in self.rows])
+        found, kept = [], slice(self.skipped, None)
+        for first in range(0, len(theta), size):
+            some = slice(first, first + size)
+            every = errors_and_gradients(self.rows, theta[some], self.u[some], self.y[some])
+            errors, psi = (x[:, :, kept] for x in every)
+            turned = errors.swapaxes(1, 2)
+            found.append((errors @ turned, psi @ turned, psi @ psi.swapaxes(1, 2)))
+        owner, columns = owners(self.rows)
         each = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return Sums(owner, np.eye(theta.shape[1])[columns], *each)
-
-    def _products(self, theta: Array, u: Array, y: Array) -> tuple[NDArray[np.float64], ...]:
-        """Return e e^T, psi e^T and psi psi^T of few runs, see `Sums`."""
-        samples, runs = y.shape[2], len(theta)
-        errors, psi = np.empty(y.shape), np.zeros((runs, sum(row.size for row in self.rows), samples))
-        number = 0
-        for i, row in enumerate(self.rows):
-            errors[:, i], sources = errors_and_sources(row, theta, u, y[:, i])
-            of = {id(one): source for one, source in sources}
-            for one in row.all:
-                for lag in one.lags:
-                    psi[:, number, lag:] = of[id(one)][:, : samples - lag]
-                    number += 1
-        errors, psi = errors[:, :, self.skipped :], psi[:, :, self.skipped :]
-        turned = errors.swapaxes(1, 2)
-        return errors @ turned, psi @ turned, psi @ psi.swapaxes(1, 2)
 
 
 @dataclass(frozen=True)
 class Sums:
-    """Sums of products of residuals and gradients over the samples, for each run.
+    """Sums of products of residuals and gradients over the samples, for each run."""
 
-    Attributes:
-        owner: (m,), the output that each gradient is of; `spread` (m, k), its parameter.
-        errors, slopes, products: e e^T (runs, p, p), psi e^T (runs, m, p) and psi psi^T (runs, m, m).
-    """
-
-    owner: NDArray[np.int64]
-    spread: Array
-    errors: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    products: NDArray[np.float64]
+    owner: NDArray[np.int64]  # (m,), the output that each gradient is of
+    spread: Array  # (m, k), its parameter
+    errors: NDArray[np.float64]  # e e^T (runs, p, p)
+    slopes: NDArray[np.float64]  # psi e^T (runs, m, p)
+    products: NDArray[np.float64]  # psi psi^T (runs, m, m)
 
     @property
     def own(self) -> Array:
@@ -244,7 +236,7 @@ class Sums:
 
 
 def stabilised(rows: Sequence[Row], theta: Array) -> Array:
-    """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
+    """Return theta (runs, k) with roots of C, D and F outside the unit circle mirrored into it.
 
     Roots of F that are exactly one belong to integrators, and stay.
     """
@@ -266,11 +258,11 @@ def is_arx(model: PolynomialModel) -> bool:
 
 
 def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
-    """Return estimates (runs, k) of an ARX model in one step, weighed by its covariance ([ljung-1999], 4.2).
+    """Return estimates (runs, k) of an ARX model in one step, weighted by its covariance ([ljung-1999], 4.2).
 
     Args:
         model: the structure and the covariance are meant.
-        u, y: (runs, samples, r), (runs, samples, p); what came before them is not known.
+        u, y: (runs, samples, r), (runs, samples, p); earlier samples are unknown.
     """
     longest = max(parameter.power for parameter in model.parameters)
     nowhere, weights = np.zeros((len(y), model.theta.size)), np.linalg.inv(model.covariance)

@@ -12,6 +12,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.polynomial_rows import Coefficients, Row
+from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.stability import reflected
 from inputdesign_cli.plant.filtering import filtered
 
@@ -23,36 +24,37 @@ _LONGEST = 40
 
 
 def starting_points(row: Row, size: int, u: Array, y: Array) -> Array:
-    """Return starts (points, k) for one output y (N,) and all inputs u (N, r); k is the `size`."""
+    """Return starting points (points, k) for one output y (N,) and all inputs u (N, r); k is the `size`."""
     inputs = [u[:, j] for j in row.inputs]
-    noise, responses = _long_model(row, inputs, y)
-    first = _equation_error(row, inputs, y, noise)
-    second = _output_error(row, inputs, y, responses, coloured=True)
+    highest = max(one.lags.stop for one in row.all) - 1
+    order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
+    lags = [range(b.lags.start, order + 1) for b in row.b]
+    (a, *bs), noise = regress(y, [(-y, range(1, order + 1)), *zip(inputs, lags, strict=True)])
+    A = reflected(np.append(1.0, a))
+    # What each input causes alone in this long ARX model.
+    responses = [_caused(b, A, of.start, x) for b, x, of in zip(bs, inputs, lags, strict=True)]
     left = y - sum(responses, np.zeros_like(y))
-    third = _output_error(row, inputs, y, [left + x for x in responses], coloured=False)
-    points = np.zeros((3, size))
-    for point, parts in zip(points, (first, second, third), strict=True):
+    found = [
+        _equation_error(row, inputs, y, noise),
+        _output_error(row, inputs, y, responses, coloured=True),
+        _output_error(row, inputs, y, [left + x for x in responses], coloured=False),
+    ]
+    points = np.zeros((len(found), size))
+    for point, parts in zip(points, found, strict=True):
         for one, values in parts:
             point[one.columns] = values
-    points = np.concatenate([points, *_nearly_cancelling(row, points[1])])
+    # C and D that nearly cancel, at low and at high frequency, are often separate minima.
+    for sign in (1.0, -1.0) if row.c.lags and row.d.lags else ():
+        point = points[1].copy()
+        for one, root in ((row.c, 0.85), (row.d, 0.95)):
+            point[one.columns] = -sign * root * np.eye(1, len(one.lags))[0]
+        points = np.vstack([points, point])
     return points[np.all(np.isfinite(points), axis=1)]
 
 
-def _nearly_cancelling(row: Row, theta: Array) -> list[Array]:
-    """Return `theta` with C and D that nearly cancel, at low and at high frequency: often separate minima."""
-    points = []
-    for sign in (1.0, -1.0) if row.c.lags and row.d.lags else ():
-        point = theta.copy()
-        for one, root in ((row.c, 0.85), (row.d, 0.95)):
-            point[one.columns] = 0.0
-            point[one.columns[0]] = -sign * root
-        points.append(point[None])
-    return points
-
-
 def regress(y: Array, regressors: list[tuple[Array, range]]) -> tuple[list[Array], Array]:
-    """Least squares of y(t) on x(t - lag): one array of coefficients for each regressor, and the residual."""
-    columns = [_shifted(x, lag) for x, lags in regressors for lag in lags]
+    """Estimate y(t) from x(t - lag) by least squares; return coefficients by regressor, and the residual."""
+    columns = [shifted(x, lag, (x.size,)) for x, lags in regressors for lag in lags]
     if not columns:
         return [np.zeros(0) for _ in regressors], y
     matrix = np.stack(columns, axis=1)
@@ -61,26 +63,12 @@ def regress(y: Array, regressors: list[tuple[Array, range]]) -> tuple[list[Array
     return list(np.split(solution, ends)), y - matrix @ solution
 
 
-def _shifted(x: Array, lag: int) -> Array:
-    return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])
-
-
-def _long_model(row: Row, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
-    """Return residuals of a long ARX model, and what it says that each input alone causes."""
-    highest = max(one.lags.stop for one in row.all) - 1
-    order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
-    lags = [range(b.lags.start, order + 1) for b in row.b]
-    (a, *bs), residual = regress(y, [(-y, range(1, order + 1)), *zip(inputs, lags, strict=True)])
-    A = reflected(np.append(1.0, a))
-    return residual, [_caused(b, A, of.start, x) for b, x, of in zip(bs, inputs, lags, strict=True)]
-
-
 def _caused(b: Array, F: Array, delay: int, x: Array) -> Array:
     return filtered(np.concatenate([np.zeros(delay), b]), F, x)
 
 
 def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Parts:
-    """A, B, C by regression; output-error denominators F take the place of a missing A."""
+    """Estimate A, B, C by regression; output-error denominators F take the place of a missing A."""
     longest = max((f.lags for f in row.f), key=len, default=range(1, 1))
     in_f = len(longest) > 0 and not row.a.lags
     regressors = [(x, b.lags) for x, b in zip(inputs, row.b, strict=True)]
@@ -90,7 +78,7 @@ def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Pa
 
 
 def _output_error(row: Row, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool) -> Parts:
-    """B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
+    """Estimate B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
     if any(f.lags for f in row.f) or not row.a.lags:
         found = [
             _iterated(target, f.lags, [(x, b.lags)])
@@ -125,7 +113,7 @@ def noise_polynomials(v: Array, c: int, d: int) -> tuple[Array, Array]:
 
 
 def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> tuple[Array, list[Array]]:
-    """A common denominator with these lags `below`, monic, and the numerators by Steiglitz and McBride."""
+    """Estimate a common monic denominator at lags `below`, and numerators, by Steiglitz and McBride."""
     F = np.ones(1)
     numerators: list[Array] = []
     for _ in range(_ITERATIONS if below else 1):

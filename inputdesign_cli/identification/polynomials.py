@@ -7,7 +7,7 @@ With one output it is the sum of squares.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +20,8 @@ from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts
 from inputdesign_cli.identification.polynomial_rows import (
     FromRest,
     Row,
-    errors_and_sources,
+    errors_and_gradients,
+    owners,
     rows_of,
     stabilised,
 )
@@ -32,7 +33,7 @@ from inputdesign_cli.plant.filtering import filtered
 
 @dataclass(frozen=True)
 class PolynomialKind(Kind):
-    """Polynomials in q^-1; see `Kind`."""
+    """A polynomial model in q^-1; see `Kind`."""
 
     model: PolynomialModel
 
@@ -43,7 +44,7 @@ class PolynomialKind(Kind):
 
     @property
     def recent(self) -> int:
-        """Return how far back the regressions look."""
+        """Return the largest lag of the regressions."""
         return max(row.memory for row in self.rows)
 
     @property
@@ -53,28 +54,25 @@ class PolynomialKind(Kind):
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
-        errors, psi = np.empty(y.shape), np.zeros((theta.size, *y.shape))
-        for i, row in enumerate(self.rows):
-            own, sources = errors_and_sources(row, theta[None], u.T[None], y[None, :, i])
-            errors[:, i] = own[0]
-            for one, source in sources:
-                for column, lag in zip(one.columns, one.lags, strict=True):
-                    psi[column, lag:, i] = source[0, : len(y) - lag]
-        return errors, psi
+        errors, each = errors_and_gradients(self.rows, theta[None], u.T[None], y.T[None])
+        psi = np.zeros((theta.size, *y.shape))
+        for output, column, own in zip(*owners(self.rows), each[0], strict=True):
+            psi[column, :, output] = own
+        return errors[0].T, psi
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """Return the starts, output by output.
+        """Return the effect of the past on the prediction errors, output by output.
 
         The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j. This sum is off by impulses if y and u
-        before the record are missing. It is off by impulses through 1/F_j if the state of an entry is,
-        and by a step through it if the level of its input is. For a stable F_j the others make up for the
+        before the record are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown
+        level of its input a step through 1/F_j. For a stable F_j the others make up for the
         step, but not if F_j integrates or nearly does. From rest only y is missing, which noise has moved.
         That matters only if the predictor remembers y beyond its order.
         """
         return tuple(_start(row, theta, samples, free=free) for row in self.rows)
 
     def lateness(self, theta: Array) -> int:
-        """Return by how many samples B looks back further than F."""
+        """Return the number of samples by which B looks back further than F."""
         entries = (entry for row in self.rows for entry in zip(row.b, row.f, strict=True))
         return max([0, *(b.lags.stop - f.lags.stop for b, f in entries)])
 
@@ -84,20 +82,20 @@ class PolynomialKind(Kind):
         return np.flatnonzero([parameter.letter in letters for parameter in self.model.parameters])
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through D/C of each output (p, N, m)."""
+        """Return signals (N, m) filtered by D/C of each output, as (p, N, m)."""
         return np.array([filtered(*row.whitening(theta), signals, axis=0) for row in self.rows])
 
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta with the roots of C, D and F in the unit circle."""
+        """Return theta with the roots of C, D and F inside the unit circle."""
         return stabilised(self.rows, theta[None])[0]
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Each output estimated alone, then what outputs share weighed by how well each knows it."""
-        listed = np.zeros((0, len(self.names))) if given is None else given[None]
-        points, tried = [], 0
+        """Return each output's own estimate; shared parameters are weighted by the information of each."""
+        listed = np.zeros((0, len(self.model.names))) if given is None else given[None]
+        points, tried = list[Array](), 0
         for u, y in parts:
             alone = [
-                np.concatenate([listed, starting_points(row, len(self.names), u, own)])
+                np.concatenate([listed, starting_points(row, len(self.model.names), u, own)])
                 for row, own in zip(self.rows, y.T, strict=True)
             ]
             tried = max(tried, *(len(starts) for starts in alone))
@@ -106,8 +104,8 @@ class PolynomialKind(Kind):
         return Starts(np.concatenate(points), tried)
 
     def _one_by_one(self, u: Array, y: Array, starts: Sequence[Array]) -> Array:
-        """Return theta (k,) from each output alone: the information of all, added up."""
-        size = len(self.names)
+        """Return theta (k,) from each output alone, combined by the sum of the information matrices."""
+        size = len(self.model.names)
         total, moment = np.zeros((size, size)), np.zeros(size)
         for row, own, points in zip(self.rows, y.T, starts, strict=True):
             if row.size:
@@ -122,11 +120,31 @@ class PolynomialKind(Kind):
         return np.asarray(scaled / scale)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions by a further coefficient in any of the polynomials, or a shorter delay."""
+        """Return the extensions by a further coefficient in any of the polynomials, or by a shorter delay."""
+        model, larger = self.model.at(theta), []
+        for i, j in model.active:
+            B, F = model.B[i][j], model.F[i][j]
+            longer = replace(model, B=with_entry(model.B, i, j, np.append(B, 0.0)))
+            larger.append((longer, "coefficient in B"))
+            if model.row(model.A, i).size == 1 or F.size > 1:
+                longer = replace(model, F=with_entry(model.F, i, j, np.append(F, 0.0)))
+                larger.append((longer, "pole in F"))
+            if model.first[i][j] > int(feedback):
+                earlier = np.array(model.first)
+                earlier[i, j] -= 1
+                sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
+                larger.append((sooner, "coefficient in B before the others"))
+        for i, row in enumerate(model.A):
+            if row.size > 1:
+                larger.append((replace(model, A=_longer(model.A, i)), "pole in A"))
+        for i in range(len(model.C)):
+            larger.append((replace(model, C=_longer(model.C, i)), "coefficient in C"))
+        for i in range(len(model.D)):
+            larger.append((replace(model, D=_longer(model.D, i)), "coefficient in D"))
         found = []
-        for larger, what in _larger(self.model.at(theta), feedback=feedback):
-            (name,) = set(larger.names) - set(self.names)
-            found.append(Extension(larger, PolynomialKind(larger), name, what))
+        for one, what in larger:
+            (name,) = set(one.names) - set(self.model.names)
+            found.append(Extension(one, PolynomialKind(one), name, what))
         return tuple(found)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
@@ -135,7 +153,7 @@ class PolynomialKind(Kind):
 
 
 def _start(row: Row, theta: Array, samples: int, *, free: bool) -> Start:
-    """Impulses, and levels, with what 1/F makes of them."""
+    """Return the effect of an unknown past: impulses and levels, directly and through 1/F."""
     impulse, level = np.eye(1, samples)[0], np.ones(samples)
     if free:
         older = [b.lags.stop - f.lags.stop for b, f in zip(row.b, row.f, strict=True)]
@@ -150,33 +168,12 @@ def _start(row: Row, theta: Array, samples: int, *, free: bool) -> Start:
     return Start.white(np.concatenate([each_later(one, count) for one, count in parts])).through(C, D)
 
 
-def _larger(model: PolynomialModel, *, feedback: bool) -> Iterator[tuple[PolynomialModel, str]]:
-    """Yield models with a further coefficient in B, F (or A), C or D, or a shorter delay, and its name.
-
-    Args:
-        feedback: whether u(t) depends on y(t), so that it cannot act at once.
-    """
-    for i, j in model.active:
-        B, F = model.B[i][j], model.F[i][j]
-        yield replace(model, B=with_entry(model.B, i, j, np.append(B, 0.0))), "coefficient in B"
-        if model.row(model.A, i).size == 1 or F.size > 1:
-            yield replace(model, F=with_entry(model.F, i, j, np.append(F, 0.0))), "pole in F"
-        if model.first[i][j] > int(feedback):
-            earlier = np.array(model.first)
-            earlier[i, j] -= 1
-            sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
-            yield sooner, "coefficient in B before the others"
-    for letter, rows in (("A", model.A), ("C", model.C), ("D", model.D)):
-        for i, row in enumerate(rows):
-            longer = {letter: (*rows[:i], np.append(row, 0.0), *rows[i + 1 :])}
-            if letter != "A":
-                yield replace(model, **longer), f"coefficient in {letter}"
-            elif row.size > 1:
-                yield replace(model, **longer), "pole in A"
-
-
 def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
-    """Return a table with another entry."""
+    """Return a table with the entry at (i, j) replaced."""
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )
+
+
+def _longer(rows: tuple[Array, ...], i: int) -> tuple[Array, ...]:
+    return (*rows[:i], np.append(rows[i], 0.0), *rows[i + 1 :])

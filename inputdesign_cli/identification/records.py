@@ -34,35 +34,30 @@ _EXACT = 1e-20
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """Prediction errors near one theta.
+class Point:
+    """Prediction errors of records near theta (k,), and their cost.
 
-    What noise before the records is likely to have been counts as M more errors of each output.
-
-    Attributes:
-        all_errors: (N + M, p), what unknown starts explain taken off; `samples`, N.
-        slope, curvature: (k,), half the gradient of `determinant`, and (k, k), about half its Hessian.
-        determinant: what integrating over the starts adds to -2 log likelihood; `of_noise`, the part that
-            belongs to noise before the records.
+    The likely values of noise before the records count as M more errors of each output.
     """
 
-    all_errors: Array
+    theta: Array
+    all_errors: Array  # (N + M, p), what unknown starts explain taken off
     all_psi: NDArray[np.float64]  # (k, N + M, p) = -d errors / d theta, the starts following
-    samples: int
-    begun: Array  # (N, p), what levels and states at the start explain
-    directions: Array  # ((N + M) p, m) orthonormal, the errors in white units that unknown starts can explain
-    slope: Array
-    curvature: Array
-    unknowns: int = 0  # how many unknowns are levels and states, of which nothing is known
-    determinant: float = 0.0
-    of_noise: float = 0.0
+    samples: int  # N
+    directions: Array  # ((N + M) p, m) orthonormal, errors in white units that unknown starts can explain
+    towards: Array  # (k,), minus half the gradient of what the cost has beside the errors
+    known: Array  # (k, k), half the Hessian of that, about
+    weights: Array  # W (p, p)
+    unknowns: int = 0  # how many are levels and states, of which nothing is known
+    determinant: float = 0.0  # what integrating over the starts adds to -2 log likelihood
+    of_noise: float = 0.0  # the part of that which belongs to noise before the records
+    cost: float = np.inf
 
     @classmethod
-    def at_rest(cls, errors: Array, psi: NDArray[np.float64]) -> Linearised:
-        """Return the errors and gradient without unknown starts."""
-        k, directions = len(psi), np.zeros((errors.size, 0))
-        nothing = np.zeros_like(errors)
-        return cls(errors, psi, len(errors), nothing, directions, np.zeros(k), np.zeros((k, k)))
+    def at_rest(cls, theta: Array, errors: Array, psi: NDArray[np.float64]) -> Point:
+        """Return errors and gradient without unknown starts, not yet weighted."""
+        k, none, weights = theta.size, np.zeros((errors.size, 0)), np.eye(errors.shape[1])
+        return cls(theta, errors, psi, len(errors), none, np.zeros(k), np.zeros((k, k)), weights)
 
     @property
     def errors(self) -> Array:
@@ -71,26 +66,41 @@ class Linearised:
 
     @property
     def psi(self) -> NDArray[np.float64]:
-        """Return their gradient (k, N, p)."""
+        """Return the negative gradient psi (k, N, p) of the prediction errors."""
         return self.all_psi[:, : self.samples]
 
     @property
     def freedom(self) -> int:
-        """Return the number of errors that levels and states leave."""
+        """Return the number of errors less the number of unknown levels and states."""
         return self.errors.size - self.unknowns
+
+    @property
+    def slope(self) -> Array:
+        """Return minus half the gradient (k,) of the cost."""
+        return np.asarray(self._weighed @ self.all_errors.ravel() + self.towards)
+
+    @property
+    def hessian(self) -> Array:
+        """Return half the Hessian (k, k) of the cost, to first order."""
+        return np.asarray(self._weighed @ self.all_psi.reshape(self.theta.size, -1).T + self.known)
+
+    @property
+    def of_errors(self) -> Point:
+        """Return the point without the terms that do not come from the errors."""
+        return replace(self, known=np.zeros_like(self.known), towards=np.zeros_like(self.towards))
+
+    @property
+    def _weighed(self) -> Array:
+        return (self.all_psi @ self.weights).reshape(self.theta.size, -1)
 
 
 @dataclass(frozen=True)
 class Records:
-    """Records of one structure, one after the other.
-
-    Attributes:
-        free: whether each begins in an unknown state about an unknown level, instead of at rest at zero.
-    """
+    """Records of one structure, which follow each other."""
 
     kind: Kind  # the structure
     parts: tuple[Part, ...]  # u (n, r), y (n, p) of each record
-    free: bool = False
+    free: bool = False  # whether each begins in an unknown state about an unknown level, not at rest at zero
     late: int = 0  # samples in which unknown inputs before each act, if it is free
     weights: Array | None = None  # W (p, p) of the errors; None to weigh by their own covariance
     earlier: Earlier | None = None  # what is known besides
@@ -102,7 +112,7 @@ class Records:
 
     @cached_property
     def dead_times(self) -> NDArray[np.int64]:
-        """Return the parameters that move dead times: there the cost has kinks."""
+        """Return the indices of the parameters that move dead times: there the cost has kinks."""
         return np.flatnonzero(self.kind.model.dead_times)
 
     @cached_property
@@ -120,24 +130,19 @@ class Records:
         """Return the number of samples N."""
         return len(self.y)
 
-    @property
-    def size(self) -> int:
-        """Return the number of parameters k."""
-        return len(self.kind.names)
-
     @cached_property
     def lengths(self) -> tuple[int, ...]:
-        """Return the samples of each part."""
+        """Return the number of samples of each part."""
         return tuple(len(y) for _, y in self.parts)
 
     @cached_property
     def longest(self) -> int:
-        """Return the samples of the longest record: the past acts on all alike, on shorter ones for fewer."""
+        """Return the length of the longest record: the past acts on all alike, on shorter ones for less."""
         return max(self.lengths)
 
     @cached_property
     def rounding(self) -> Array:
-        """Return a covariance (p, p) of errors so small that they are rounding."""
+        """Return a covariance (p, p) below which errors count as rounding."""
         return _EXACT * np.diag(np.mean(self.y**2, axis=0))
 
     def from_rest(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -145,12 +150,13 @@ class Records:
         found = [self.kind.errors_and_gradient(theta, *part) for part in self.parts]
         return np.concatenate([e for e, _ in found]), np.concatenate([psi for _, psi in found], axis=1)
 
-    def at(self, theta: Array) -> Linearised:
-        """Return prediction errors and their gradient, the unknown starts eliminated."""
+    def at(self, theta: Array) -> Point:
+        """Return prediction errors and their gradient, the unknown starts eliminated, not yet weighted."""
         errors, psi = self.from_rest(theta)
         finite = bool(np.all(np.isfinite(errors)) and np.all(np.isfinite(psi)))
+        point = Point.at_rest(theta, errors, psi)
         if not (finite and (free := FreeStarts(self.lengths, self._starts(theta))).usable):
-            return Linearised.at_rest(errors, psi)
+            return point
         coefficients, root, directions = free.eliminated(errors, self.weights)
         slopes = np.zeros((theta.size, len(self.lengths) * len(free.starts) + len(free.starts)))
         for k in self._moving:
@@ -161,17 +167,16 @@ class Records:
         flat = (psi @ root.T).reshape(len(psi), -1)
         flat = flat - (flat @ directions) @ directions.T
         left = errors - free.combined(coefficients, free.starts)
-        return Linearised(
-            np.concatenate([left, free.errors_of_past(coefficients)]),
-            flat.reshape(psi.shape) @ np.linalg.inv(root).T,
-            len(errors),
-            free.combined(coefficients, free.starts, noise=False),
-            directions,
-            slopes.sum(axis=1),
-            slopes @ slopes.T,
-            free.unknowns,
-            free.determinant,
-            free.of_noise,
+        return replace(
+            point,
+            all_errors=np.concatenate([left, free.errors_of_past(coefficients)]),
+            all_psi=flat.reshape(psi.shape) @ np.linalg.inv(root).T,
+            directions=directions,
+            towards=-slopes.sum(axis=1),
+            known=slopes @ slopes.T,
+            unknowns=free.unknowns,
+            determinant=free.determinant,
+            of_noise=free.of_noise,
         )
 
     def gradient(self, theta: Array, index: int) -> Array:
@@ -187,7 +192,7 @@ class Records:
 
     @property
     def _moving(self) -> list[int]:
-        """Return the parameters on which the starts depend."""
+        """Return the indices of the parameters on which the starts depend."""
         return self.kind.in_starts(self.late, free=self.free).tolist()
 
     def _starts(self, theta: Array) -> tuple[Start, ...]:
@@ -213,12 +218,12 @@ class Records:
         )
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m), see `Kind`."""
+        """Return signals filtered by the inverse noise models, (p, N, m); see `Kind`."""
         pieces = np.split(signals, np.cumsum(self.lengths)[:-1])
         return np.concatenate([self.kind.whitened(theta, x) for x in pieces], axis=1)
 
     def stabilised(self, theta: Array) -> Array:
-        """Return theta with a stable predictor."""
+        """Return theta, changed where its predictor would be unstable."""
         return self.kind.stabilised(theta, self.longest)
 
 
@@ -234,13 +239,13 @@ def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
 
 
 def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[Part]:
-    """Return the signals of each record; None: of the only one."""
+    """Return the signals of each record; `lengths` None stands for a single record."""
     at = np.cumsum(lengths or [len(y)])[:-1]
     return list(zip(np.split(u, at), np.split(y, at), strict=True))
 
 
 def longest(parts: Sequence[Part]) -> list[Part]:
-    """Return the longest records, of which starting points are made: at most three, of similar lengths."""
+    """Return the longest records, for starting points: at most three, of similar lengths."""
     ranked = sorted(parts, key=lambda part: -len(part[1]))[:_MOST_STARTED]
     return [part for part in ranked if 2 * len(part[1]) >= len(ranked[0][1])]
 
@@ -250,79 +255,31 @@ def centred(parts: Sequence[Part]) -> list[Part]:
     return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts]
 
 
-@dataclass(frozen=True)
-class Point:
-    """Errors, gradient, weights W (p, p) and cost of records at theta (k,).
-
-    Attributes:
-        known: (k, k), half the Hessian of the terms of an earlier estimate and of integrating over unknown
-            starts; `towards` (k,), minus half their gradient.
-    """
-
-    theta: Array
-    near: Linearised
-    weights: Array
-    cost: float
-    known: Array
-    towards: Array
-
-    @property
-    def errors(self) -> Array:
-        """Return the prediction errors (N, p)."""
-        return self.near.errors
-
-    @property
-    def psi(self) -> NDArray[np.float64]:
-        """Return psi, minus the slopes of the prediction errors, (k, N, p)."""
-        return self.near.psi
-
-    @property
-    def slope(self) -> Array:
-        """Return minus half the gradient (k,) of the cost."""
-        near = self.near
-        return np.asarray(self._weighed(near.all_psi) @ near.all_errors.ravel() + self.towards)
-
-    @property
-    def hessian(self) -> Array:
-        """Return half the Hessian (k, k) of the cost, to first order."""
-        every = self.near.all_psi
-        return np.asarray(self._weighed(every) @ every.reshape(len(every), -1).T + self.known)
-
-    @property
-    def of_errors(self) -> Point:
-        """Return the point without the terms that do not come from the errors."""
-        return replace(self, known=np.zeros_like(self.known), towards=np.zeros_like(self.towards))
-
-    def _weighed(self, psi: NDArray[np.float64]) -> Array:
-        return (psi @ self.weights).reshape(len(psi), -1)
-
-
 def evaluate(records: Records, theta: Array) -> Point:
-    """Return the cost of records; infinite where it overflows, zero where all errors are rounding."""
+    """Return errors and cost of records at theta: infinite on overflow, zero if errors are rounding."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         near = records.at(theta)
         S = near.all_errors.T @ near.all_errors / records.samples
-    none, nowhere = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
-    if not all(np.all(np.isfinite(x)) for x in (S, near.psi, near.determinant, near.slope)):
-        nothing = Linearised.at_rest(np.zeros(near.errors.shape), np.zeros(near.psi.shape))
-        return Point(theta, nothing, np.eye(len(S)), np.inf, none, nowhere)
+    if not all(np.all(np.isfinite(x)) for x in (S, near.psi, near.determinant, near.towards)):
+        return Point.at_rest(theta, np.zeros(near.errors.shape), np.zeros(near.psi.shape))
     if np.all(np.diag(S) <= np.diag(records.rounding)):
-        return Point(theta, near, np.eye(len(S)), 0.0, none, nowhere)
-    q, towards, known, earlier = near.determinant, -near.slope, near.curvature, records.earlier
+        return replace(near.of_errors, cost=0.0)
+    q, towards, known, earlier = near.determinant, near.towards, near.known, records.earlier
     if earlier is not None:
         q, towards = q + earlier.q(theta), towards - earlier.slope(theta)
         known = known + earlier.information
     if records.weights is not None:
-        cost = records.samples * float(np.sum(records.weights * S))
-        return Point(theta, near, records.weights, cost + q, known, towards)
+        cost = records.samples * float(np.sum(records.weights * S)) + q
+        return replace(near, weights=records.weights, cost=cost, known=known, towards=towards)
     costs, every = weighing((S + records.rounding)[None], records.samples)
     with np.errstate(over="ignore"):
         factor = float(np.exp(q / near.freedom))
     cost = factor * float(costs[0])
     if not np.isfinite(cost):
-        return Point(theta, near, every[0], np.inf, none, nowhere)
+        return replace(near.of_errors, weights=every[0])
     share = cost / near.freedom
-    return Point(theta, near, factor * every[0], cost, share * known, share * towards)
+    known, towards = share * known, share * towards
+    return replace(near, weights=factor * every[0], cost=cost, known=known, towards=towards)
 
 
 @dataclass(frozen=True)
@@ -358,7 +315,7 @@ def shares(acting: NDArray[np.bool_]) -> Array:
 
 
 def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.float64]]:
-    """Return cost (runs,) and weights W (runs, p, p) of errors of the covariances S (runs, p, p)."""
+    """Return cost (runs,) and weights W (runs, p, p) of errors with covariances S (runs, p, p)."""
     inverse, logarithm = inverses(S)
     root = np.exp(logarithm / S.shape[1])
     return samples * root, (root / S.shape[1])[:, None, None] * inverse
@@ -367,7 +324,7 @@ def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.fl
 def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
     """Return the inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
 
-    Through correlations, since outputs may differ by orders of magnitude; a singular correlation is raised
+    They follow from correlations: outputs may differ by orders of magnitude. A singular correlation is raised
     to rounding, and one that has overflowed has an infinite determinant.
     """
     usable = np.atleast_1d(np.isfinite(covariances).all(axis=(1, 2)))

@@ -37,7 +37,7 @@ class ReparametrisedKind(Kind):
 
     @property
     def recent(self) -> int:
-        """Return the lag up to which the structure looks at the inputs."""
+        """Return the largest lag at which inputs act directly."""
         return self.coefficients.recent
 
     @property
@@ -52,15 +52,15 @@ class ReparametrisedKind(Kind):
 
     @property
     def _moved(self) -> NDArray[np.bool_]:
-        """Return which parameter moves which coefficient (K, k)."""
+        """Return the mask (K, k) of the coefficients that each parameter moves."""
         return self.model.parametrisation.moves
 
     def _at(self, theta: Array) -> Array:
-        """Return the coefficients (K,)."""
+        """Return the coefficients (K,) at theta."""
         return self.model.parametrisation.at(theta).coefficients
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Prediction errors (N, p) from rest, and psi (k, N, p); not a number where a coefficient is not."""
+        """Return prediction errors (N, p) from rest, and psi (k, N, p); NaN if a coefficient is infinite."""
         here = self.model.parametrisation.at(theta)
         if not (np.all(np.isfinite(here.coefficients)) and np.all(np.isfinite(here.jacobian))):
             return np.full(y.shape, np.nan), np.full((theta.size, *y.shape), np.nan)
@@ -68,7 +68,7 @@ class ReparametrisedKind(Kind):
         return errors, np.tensordot(here.jacobian, psi, axes=(0, 0))
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """Return the starts at the coefficients."""
+        """Return the effect of the past on the prediction errors, at the coefficients."""
         return self.coefficients.starts(self._at(theta), samples, late, free=free)
 
     def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
@@ -80,7 +80,7 @@ class ReparametrisedKind(Kind):
         return _STEP * (abs(float(theta[index])) or 1.0)
 
     def lateness(self, theta: Array) -> int:
-        """Return the lateness at the coefficients."""
+        """Return the number of samples in which earlier inputs act, at the coefficients."""
         return self.coefficients.lateness(self._at(theta))
 
     def crossings(self, theta: Array, samples: int) -> Array:
@@ -93,13 +93,13 @@ class ReparametrisedKind(Kind):
         return np.asarray(steps @ back.T)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return the signals whitened at the coefficients."""
+        """Return signals filtered by the inverse noise models at the coefficients."""
         return self.coefficients.whitened(self._at(theta), signals)
 
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """theta; where its predictor is not stable, the nominal parameters moved there as far as it is.
+        """Return theta if its predictor is stable, otherwise the nominal parameters moved towards it.
 
-        One after the other, so that one which has reached its end, as a dead time of zero, holds no other.
+        They move one after the other: one that has reached its end, as a dead time of zero, holds no other.
         """
 
         def is_stable(point: Array) -> bool:
@@ -119,14 +119,14 @@ class ReparametrisedKind(Kind):
         return point
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Return the starts of all coefficients, brought back to the parameters, and the `given` one."""
+        """Return the starting points of all coefficients, mapped to the parameters, and the `given` one."""
         kind = self.coefficients.holding(~np.any(self._moved, axis=1))
         found, about = kind.starting_points(parts, None), Records(self.coefficients, tuple(parts))
         points = [self.brought_back(evaluate(about, theta)) for theta in found.points]
         return Starts(np.array(points), found.tried).and_given(given)
 
     def brought_back(self, point: Point) -> Array:
-        """Return the parameters (k,) whose coefficients are nearest to a point, weighed by its Hessian."""
+        """Return the parameters (k,) whose coefficients are nearest to a point, weighted by its Hessian."""
         at = self.model.parametrisation
         if not np.isfinite(point.cost):
             return at.theta
@@ -151,10 +151,10 @@ class ReparametrisedKind(Kind):
         return np.asarray(found.x * unit, dtype=float)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions of the coefficients."""
+        """Return the extensions of the structure of the coefficients."""
         found = self.coefficients.extensions(self._at(theta), feedback=feedback)
         return tuple(extension._replace(nested=False) for extension in found)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
-        """Return which outputs can be simulated at the coefficients."""
+        """Return whether each output can be simulated at the coefficients."""
         return self.coefficients.simulates(self._at(theta))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.identification.estimate import Estimate
+from inputdesign_cli.arrays import ComplexArray
+from inputdesign_cli.identification.estimators import Estimate
 from inputdesign_cli.plant import Model
 
 _FREQUENCIES = 60
@@ -37,11 +37,7 @@ def like_nothing_elsewhere(
 
 
 def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
-    """Return the outputs (from zero) of a model whose row of G does not differ from zero significantly.
-
-    Args:
-        step: between samples, in the unit of time of the model.
-    """
+    """Return the outputs (from zero) of a model whose row of G does not differ from zero significantly."""
     return _like_nothing(model, estimate, step, axis=2)
 
 
@@ -55,9 +51,9 @@ def _like_nothing(model: Model, estimate: Estimate, step: float, axis: int) -> l
     gradient, G = _response(model, step)
     found = []
     for number in range(gradient.shape[axis]):
-        change, own = np.take(gradient, number, axis), np.take(G, number, axis - 1)
-        probability = _chance(estimate, change, own, wholly=True)
-        if np.any(change) and probability is not None and probability > _ZERO:
+        change = np.take(gradient, number, axis)
+        chance = _chance(estimate, change, np.take(G, number, axis - 1), wholly=True)
+        if np.any(change) and chance is not None and chance > _ZERO:
             found.append(number)
     return found
 
@@ -83,14 +79,11 @@ def _chance(
     Returns:
         None if no step does, or something is infinite.
     """
-
-    def stacked(x: ComplexArray) -> Array:
-        return np.concatenate([x.real.reshape(len(x), -1), x.imag.reshape(len(x), -1)], axis=1)
-
-    change, away = stacked(gradient.swapaxes(0, 1)), stacked(difference[None])[0]
-    if not all(np.all(np.isfinite(x)) for x in (change, away)):
+    if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(difference))):
         return None
-    J = scipy.linalg.solve_triangular(estimate.factor, change, lower=True)
+    every = np.concatenate([gradient.swapaxes(0, 1), difference[None]]).reshape(gradient.shape[1] + 1, -1)
+    *change, away = np.concatenate([every.real, every.imag], axis=1)
+    J = scipy.linalg.solve_triangular(estimate.factor, np.array(change), lower=True)
     _, sizes, right = np.linalg.svd(J, full_matrices=False)
     kept = sizes > _DEPENDENT * np.max(sizes, initial=0.0)
     along = right[kept] @ away

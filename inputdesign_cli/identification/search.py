@@ -23,30 +23,21 @@ from inputdesign_cli.identification.records import Point, RecordProblem, Records
 _NEARLY = 2.0 * float(np.log(1000.0))
 # Another minimum: so far apart in squared standard deviations, and by what the slope of one does not explain.
 _APART, _UNEXPLAINED = 25.0, 4.0
-# Instants that are farther, in standard deviations, part the estimate from nothing that is likely.
-_REACH = 3.0
+# Squared standard deviations between minima that are not one. Instants that are farther than _REACH standard
+# deviations part the estimate from nothing that is likely.
+_SAME, _REACH, _RIDGE = 0.1, 3.0, 1e-9
 # Begun within a deviation, a search settles in a few steps, or is stopped by the kink that it has passed.
 _STEPS, _ROUNDS = 15, 4
-# Squared standard deviations between minima that are not one.
-_SAME = 0.1
-_RIDGE = 1e-9
 # Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
-_SETTLED = 1e-8
-_ASIDE = 0.01
-_MOST_HELD_STEPS = 60
+_SETTLED, _ASIDE, _MOST_HELD_STEPS = 1e-8, 0.01, 60
 # What ten steps of a quick search must take off -2 log likelihood.
 _IDLE = 0.1
-# A record that begins at rest is taken for one that does not with this probability.
-_MISTAKEN = 0.01
-# A step that promises to take off nearly all promises too much.
-_MOST_PROMISED = 0.999
-# Above this probability nothing is searched for.
-_UNLIKELY = 0.2
-# Samples by which a dead time may grow while a search begun freely goes on.
-_SPARE = 2
-# How often they are counted anew; more than one unknown start for so many samples are many.
-_MOST_COUNTS = 4
-_MANY = 10
+# A record that begins at rest is taken for one that does not with the probability _MISTAKEN; above _UNLIKELY
+# nothing is searched for. A step that promises to take off nearly all promises too much.
+_MISTAKEN, _UNLIKELY, _MOST_PROMISED = 0.01, 0.2, 0.999
+# Samples by which a dead time may grow while a search begun freely goes on, how often they are counted anew,
+# and the samples for each unknown start if these are many.
+_SPARE, _MOST_COUNTS, _MANY = 2, 4, 10
 # Errors to spare beside unknown starts: with fewer nothing is said against rest.
 _FEWEST = 8
 # Of exp, so that it stays finite.
@@ -63,11 +54,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Search:
-    """Where the search from the best of `starts` points ended.
-
-    Attributes:
-        beside: those beyond sampling instants near it, with what they have more in -2 log likelihood.
-    """
+    """The end of the search from the best of `starts` points."""
 
     records: Records
     point: Point
@@ -76,7 +63,7 @@ class Search:
     starts: int
     first: Array  # (parts, p), the first residuals if each record began at rest about zero, noise as well
     rivals: tuple[Rival, ...]  # other minima that explain the records nearly as well, far from the best
-    beside: tuple[tuple[Point, float], ...]
+    beside: tuple[tuple[Point, float], ...]  # those beyond instants near it, with their excess
     rest_refuted: bool = False  # whether the records say that they do not begin at rest about zero
 
 
@@ -84,7 +71,7 @@ def search(records: Records, points: Array, *, starts: int, quick: int | None = 
     """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k).
 
     Args:
-        starts: how many points were looked at.
+        starts: the number of points that were tried.
         quick: the most steps from each, fewer if these gain nothing that matters. Kinks may stop the search,
             and no other minima are returned.
     """
@@ -109,17 +96,17 @@ def _first(records: Records, theta: Array) -> Array:
 
 
 def _likely(point: Point, found: Minimum) -> Iterator[tuple[int, Array, float]]:
-    """Yield runs that ended nearly as likely as the best `point`, and what they have more, the best first."""
+    """Yield runs that ended nearly as likely as the best `point`, with their excess, the best first."""
     for run in np.argsort(found.cost) if point.cost > 0.0 else ():
         cost = float(found.cost[run])
-        excess = point.near.freedom * float(np.log(cost / point.cost)) if np.isfinite(cost) else np.inf
+        excess = point.freedom * float(np.log(cost / point.cost)) if np.isfinite(cost) else np.inf
         if excess > _NEARLY:
             return
         yield int(run), np.asarray(found.theta[run], dtype=float), excess
 
 
 def rivals(point: Point, found: Minimum) -> tuple[Rival, ...]:
-    """Where other starts ended, the likeliest first: far from the best `point`, and nearly as likely."""
+    """Return the minima that other starts found, likeliest first: far from the best and nearly as likely."""
     minima = [Rival(point.theta, 0.0)]
     for _, theta, excess in _likely(point, found):
         if not any(_is_near(point, theta - other.theta, excess - other.excess) for other in minima):
@@ -129,7 +116,7 @@ def rivals(point: Point, found: Minimum) -> tuple[Rival, ...]:
 
 def _distance(point: Point, step: Array) -> float:
     """Return the square of a `step` (k,) in standard deviations of the parameters at a point."""
-    return point.near.freedom / point.cost * float(step @ point.hessian @ step)
+    return point.freedom / point.cost * float(step @ point.hessian @ step)
 
 
 def _is_near(point: Point, step: Array, excess: float) -> bool:
@@ -155,8 +142,7 @@ def _beyond_instants(records: Records, found: Minimum) -> Minimum:
     for _ in range(_ROUNDS):
         best = best_run(found)
         point = evaluate(records, found.theta[best])
-        points = _beyond(records, point) if np.isfinite(point.cost) and point.cost > 0.0 else ()
-        if not len(points):
+        if not (np.isfinite(point.cost) and point.cost > 0.0 and len(points := _beyond(records, point))):
             break
         others = minimise(RecordProblem((records,) * len(points)), points, most=_STEPS)
         better = ~others.converged & (others.cost < point.cost)
@@ -170,13 +156,13 @@ def _beyond_instants(records: Records, found: Minimum) -> Minimum:
 
 
 def _beyond(records: Records, point: Point) -> Array:
-    """(n, k): where to begin beyond instants within reach, the other parameters following the dead time."""
+    """Return starts (n, k) beyond sampling instants within reach; other parameters follow the dead time."""
     crossings = records.kind.crossings(point.theta, records.longest)
     if not len(crossings):
         return np.zeros((0, point.theta.size))
     scale = np.sqrt(np.maximum(np.diag(point.hessian), 1e-300))
     covariance = np.linalg.pinv(point.hessian / np.outer(scale, scale), rcond=_RIDGE, hermitian=True)
-    covariance *= point.cost / point.near.freedom / np.outer(scale, scale)
+    covariance *= point.cost / point.freedom / np.outer(scale, scale)
     found = []
     for to_instant, to_midst in crossings:
         index = int(np.argmax(np.abs(to_midst)))
@@ -189,10 +175,10 @@ def _beyond(records: Records, point: Point) -> Array:
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
-    """Return where a search stopped by kinks of the cost settles, or None if kinks did not stop it.
+    """Return the point where the search settles if kinks of the cost stopped it, otherwise None.
 
     A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains what its slopes promise. The same happens if the edge of stability mirrors a root.
+    and Newton gains as much as its slopes promise. The same happens if the edge of stability mirrors a root.
     Parameters that block the way are held, one after the other; only dead times, if there are some. The rest
     settles. Then each held one is moved to both sides, where the cost must be higher.
     """
@@ -226,7 +212,7 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
 
 
 def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
-    """Return the step (k,) of Gauss and Newton that leaves some parameters."""
+    """Return the Gauss-Newton step (k,) of all parameters that are not held."""
     free = np.flatnonzero(~held)
     scale = np.sqrt(np.maximum(np.diag(point.hessian)[free], 1e-300))
     step = np.zeros(held.size)
@@ -236,53 +222,36 @@ def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
 
 
 def _deviance(records: Records, point: Point) -> float:
-    """-2 log of the likelihood at the likeliest levels and states, up to a constant."""
-    products = point.near.all_errors.T @ point.near.all_errors
-    return float(records.samples * np.linalg.slogdet(products)[1]) + point.near.of_noise
+    """Return -2 log of the likelihood at the likeliest levels and states, up to a constant."""
+    products = point.all_errors.T @ point.all_errors
+    return float(records.samples * np.linalg.slogdet(products)[1]) + point.of_noise
 
 
-@dataclass(frozen=True)
-class _FromRest:
-    """The search of records from rest, against which unknown starts are held."""
+def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.0) -> float:
+    """Return the probability that useless unknown starts at a point lower -2 log likelihood as far.
 
-    found: Search
+    Many unknowns shrink the estimated noise, which chi-squared does not account for: F does. One is the
+    answer if there are no unknowns beyond the ones from rest, or too few errors to compare.
+    """
+    rest, errors, unknowns = at_rest.point, records.y.size, point.unknowns
+    more, left = unknowns - rest.unknowns, errors - len(records.kind.model.names) - unknowns
+    if more <= 0 or left <= _FEWEST:
+        return 1.0
+    fell = max(_deviance(at_rest.records, rest) - _deviance(records, point) + gain, 0.0)
+    ratio = np.expm1(min(fell / errors, _LARGEST))
+    return float(scipy.special.fdtrc(more, left, ratio * left / more))
 
-    def more(self, point: Point) -> int:
-        """Return the unknowns beyond the ones from rest; 0 if too few errors are left to compare."""
-        records = self.found.records
-        few = records.y.size <= records.size + point.near.unknowns + _FEWEST
-        return 0 if few else point.near.unknowns - self.found.point.near.unknowns
 
-    def probability(self, records: Records, point: Point, gain: float = 0.0) -> float:
-        """Return the probability that unknown starts, if useless, lower -2 log likelihood as far.
+def _promised(point: Point) -> float:
+    """Return the promised decrease of -2 log likelihood by one step: about as much as by a search.
 
-        Many unknowns shrink the estimated noise, which chi-squared does not account for: F does.
-        """
-        more, errors = max(self.more(point), 1), records.y.size
-        fell = max(_deviance(self.found.records, self.found.point) - _deviance(records, point) + gain, 0.0)
-        left = errors - records.size - point.near.unknowns
-        if left < 1:
-            return float(scipy.special.chdtrc(more, fell))
-        ratio = np.expm1(min(fell / errors, _LARGEST))
-        return float(scipy.special.fdtrc(more, left, ratio * left / more))
-
-    def unless_by_chance(self, begun: Search) -> Search:
-        """Return the search with unknown starts if chance does not explain what it gains."""
-        refuted = self.more(begun.point) > 0 and self.probability(begun.records, begun.point) < _MISTAKEN
-        return replace(begun, rest_refuted=True) if refuted else self.found
-
-    def hopeless(self, free: Records, near: Point) -> bool:
-        """Return whether a search from rest on, with unknown starts, is not worth the while.
-
-        What errors promise of one step is about what the search would find. Near the edge of stability the
-        determinant allows short steps only.
-        """
-        errors = near.of_errors
-        step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
-        # Where nothing is left of the errors there is nothing to gain.
-        share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED) if near.cost else 0.0
-        gain = -near.near.freedom * np.log1p(-share)
-        return self.more(near) <= 0 or self.probability(free, near, gain) > _UNLIKELY
+    Near the edge of stability the determinant allows short steps only.
+    """
+    errors = point.of_errors
+    step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
+    # Where nothing is left of the errors there is nothing to gain.
+    share = min(float(errors.slope @ step) / point.cost, _MOST_PROMISED) if point.cost else 0.0
+    return float(-point.freedom * np.log1p(-share))
 
 
 def from_rest_or_free(
@@ -299,7 +268,7 @@ def from_rest_or_free(
     Args:
         records: from rest.
         rest: whether the records begin at rest about zero; None: as the data say.
-        searched: what searches from its own starts and, if given, from the parameters (k,).
+        searched: a function that searches from its own starts and, if given, from the parameters (k,).
         about: (k,), parameters that show roughly how long unknown inputs act.
     """
     # An unknown level makes up for the means.
@@ -327,12 +296,15 @@ def from_rest_or_free(
     at_rest = searched(records, None)
     if rest or at_rest.point.cost <= 0.0:
         return at_rest
-    judge, late = _FromRest(at_rest), later(at_rest.point.theta)
+    late = later(at_rest.point.theta)
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
-    if records.dead_times.size and near.near.unknowns * _MANY > records.y.size:
+    if records.dead_times.size and near.unknowns * _MANY > records.y.size:
         # A wrong level or a spike may feign a dead time, and the inputs before it explain whatever they like.
-        return judge.unless_by_chance(begun_free(None, later(about)))
-    if judge.hopeless(free, near):
-        return at_rest
-    return judge.unless_by_chance(begun_free(at_rest.point.theta, late))
+        begun = begun_free(None, later(about))
+    elif _chance_of(at_rest, free, near, _promised(near)) > _UNLIKELY:
+        return at_rest  # a search with unknown starts is not worth the while
+    else:
+        begun = begun_free(at_rest.point.theta, late)
+    refuted = _chance_of(at_rest, begun.records, begun.point) < _MISTAKEN
+    return replace(begun, rest_refuted=True) if refuted else at_rest

@@ -1,4 +1,4 @@
-"""Polynomials with all roots inside the unit circle: the test, and the nearest thing when it fails."""
+"""Test whether all roots of polynomials lie inside the unit circle, and mirror the others into it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def is_stable(monic: Array) -> NDArray[np.bool_]:
 
 
 def without_integrators(monic: Array) -> Array:
-    """Return a polynomial in q^-1 divided by 1 - q^-1 as often (n times) as it can be, (m + 1 - n,)."""
+    """Return a polynomial in q^-1 divided by 1 - q^-1 as often (n times) as possible, (m + 1 - n,)."""
     while monic.size > 1 and abs(np.sum(monic)) <= _EXACT * np.sum(np.abs(monic)):
         monic = np.cumsum(monic)[:-1]
     return monic

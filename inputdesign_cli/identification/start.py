@@ -36,7 +36,7 @@ _ALIKE = 1e-6
 
 
 class Start(NamedTuple):
-    """Effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
+    """The effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
 
     free: NDArray[np.float64]  # (m, N), by the level and states, of which nothing is known
     disturbance: NDArray[np.float64]  # (m, N), `free` before the inverse of the noise model
@@ -56,11 +56,11 @@ class Start(NamedTuple):
 
 
 def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
-    """Return what stationary noise C/D e before a record adds to (D/C) of the record, (n, samples).
+    """Return the effect of stationary noise C/D e before a record on (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
-    first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values
-    are made of independent ones by the predictors of every order.
+    first n samples. Both e = D q and v = C q follow from the autoregression q = e / D. The predictors of
+    every order make its last n values of independent ones.
     """
     n = max(C.size, D.size) - 1
     if n == 0:
@@ -71,12 +71,17 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
         [np.pad(p, (before, 2 * n + 1 - before - p.size)) for before in (0, n)] for p in (C, D)
     )
     past = c[1 + i + j] @ below[n + j - i] - d[1 + i + j] @ above[n + j - i]
-    r = past @ _autoregression(d[: n + 1])[::-1]
+    # Values in a row of e / D, oldest first, made of independent ones of the variance of e.
+    predictors, variances = _step_down(d[: n + 1])
+    onto = np.eye(n)
+    for order, predictor in enumerate(predictors):
+        onto[order, :order] = predictor[:0:-1]
+    r = past @ np.linalg.solve(onto, np.diag(np.sqrt(variances)))[::-1]
     return np.asarray(r.T @ each_later(filtered([1.0], C, np.eye(1, samples)[0]), n))
 
 
 def each_later(response: Array, count: int) -> NDArray:
-    """Return a response (N,) begun at once, and one sample later than the row before, (count, N)."""
+    """Return a response (N,) in rows (count, N), each one sample later than the row before."""
     padded = np.concatenate([np.zeros(max(count - 1, 0)), response])
     return np.lib.stride_tricks.sliding_window_view(padded, response.size)[:count][::-1]
 
@@ -85,26 +90,17 @@ def density(C: Array) -> float:
     """Return -2 log of a density of the zeros of C, up to a constant: 2 log of the variance of e / C.
 
     It vanishes on the unit circle and is all but flat elsewhere, 1 - c_1^2 for one zero. The likelihood has
-    no slope across the circle, and in short records it is often largest there: noise seems to vanish at a
-    frequency, and the model to be exact ([sargan-bhargava-1983]; [chung-2013] treat variances that come out
-    zero alike). A zero z moves by about 2 z / N.
+    no slope across the circle. In short records it is often largest there: noise seems to vanish at a
+    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that come out
+    zero alike. A zero z moves by about 2 z / N.
     """
     return 2.0 * float(np.log(_step_down(C)[1][0]))
-
-
-def _autoregression(d: Array) -> NDArray:
-    """(n, n): n values in a row of e / D, oldest first, made of independent ones of the variance of e."""
-    predictors, variances = _step_down(d)
-    onto = np.eye(d.size - 1)
-    for order, predictor in enumerate(predictors):
-        onto[order, :order] = predictor[:0:-1]
-    return np.asarray(np.linalg.solve(onto, np.diag(np.sqrt(variances))))
 
 
 def _step_down(d: Array) -> tuple[list[Array], NDArray]:
     """Return the predictors of the orders 0 to n - 1 of e / D, and the variances (n,) of their errors.
 
-    By the recursion of [brockwell-davis-1991], Section 5.2, from the predictor of order n, which is D.
+    They follow from D, the predictor of order n, by the recursion of [brockwell-davis-1991], Section 5.2.
     """
     predictor, variance, found = d * (1.0 - _INSIDE) ** np.arange(d.size), 1.0, []
     while predictor.size > 1:
@@ -115,33 +111,15 @@ def _step_down(d: Array) -> tuple[list[Array], NDArray]:
     return [p for p, _ in found[::-1]], np.array([v for _, v in found[::-1]])
 
 
-class Elimination(NamedTuple):
-    """What the starts are likely to be, of records of N samples and M independent unknowns of past noise.
-
-    Attributes:
-        coefficients: output by output of its unknowns in each record, (records, m + n), free ones first.
-    """
-
-    coefficients: list[Array]
-    root: Array  # R (p, p), R^T R being the weights of the errors up to a factor
-    directions: Array  # ((N + M) p, K) orthonormal, the errors in units of R that the starts can explain
-
-
 class _Basis(NamedTuple):
-    """Orthonormal directions (N + n, K) of all errors that one start of N samples can explain.
-
-    Attributes:
-        coefficients: (m + n, K), of its unknowns for each direction; `free`, how many are not of past noise.
-        determinant: log det Z^T Z, Z being the responses to orthonormal disturbances and to past noise;
-            `gradient`, half of its gradient in the blocks of a start; `of_noise`, the one of past noise.
-    """
+    """Orthonormal directions (N + n, K) of all errors that one start of N samples can explain."""
 
     directions: Array
-    coefficients: Array
-    free: int
-    determinant: float
-    gradient: Start
-    of_noise: float
+    coefficients: Array  # (m + n, K), of its unknowns for each direction
+    free: int  # how many of these are not of past noise
+    determinant: float  # log det Z^T Z, Z being the responses to orthonormal disturbances and past noise
+    gradient: Start  # half of its gradient in the blocks of a start
+    of_noise: float  # the determinant of past noise
 
     @classmethod
     def of(cls, start: Start, samples: int) -> _Basis:
@@ -176,8 +154,8 @@ class _Basis(NamedTuple):
 class FreeStarts:
     """The starts of records of these `lengths`; `starts` has the longest record's, output by output.
 
-    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
-    as large as an error each, they are errors of their own.
+    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share.
+    Each is as large as an error and counts as one.
     """
 
     lengths: tuple[int, ...]
@@ -191,7 +169,7 @@ class FreeStarts:
 
     @property
     def past(self) -> int:
-        """M: of every record the most unknowns of past noise that an output has."""
+        """Return M: for every record the most unknowns of past noise that an output has, added up."""
         return len(self.lengths) * self._past
 
     @property
@@ -201,7 +179,7 @@ class FreeStarts:
 
     @property
     def determinant(self) -> float:
-        """log det Z^T Z, which integrating over all unknowns adds to -2 log likelihood, and `Start.zeros`.
+        """Return log det Z^T Z for all unknowns plus `Start.zeros`: both add to -2 log likelihood.
 
         Records share the noise model and its zeros.
         """
@@ -219,30 +197,30 @@ class FreeStarts:
         zeros = [float(start.zeros) for start in starts]
         return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
 
-    def combined(
-        self, coefficients: Sequence[Array], starts: Sequence[Start], *, noise: bool = True
-    ) -> Array:
-        """Return the responses (N, p) by the coefficients of all unknowns, or of the free ones.
-
-        Args:
-            starts: these, or their derivatives.
-        """
+    def combined(self, coefficients: Sequence[Array], starts: Sequence[Start]) -> Array:
+        """Return the effect (N, p) of starts, or of their derivatives, for these coefficients of unknowns."""
         within = np.arange(max(self.lengths)) < np.array(self.lengths)[:, None]
-        found = []
-        for own, start in zip(coefficients, starts, strict=True):
-            every = np.concatenate([start.free, start.noise if noise else start.noise[:0]])
-            found.append((own[:, : len(every)] @ every)[within])
-        return np.stack(found, axis=1)
+        pairs = zip(coefficients, starts, strict=True)
+        each = [(own @ np.concatenate([start.free, start.noise]))[within] for own, start in pairs]
+        return np.stack(each, axis=1)
 
     def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
-        """Return the unknowns of past noise as errors, of outputs that have fewer zero, (M, p)."""
+        """Return the unknowns of past noise as errors (M, p), zero for outputs that have fewer."""
         found = np.zeros((len(self.lengths), self._past, len(self.starts)))
         for i, (own, start) in enumerate(zip(coefficients, self.starts, strict=True)):
             found[:, : len(start.noise), i] = -own[:, len(start.free) :]
         return found.reshape(-1, len(self.starts))
 
-    def eliminated(self, errors: Array, weights: Array | None) -> Elimination:
-        """The likeliest starts of errors (N, p), weighed by W (p, p); None: as the covariance left asks."""
+    def eliminated(self, errors: Array, weights: Array | None) -> tuple[list[Array], Array, Array]:
+        """Return the likeliest starts of errors (N, p), the root of the weights, and explained directions.
+
+        The starts are coefficients (records, m + n) of all unknowns by output, free ones first. The root is
+        R (p, p), with R^T R the weights up to a factor. The directions ((N + M) p, K) that starts can explain
+        are orthonormal, in units of R.
+
+        Args:
+            weights: W (p, p); None: by the covariance of the remaining errors.
+        """
         errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
         plain, of = self._plain
 
@@ -269,12 +247,17 @@ class FreeStarts:
                 if weights is not None or abs(size - previous) <= 1e-14 * size:
                     break
                 previous = size
-            directions = _orthogonal((plain[:, None] * scaled[:, of]).reshape(-1, of.size), gram)
+            # An orthonormal basis of columns of unit length, whose products are known.
+            directions = (plain[:, None] * scaled[:, of]).reshape(-1, of.size)
+            if of.size and np.linalg.eigvalsh(gram)[0] < _ALIKE:
+                directions = np.linalg.qr(directions)[0]
+            else:
+                directions = directions @ np.linalg.inv(np.linalg.cholesky(gram)).T
         coefficients = [np.zeros((len(self.lengths), len(x.free) + len(x.noise))) for x in self.starts]
         ends = np.cumsum([basis.directions.shape[1] for _, _, basis in self._blocks])[:-1]
         for (record, i, basis), own in zip(self._blocks, np.split(shares, ends), strict=True):
             coefficients[i][record] = basis.coefficients @ own
-        return Elimination(coefficients, root, directions)
+        return coefficients, root, directions
 
     @property
     def _past(self) -> int:
@@ -288,7 +271,7 @@ class FreeStarts:
 
     @cached_property
     def _blocks(self) -> list[tuple[int, int, _Basis]]:
-        """Return record, output and basis of every start."""
+        """Return the record, the output and the basis of every start."""
         outputs = range(len(self.starts))
         return [(k, i, self._bases[n, i]) for k, n in enumerate(self.lengths) for i in outputs]
 
@@ -308,15 +291,8 @@ class FreeStarts:
         return found, of
 
 
-def _orthogonal(columns: Array, gram: Array) -> Array:
-    """Return an orthonormal basis of columns (n, m) of unit length, `gram` being their products."""
-    if np.linalg.eigvalsh(gram)[0] < _ALIKE:
-        return np.asarray(np.linalg.qr(columns)[0])
-    return np.asarray(columns @ np.linalg.inv(np.linalg.cholesky(gram)).T)
-
-
 def _root(errors: Array, weights: Array | None) -> Array:
-    """R (p, p) with R^T R = W, up to a factor; W None: the inverse of the covariance of errors (N, p)."""
+    """Return R (p, p), R^T R = W up to a factor; W None: the inverse covariance of errors (N, p)."""
     if weights is not None:
         return np.asarray(np.linalg.cholesky(weights).T)
     rms = np.sqrt(np.maximum(np.mean(errors**2, axis=0), 1e-300))

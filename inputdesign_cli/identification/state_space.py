@@ -44,8 +44,7 @@ class StateSpaceKind(Kind):
         (_, early, late), m, n, p = model.held, model.matrices, model.order, y.shape[1]
         u0, u1, direct = (shifted(u, lag, (len(u),)) for lag in (model.lag, model.lag + 1, model.direct_lag))
         at_once, slopes, closed = direct @ m.D.T, model.slopes, self._closed(model)
-        onward = np.kron(np.eye(1 + len(slopes)), closed)
-        read = np.kron(np.eye(1 + len(slopes)), m.C)
+        onward, read = (np.asarray(np.kron(np.eye(1 + len(slopes)), x), dtype=float) for x in (closed, m.C))
         driven, found = [u0 @ early.T + u1 @ late.T + (y - at_once) @ m.K.T], [at_once]
         for k, d in enumerate(slopes, start=1):
             onward[k * n : (k + 1) * n, :n] = d.A - m.K @ d.C - d.K @ m.C
@@ -57,16 +56,16 @@ class StateSpaceKind(Kind):
         return y - every[:, 0], np.moveaxis(every[:, 1:], 1, 0)
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """What the past adds: levels of the outputs, and the states at the start.
+        """Return the effect of the past: levels of the outputs, and the states at the start.
 
         Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
         Inputs before the record that come late by the dead time move the states, sample by sample, along the
-        directions in which inputs do; what they do at once, through D, is not counted. From rest, only noise
-        has moved the states, and as far as nobody knows.
+        directions of inputs. Their direct effect through D is not counted. From rest, only noise has moved
+        the states, by an unknown amount.
         """
         coloured, nothing = self._coloured, np.zeros((0, samples))
         if not (free or coloured):
-            return (Start.white(nothing),) * self.outputs
+            return (Start.white(nothing),) * self.model.outputs
         model = self.model.at(theta)
         m, n, p = model.matrices, model.order, model.outputs
         A, early, later = model.held
@@ -106,11 +105,11 @@ class StateSpaceKind(Kind):
         return np.flatnonzero([letter in letters for letter, _, _ in self.model.entries])
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return a small share of the entry."""
+        """Return a small share of the entry as the differentiation step."""
         return _STEP * max(abs(float(theta[index])), _STEP)
 
     def lateness(self, theta: Array) -> int:
-        """Return the dead time in samples, one that is begun counted whole."""
+        """Return the dead time in samples, rounded up."""
         return late_samples(self.model.at(theta).matrices.delay, self.instants)
 
     @property
@@ -125,7 +124,7 @@ class StateSpaceKind(Kind):
         return estimated or bool(np.any(self.model.matrices.K))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through the inverse of each output's own noise model, (p, N, m)."""
+        """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         model = self.model.at(theta)
         C, K, closed = model.matrices.C, model.matrices.K, self._closed(model)
         driven = signals[:, :, None]
@@ -145,12 +144,12 @@ class StateSpaceKind(Kind):
         return Starts(self.model.theta[None], 1).and_given(given)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
-        """Return whether the plant is stable or integrates."""
-        return (bool(np.all(np.abs(self.model.at(theta).poles) < 1.0 + _MARGIN)),) * self.outputs
+        """Return for every output whether the plant is stable or integrates."""
+        return (bool(np.all(np.abs(self.model.at(theta).poles) < 1.0 + _MARGIN)),) * self.model.outputs
 
     @staticmethod
     def _closed(model: StateSpaceModel) -> Array:
-        """Return A - K C, which moves the states of the predictor."""
+        """Return A - K C, the state matrix of the predictor."""
         return np.asarray(model.held[0] - model.matrices.K @ model.matrices.C)
 
 

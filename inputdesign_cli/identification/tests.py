@@ -27,19 +27,14 @@ _BAND = 2.5758293035489004
 
 
 class ResidualTest(NamedTuple):
-    """A chi-squared test of residuals over several lags, all channels at once ([ljung-1999], Section 16.6).
-
-    Attributes:
-        correlation: (n, p, columns), normalised; entry (i, j) of lag tau is that of residual i and of
-            residual or input j, tau samples earlier.
-        statistic, freedom: chi-squared with this many degrees of freedom if the model is right.
-    """
+    """A chi-squared test of residuals over several lags and all channels at once ([ljung-1999], 16.6)."""
 
     lags: Array  # (n,)
+    # (n, p, columns), normalised, of residuals with residuals or inputs that much earlier.
     correlation: NDArray[np.float64]
     limit: float  # a single correlation of white noise stays within +- limit with probability 0.99
-    statistic: float
-    freedom: int
+    statistic: float  # chi-squared if the model is right
+    freedom: int  # of that
     probability: float  # of a statistic at least as large if the model is right; small values refute it
 
     @classmethod
@@ -52,9 +47,9 @@ class ResidualTest(NamedTuple):
 def whiteness(
     errors: Array, *, lags: int = 25, fitted: int = 0, lengths: Sequence[int] | None = None
 ) -> ResidualTest:
-    """Return correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
+    """Return the test of correlations of the residuals (samples, p) among all outputs at lags 1 .. `lags`.
 
-    The portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978].
+    It has the portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978].
 
     Args:
         fitted: number of estimated parameters of the noise model, which make residuals look whiter.
@@ -80,11 +75,11 @@ def cross_correlations(
     feedback: bool = False,
     lengths: Sequence[int] | None = None,
 ) -> ResidualTest:
-    """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
+    """Return the score test of whether the past inputs u(t), u(t - 1), .. explain residuals.
 
     Args:
         errors, u: (samples, p), (samples, r).
-        lags: how far back the inputs are looked at.
+        lags: the number of lags of the inputs.
         fitted: number of estimated parameters of the plant, which take as many directions away.
         feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
         lengths: see `whiteness`.
@@ -103,33 +98,25 @@ def cross_correlations(
 
 
 def _most_lags(samples: int, pairs: int, lags: int, fitted: int) -> int:
-    """As many lags as asked for, fewer in a short record, enough for some freedom to be left."""
+    """Return the number of lags asked for, or fewer in a short record, so that some freedom is left."""
     return max(min(lags, samples // (4 * pairs)), fitted // pairs + 1)
 
 
 @dataclass(frozen=True)
 class Tests:
-    """Tests of an estimate against its own records.
+    """All tests of an estimate against its own records."""
 
-    Attributes:
-        whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
-            their correlations are (lags, p, p) and (lags, p, r).
-        shift: where an output most likely shifts, whatever the inputs do; None in too short records.
-        shifts: all that refute the structure; `beside_shifts`, `scores` once they are taken off.
-        coloured: whether the noise has more structure than its model; all tests except of past residuals are
-            then made with whitened residuals.
-        alike: of several experiments, the probability that each differs as much from the others.
-    """
-
-    whiteness: ResidualTest
-    independence: ResidualTest
+    whiteness: ResidualTest  # of the residuals, all channels at once, correlations (lags, p, p)
+    independence: ResidualTest  # of residuals and past inputs, correlations (lags, p, r)
     scores: tuple[ScoreTest, ...]  # of the structure, and `directed` of one additional parameter
     directed: tuple[Directed, ...]
-    shift: LevelShift | None
-    shifts: tuple[LevelShift, ...]
-    beside_shifts: tuple[ScoreTest, ...]
+    shift: LevelShift | None  # where an output most likely shifts; None in too short records
+    shifts: tuple[LevelShift, ...]  # all that refute the structure
+    beside_shifts: tuple[ScoreTest, ...]  # `scores` once these are taken off
+    # Whether the noise is refuted: tests, but of past residuals, are then of whitened residuals.
     coloured: bool
     future: tuple[ScoreTest, ...]  # in open loop, whether the future of each input explains errors
+    # Of several experiments, the probability that each differs as much from the others.
     alike: tuple[float, ...]
 
     @property
@@ -217,7 +204,7 @@ def tests_of(
         whiteness(errors, fitted=int(np.sum(kind.whitening)), lengths=kept),
         cross_correlations(errors, u, fitted=int(np.sum(kind.explaining)), feedback=feedback, lengths=kept),
         scores(white, robust),
-        directed_tests(robust or white, alternatives, records.size),
+        directed_tests(robust or white, alternatives, len(records.kind.model.names)),
         shift,
         shifts,
         scores(less if robust is None else white, less) if shifts else (),

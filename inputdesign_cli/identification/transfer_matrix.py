@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -36,27 +36,24 @@ _LEAST_DELAY = 1e-12
 
 @dataclass(frozen=True)
 class TransferKind(Kind):
-    """A transfer matrix in s, of inputs that are held or band-limited; see `Kind`.
-
-    Attributes:
-        held: known dead times of entries, which starting points keep.
-    """
+    """A transfer matrix in s, of inputs that are held or band-limited; see `Kind`."""
 
     model: ContinuousModel
     between: Intersample
+    # Known dead times of entries, which starts keep.
     held: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
     @property
     def continuous(self) -> bool:
-        """Return whether frequencies of the model are in rad per time unit: not behind a hold."""
+        """Return whether frequencies are in rad per time unit: not if the inputs are held."""
         return not self.between.hold
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Return y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
+        """Return prediction errors y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
         model = self.model.at(theta)
         errors, psi = y.copy(), np.zeros((theta.size, *y.shape))
         for i, j in model.active:
-            entry = self._entry(model, i, j)
+            entry = model.held(i, j, self.between.sample_time)
             columns = self.between.responses(entry, u[:, j], hold=self.between.hold)
             errors[:, i] -= columns @ entry.gain
             for index, parameter in enumerate(model.parameters):
@@ -65,16 +62,16 @@ class TransferKind(Kind):
         return errors, psi
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """What the past of each output adds: a level, and what the states of its entries do without an input.
+        """Return the effect of the past of each output: a level, and the free response of its entries.
 
-        A level of the input is unknown as well: level and states make it up where poles are stable, not the
-        ramp that an integrator makes of it, nor nearly. Inputs before the record that come late by a dead
-        time move the states, sample by sample, as if from anywhere.
+        A level of the input is unknown as well. Level and states make it up where poles are stable, but not
+        the ramp that an integrator, or nearly one, makes of it. Inputs before the record that come late by a
+        dead time move the states, sample by sample, as if from anywhere.
         """
         if not free:
-            return (Start.white(np.zeros((0, samples))),) * self.outputs
+            return (Start.white(np.zeros((0, samples))),) * self.model.outputs
         model = self.model.at(theta)
-        found = [[np.ones((1, samples))] for _ in range(self.outputs)]
+        found = [[np.ones((1, samples))] for _ in range(self.model.outputs)]
         for i, j in model.active:
             a = tuple(model.denominator[i][j].tolist())
             found[i].append(_begun(a, self.between.sample_time, samples, late))
@@ -85,7 +82,7 @@ class TransferKind(Kind):
         return np.flatnonzero([free and parameter.letter == "a" for parameter in self.model.parameters])
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return a small share of the coefficient, or of that of modes as slow as the record."""
+        """Return a small share of the coefficient, or of its value for modes as slow as the record."""
         parameter = self.model.parameters[index]
         i, j = parameter.places[0]
         slowest = 1.0 / (samples * self.between.sample_time)
@@ -98,11 +95,11 @@ class TransferKind(Kind):
 
     @property
     def instants(self) -> float | None:
-        """Return the time between the steps of held inputs; others make no kinks."""
+        """Return the time between the steps of held inputs; None for others, which make no kinks."""
         return self.between.sample_time if self.between.hold else None
 
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
+        """Return theta with poles mirrored into the left half plane, off its edge and off infinity.
 
         Poles that are exactly zero belong to integrators, and stay. Dead times are kept
         positive and below the length of the record.
@@ -122,7 +119,7 @@ class TransferKind(Kind):
         return out
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """The likeliest after a few steps from rest of those made from the parts, and the `given` one."""
+        """Return the likeliest starts after a few steps from rest, and the `given` one."""
         about = Records(self, tuple(parts))
         above = np.array([parameter.letter == "b" for parameter in self.model.parameters])
         made = []
@@ -157,20 +154,29 @@ class TransferKind(Kind):
         return replace(self, held=held)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions by a further zero or a dead time."""
+        """Return the extensions by a further zero in a proper entry, or by a dead time if it has none."""
+        model = self.model.at(theta)
+        none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
+        model, larger = replace(model, delay=model.delay or none), []
+        for i, j in model.active:
+            above = model.numerator[i][j]
+            if above.size + int(feedback) < model.denominator[i][j].size:
+                more = with_entry(model.numerator, i, j, np.append(above, 0.0))
+                larger.append((replace(model, numerator=more), "coefficient in the numerator"))
+            shared = model.active if model.common_delay else [(i, j)]
+            if not any(model.delay[o][n].size for o, n in shared):
+                late = with_entry(model.delay, i, j, np.zeros(1))
+                larger.append((replace(model, delay=late), "dead time or fast pole"))
         found = []
-        for larger, what in _larger(self.model.at(theta), feedback=feedback):
-            (name,) = set(larger.names) - set(self.names)
-            shown = SampledModel(larger, self.between.sample_time) if self.between.hold else larger
-            found.append(Extension(shown, TransferKind(larger, self.between), name, what))
+        for one, what in larger:
+            (name,) = set(one.names) - set(self.model.names)
+            shown = SampledModel(one, self.between.sample_time) if self.between.hold else one
+            found.append(Extension(shown, TransferKind(one, self.between), name, what))
         return tuple(found)
-
-    def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
-        return model.held(i, j, self.between.sample_time)
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:
-        """Return where the coefficients of each denominator stand in theta."""
+        """Return the indices in theta of the coefficients of each denominator."""
         groups: dict[tuple[tuple[int, int], ...], list[int]] = {}
         for index, parameter in enumerate(self.model.parameters):
             if parameter.letter == "a":
@@ -180,27 +186,9 @@ class TransferKind(Kind):
 
 @lru_cache(maxsize=32)
 def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int) -> Array:
-    """Return what states of an entry, and unknown inputs over `late` samples, do to its output, (m, N)."""
+    """Return the effects (m, N) of an entry's states and of `late` unknown inputs on its output."""
     entry = HeldEntry.of(np.ones(1), np.array(denominator), step)
     impulses = np.eye(min(entry.order + late, samples), samples)
     entering = np.concatenate([impulses, np.ones((int(entry.order > 0), samples))])
     poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
     return filtered([1.0], poles, entering)
-
-
-def _larger(model: ContinuousModel, *, feedback: bool) -> Iterator[tuple[ContinuousModel, str]]:
-    """Yield models with a zero more in a proper entry, or a dead time if it has none, and its name.
-
-    Args:
-        feedback: whether u(t) depends on y(t), so that it cannot act at once.
-    """
-    none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
-    model = replace(model, delay=model.delay or none)
-    for i, j in model.active:
-        above = model.numerator[i][j]
-        if above.size + int(feedback) < model.denominator[i][j].size:
-            more = with_entry(model.numerator, i, j, np.append(above, 0.0))
-            yield replace(model, numerator=more), "coefficient in the numerator"
-        shared = model.active if model.common_delay else [(i, j)]
-        if not any(model.delay[o][n].size for o, n in shared):
-            yield replace(model, delay=with_entry(model.delay, i, j, np.zeros(1))), "dead time or fast pole"

@@ -80,7 +80,7 @@ def _delays(
 
 
 def _grid(samples: int) -> Array:
-    """Dead times in samples, one by one, then ever longer ones, up to a third of the record."""
+    """Return dead times in samples: one by one, then ever longer ones, up to a third of the record."""
     longest = max(samples // 3, 1)
     fine = np.arange(min(_FINE, longest))
     steps = 1 + int(np.log(max(longest / _FINE, 1.0)) / np.log(_GROWTH))
@@ -109,9 +109,9 @@ class _Filtered:
         return np.concatenate([np.zeros(zeros), found])
 
     def regression(self, output: int, delays: Mapping[Place, float]) -> tuple[Array, float]:
-        """Return the denominator of a row, and the share of the power of its highest derivative that is left.
+        """Return the denominator of a row, and the unexplained share of the power of its highest derivative.
 
-        That of the output is regressed on its others and on the derivatives of the inputs.
+        This derivative of the output is regressed on lower ones and on derivatives of the inputs.
         """
         places = [place for place in self.model.active if place[0] == output]
         m = max(self.model.denominator[i][j].size - 1 for i, j in places)
@@ -128,7 +128,7 @@ class _Filtered:
         return solution[:m], left / max(float(np.sum(target**2)), 1e-300)
 
     def _derivatives(self, signal: int, m: int, delay: float, *, hold: bool) -> Array:
-        """(N, m + 1): of order 0 to m, of an input j >= 0 or of output -1 - j, behind 1 / (s + 1)^m."""
+        """Return derivatives (N, m + 1) of input j >= 0 or output -1 - j, filtered by 1 / (s + 1)^m."""
         key = (signal, m, delay)
         if key not in self._columns:
             step = self.between.sample_time
@@ -141,5 +141,5 @@ class _Filtered:
 
 
 def _power(cutoff: float, order: int) -> Array:
-    """(s + cutoff)^order, ascending."""
+    """Return the coefficients of (s + cutoff)^order, ascending."""
     return np.asarray(ascending.polypow([cutoff, 1.0], order), dtype=float)

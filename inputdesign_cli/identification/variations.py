@@ -36,7 +36,7 @@ RISING = "rising"
 
 
 class _Tried(NamedTuple):
-    """A signal f (N,) that is made of an input scaled to size one."""
+    """A trial signal f (N,) that is made of an input scaled to size one."""
 
     name: str
     phrase: str
@@ -47,7 +47,7 @@ class _Tried(NamedTuple):
     early: int = 0  # by how many samples that acts early
 
     def slopes(self, channel: int, size: float, model: Model, w: ArrayLike) -> NDArray[np.complex128]:
-        """Return the derivative of G by x, (states, n, p, r), of an input of this size."""
+        """Return the derivative (states, n, p, r) of G by x, for an input of this size."""
         G = model.plant_at(w)
         own, moving = np.zeros_like(G), np.zeros_like(G)
         own[..., channel] = G[..., channel]
@@ -86,7 +86,7 @@ def variations(records: Records, theta: Array, simulated: Array | None) -> tuple
 
 
 def _changes(name: str, x: Array) -> Iterator[_Tried]:
-    """Yield a gain of samples x (N,) that rises evenly, and gains that jump during the record."""
+    """Yield the signal of a gain of x (N,) that rises evenly, and of gains that jump during the record."""
     time = np.arange(x.size) / x.size
     phrase = f"a gain of {name} that rises or falls evenly during the record"
     yield _Tried(f"{name} {RISING}", phrase, "change", (time - 0.5) * x, (-0.5, 0.5))
@@ -96,7 +96,7 @@ def _changes(name: str, x: Array) -> Iterator[_Tried]:
 
 
 def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
-    """Yield signals that stand for a gain that depends on samples x (N,), of mean zero and size one."""
+    """Yield the signals of gains that depend on samples x (N,), of mean zero and size one."""
     moves = []
     for own in np.split(x, np.cumsum(lengths)[:-1]):
         # The direction in which x last moved; before it first does, the other one.
@@ -117,7 +117,7 @@ def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
 
 
 def _one_way(x: Array, simulated: Array, early: int, lengths: Sequence[int]) -> Iterator[_Tried]:
-    """Yield a plant of inputs x (N,) that is slower where its output (N,) rises than where it falls."""
+    """Yield the signal of a plant of inputs x (N,) that is slower where its output (N,) rises than falls."""
     each = (np.diff(own, prepend=own[:1]) for own in np.split(simulated, np.cumsum(lengths)[:-1]))
     changes = np.concatenate([np.append(own, np.zeros(early))[early:] for own in each])
     scale = float(np.std(changes))
@@ -131,7 +131,7 @@ def _one_way(x: Array, simulated: Array, early: int, lengths: Sequence[int]) -> 
 
 
 def _bent(f: Array, x: Array, lengths: Sequence[int]) -> tuple[Array, float]:
-    """What no straight line in x explains of f (N,) in each record, and the mean slope of these lines."""
+    """Return f (N,) less its straight-line fit in x, record by record, and the mean slope of these lines."""
     ends = np.cumsum(lengths)[:-1]
     bent, slopes = [], []
     for own, by in zip(np.split(f, ends), np.split(x, ends), strict=True):

@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.kind import FADED
 from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.records import Point, Records, shifted
 from inputdesign_cli.identification.stability import reflected
@@ -41,19 +42,17 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
     Args:
         lengths: of the records that follow each other; the longest determines the polynomials.
     """
-    at = int(np.argmax(lengths))
+    at, best, largest = int(np.argmax(lengths)), [], []
     begin = sum(lengths[:at])
-    tried = [[_fitted(v, c, d) for c, d in _ORDERS] for v in errors[begin : begin + lengths[at]].T]
-    best = [int(np.argmin([value for value, _ in one])) for one in tried]
-    chosen = [[own[k][1] for own, k in zip(tried, best, strict=True)], [own[-1][1] for own in tried]]
-    return chosen[: 1 if all(k == len(_ORDERS) - 1 for k in best) else 2]
-
-
-def _fitted(v: Array, c: int, d: int) -> tuple[float, Noise]:
-    """Return BIC of noise (n,) of these orders, and its C and D."""
-    C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
-    left = filtered(D, C, v)
-    return float(v.size * np.log(np.mean(left**2)) + (c + d) * np.log(v.size)), (C, D)
+    for v in errors[begin : begin + lengths[at]].T:
+        tried = []
+        for c, d in _ORDERS:
+            C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
+            criterion = v.size * np.log(np.mean(filtered(D, C, v) ** 2)) + (c + d) * np.log(v.size)
+            tried.append((float(criterion), (C, D)))
+        best.append(min(tried, key=lambda one: one[0])[1])
+        largest.append(tried[-1][1])
+    return [best] if all(a is b for a, b in zip(best, largest, strict=True)) else [best, largest]
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class Whitening:
         return cls(tuple(_autoregression(v, lengths) for v in errors.T), lengths)
 
     def through(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return signals (.., N + M, p) filtered record by record; the M errors before them stay.
+        """Return signals (.., N + M, p) filtered record by record; the M errors before the records stay.
 
         The first samples of a record, whose past is not known, are zero.
         """
@@ -83,7 +82,7 @@ class Whitening:
         return found
 
     def slopes(self, errors: Array) -> NDArray[np.float64]:
-        """Return minus the derivative of filtered residuals by every coefficient, (m, N, p)."""
+        """Return minus the derivative (m, N, p) of filtered residuals by every coefficient."""
         at = [(i, lag) for i, filter in enumerate(self.filters) for lag in range(1, filter.size)]
         found = np.zeros((len(at), *errors.shape))
         for k, (i, lag) in enumerate(at):
@@ -91,8 +90,8 @@ class Whitening:
         return found
 
     def echoes(self) -> NDArray[np.float64]:
-        """Return how these respond to past errors that are white, (m, lags, p, p); see `Kind.echoes`."""
-        samples, p = max(self.lengths), len(self.filters)
+        """Return the responses (m, lags, p, p) of `slopes` to past white errors; see `Kind.echoes`."""
+        samples, p = min(max(self.lengths), FADED), len(self.filters)
         alone, impulse = replace(self, lengths=(samples,)), np.eye(1, samples)[0]
         coloured = np.stack([filtered([1.0], filter, impulse) for filter in self.filters], axis=1)
         return alone.slopes(coloured)[:, :, :, None] * np.eye(p)
@@ -113,51 +112,45 @@ def _autoregression(v: Array, lengths: Sequence[int]) -> Array:
 
 @dataclass(frozen=True)
 class White:
-    """An estimate in units of the covariance of its residuals, outputs interleaved.
-
-    Attributes:
-        lengths: of the records, N samples; errors of noise before them, M of every output, follow.
-        explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
-        whitening: filters of residuals that are not white; their coefficients come after the k parameters.
-    """
+    """An estimate in units of the covariance of its residuals, outputs interleaved."""
 
     root: Array  # R (p, p), which makes residuals white
-    lengths: tuple[int, ...]
+    lengths: tuple[int, ...]  # of the records, N samples; M errors of noise before them follow
     residuals: Array  # ((N + M) p,)
     variance: float  # of the noise, in these units: residuals lack what unknown starts explain
     starts: Array  # ((N + M) p, m), orthonormal, what m unknown starts explain
-    explained: Array
-    basis: Array
+    explained: Array  # ((N + M) p, m + k), what they and the k parameters explain
+    basis: Array  # of that, orthonormal
     echoes: NDArray[np.float64]  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
-    whitening: Whitening | None = None
+    whitening: Whitening | None = None  # filters of residuals that are not white, estimated along
 
     @classmethod
     def of(cls, records: Records, point: Point, whitening: Whitening | None = None) -> White:
-        """Return that of a point of the search; a parameter that stands at its limit explains nothing.
+        """Return the estimate at a point of the search; a parameter at its limit explains nothing.
 
         Args:
             whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
                 estimated along; of the parameters of that noise model nothing is known then.
         """
-        near, starts = point.near, point.near.directions
-        errors, psi = near.all_errors, np.where(_held(records, point)[:, None, None], 0.0, near.all_psi)
-        root = _root(errors, near.samples)
+        starts = point.directions
+        errors, psi = point.all_errors, np.where(_held(records, point)[:, None, None], 0.0, point.all_psi)
+        root = _root(errors, point.samples)
         if whitening is None:
             echoes = records.kind.echoes(point.theta, records.longest)
         else:
             free = starts.T.reshape(-1, *errors.shape) @ np.linalg.inv(root).T
-            own = np.pad(whitening.slopes(near.errors), ((0, 0), (0, len(errors) - near.samples), (0, 0)))
+            own = np.pad(whitening.slopes(point.errors), ((0, 0), (0, len(errors) - point.samples), (0, 0)))
             errors, free, psi = (whitening.through(x) for x in (errors, free, psi))
             echoes = whitening.echoes()
             echoes = np.concatenate([np.zeros((len(psi), *echoes.shape[1:])), echoes])
-            psi, root = np.concatenate([psi, own]), _root(errors, near.samples)
+            psi, root = np.concatenate([psi, own]), _root(errors, point.samples)
             starts = _orthonormal(_scaled((free @ root.T).reshape(len(free), errors.size).T))
         explained = np.column_stack([starts, (psi @ root.T).reshape(len(psi), -1).T])
         return cls(
             root,
             records.lengths,
             (errors @ root.T).ravel(),
-            near.errors.size / max(near.freedom, 1),
+            point.errors.size / max(point.freedom, 1),
             starts,
             explained,
             _orthonormal(_scaled(explained)),
@@ -166,7 +159,7 @@ class White:
         )
 
     def columns(self, signals: NDArray[np.float64]) -> Array:
-        """((N + M) p, m): signals (m, N, p) in units of the residuals, zero before the records."""
+        """Return signals (m, N, p) as ((N + M) p, m) in units of the residuals, zero before the records."""
         if self.whitening is not None:
             signals = self.whitening.through(signals)
         found = np.zeros((self.residuals.size, len(signals)))
@@ -176,8 +169,8 @@ class White:
     def mean(self, echoes: NDArray[np.float64]) -> Array:
         """Return the means (m,) of the scores of signals that are made of the residuals themselves.
 
-        Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
-        the mean -tr(Q^T T Q), for T, which looks back in time, has no trace. Under whitening it is zero.
+        Residuals are P e, with P = I - Q Q^T for the unknown starts Q, and e white. The score (T P e)^T P e
+        has the mean -tr(Q^T T Q), since T looks back in time and has no trace. Under whitening it is zero.
 
         Args:
             echoes: T (m, lags, p, p), in the units of residuals.
@@ -195,13 +188,13 @@ class White:
         return -self.variance * _traces(self.echoes, self._of_starts)
 
     def probability(self, statistic: float, directions: Array) -> float:
-        """That of a sum of squares as large along f directions ((N + M) p, f), orthonormal, if all is noise.
+        """Return the probability of a sum of squares as large by chance, along orthonormal D ((N + M) p, f).
 
-        It is chi-squared in units of the noise along these directions, and what is known of that is the
-        estimate. With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of its power changes by
-        2 tr(D^T T_k D) / f for each delta theta_k; of the variance v that this has, the statistic over f is F
-        with f and 2 / v degrees of freedom. White directions have v = 0, a narrow band where the noise has a
-        zero or a pole next to the unit circle has 0.1 and more.
+        It is chi-squared in units of the noise along these directions, whose power is known by the estimate.
+        With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of this power changes by
+        2 tr(D^T T_k D) / f for each delta theta_k. If v is the variance of this change, the statistic over f
+        is F with f and 2 / v degrees of freedom. White directions have v = 0. A narrow band where the noise
+        has a zero or a pole next to the unit circle has 0.1 and more.
         """
         freedom, v = directions.shape[1], 0.0
         if np.any(self.echoes):
@@ -213,7 +206,7 @@ class White:
 
     @cached_property
     def _spread(self) -> Array:
-        """(k, (N + M) p): by it and the residuals' variance parameters are spread, starts being unknown."""
+        """Return the matrix (k, (N + M) p) that maps residuals to parameters if starts are unknown."""
         scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
         inverse = np.linalg.pinv(self.explained / scale, rcond=1e-12) / scale[:, None]
         return np.asarray(inverse[len(inverse) - len(self.echoes) :])
@@ -230,7 +223,7 @@ class White:
         return found
 
     def mean_left(self, columns: Array, means: Array) -> Array:
-        """Return the means of scores of columns (N p, m) once what parameters explain is taken off, (m,)."""
+        """Return the means (m,) of scores of columns (N p, m) less the part that parameters explain."""
         if not np.any(means) and not np.any(self.means):
             return np.zeros(columns.shape[1])
         scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
@@ -239,12 +232,12 @@ class White:
 
     @property
     def errors(self) -> Array:
-        """Return the residuals in their own units, (N, p)."""
+        """Return the residuals (N, p) in their own units."""
         samples, outputs = sum(self.lengths), len(self.root)
         return self.residuals[: samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
 
     def without(self, columns: Array) -> White:
-        """Return the estimate where columns ((N + M) p, m) of free sizes explain residuals like starts."""
+        """Return the estimate if columns ((N + M) p, m) of free sizes explain residuals like starts."""
         left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
         left = left[:, sizes > DEPENDENT]
         freedom = self.residuals.size / self.variance
@@ -263,8 +256,9 @@ class White:
 
 
 def _traces(echoes: NDArray[np.float64], correlations: NDArray[np.float64]) -> Array:
-    """tr(D^T T D) of directions with these correlations (lags, p, p), for T (m, lags, p, p)."""
-    return np.asarray(np.tensordot(echoes, correlations[: echoes.shape[1]], axes=3))
+    """Return tr(D^T T D) for T (m, lags, p, p) and directions with these correlations (lags, p, p)."""
+    lags = min(echoes.shape[1], len(correlations))
+    return np.asarray(np.tensordot(echoes[:, :lags], correlations[:lags], axes=3))
 
 
 def _held(records: Records, point: Point) -> NDArray[np.bool_]:
@@ -283,16 +277,16 @@ def _held(records: Records, point: Point) -> NDArray[np.bool_]:
 
 
 def _root(errors: Array, samples: int) -> Array:
-    """Return R (p, p) that makes errors (n, p) of `samples` samples white in space."""
+    """Return R (p, p) that makes errors (n, p) of `samples` samples uncorrelated between outputs."""
     return np.linalg.inv(np.linalg.cholesky(errors.T @ errors / samples))
 
 
 def _scaled(columns: Array) -> Array:
-    """Columns (n, m) of norm one, or zero."""
+    """Return columns (n, m) scaled to norm one, or zero."""
     return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
 
 
 def _orthonormal(columns: Array) -> Array:
-    """Return an orthonormal basis of columns (n, m), of norm one before others were taken off."""
+    """Return an orthonormal basis of columns (n, m), which had norm one before projections."""
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, singular > DEPENDENT])

@@ -25,7 +25,7 @@ _TAKES_PART = 0.05
 
 
 class Coordinates:
-    """What every experiment does with its `factor`, its `prior` and the `names` and `theta` of its model."""
+    """Converts between raw parameters and the coordinates of an experiment (`factor`, `prior`)."""
 
     factor: Array | None
     prior: Array | None
@@ -34,11 +34,11 @@ class Coordinates:
 
         @property
         def model(self) -> Model:
-            """What is to be identified."""
+            """Return the model to be identified."""
 
     @cached_property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.model.names)
 
     @cached_property
@@ -49,12 +49,12 @@ class Coordinates:
         return self.whiten_matrix(self.prior)
 
     def whiten_matrix(self, information: Array) -> Array:
-        """An information matrix (k, k) of raw parameters in these coordinates."""
+        """Return an information matrix (k, k) of raw parameters in these coordinates."""
         return self.whiten_rows(self.whiten_rows(information).T)
 
     @property
     def from_raw(self) -> Array:
-        """Return what takes the gradient with respect to raw parameters to these coordinates, (k, k)."""
+        """Return the matrix (k, k) from the gradient for raw parameters to these coordinates."""
         return np.eye(self.size) if self.factor is None else self._inverse_factor
 
     @cached_property
@@ -63,37 +63,37 @@ class Coordinates:
         return np.asarray(inverse)
 
     def to_raw(self, information: Array) -> Array:
-        """An information matrix of these coordinates in raw parameters."""
+        """Return an information matrix of these coordinates in raw parameters."""
         if self.factor is None:
             return information
         return self.factor @ information @ self.factor.T
 
     def raw_covariance(self, information: Array) -> Array:
-        """P = M^-1 in raw parameters, from an information matrix of these coordinates."""
+        """Return P = M^-1 in raw parameters, from an information matrix of these coordinates."""
         half = scipy.linalg.solve_triangular(np.linalg.cholesky(information), np.eye(self.size), lower=True)
         if self.factor is not None:
             half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
         return half.T @ half
 
     def raw_steps(self, steps: Array) -> Array:
-        """Differences (n, k) of parameters in these coordinates as such of raw parameters."""
+        """Return differences (n, k) of parameters in these coordinates as differences of raw parameters."""
         return steps if self.factor is None else steps @ self._inverse_factor
 
     def whiten_rows(self, rows: NDArray) -> NDArray:
-        """Gradients (n, k) of raw parameters in these coordinates."""
+        """Return gradients (n, k) of raw parameters in these coordinates."""
         if self.factor is None:
             return rows
         return rows @ self._inverse_factor.T
 
     def unexcited(self, directions: Array) -> str:
-        """The names of the parameters that take part in some `directions` (k, m) of these coordinates."""
+        """Return the names of the parameters in some `directions` (k, m) of these coordinates."""
         raw = directions if self.factor is None else self._inverse_factor.T @ directions
         size = np.abs(self.model.theta)
         return taking_part(self.model.names, raw / np.maximum(size, 1e-3 * size.max())[:, None])
 
 
 def taking_part(names: Sequence[str], directions: Array) -> str:
-    """The names of the parameters that take part in a space, whatever vectors span it.
+    """Return the names of the parameters that take part in a space, for any vectors that span it.
 
     Args:
         names: of the k parameters.
@@ -143,7 +143,7 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
 def triangular_factor(rows: NDArray[np.float64]) -> tuple[Array, Array]:
     """Return L (k, k), lower triangular, with rows^T rows = L L^T, and its null directions (k, m).
 
-    Rank is judged with every column of the rows (number, k) at norm one, whatever its units.
+    Rank is judged with every column of the rows (number, k) at norm one, in any units.
     """
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0.0] = 1.0

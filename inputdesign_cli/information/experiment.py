@@ -27,7 +27,7 @@ _ROUNDING = 1e-15  # shares of the largest gradient of an output
 
 @dataclass(frozen=True)
 class WeightedProducts:
-    """In parts of the frequencies, by output: the parameters (c,) that matter to it, and F^T (n, r, c)."""
+    """Holds by output, in parts of the frequencies, the parameters (c,) that matter and F^T (n, r, c)."""
 
     parts: list[list[tuple[NDArray[np.intp], ComplexArray]]]
 
@@ -98,17 +98,17 @@ class Experiment(Coordinates):
 
     @cached_property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return self.model.inputs
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of all densities below, as points frequency + j damping of the frequency plane."""
+        """Return poles of all densities below, as points frequency + j damping of the frequency plane."""
         return self._source.singularities
 
     @property
     def memory(self) -> float:
-        """How long, in samples or time units, signals matter beyond what poles remember."""
+        """Return the time, in samples or time units, that signals matter beyond what poles remember."""
         return self._source.memory
 
     @property
@@ -117,11 +117,11 @@ class Experiment(Coordinates):
 
     @cached_property
     def noise_whitener(self) -> Array:
-        """K (p, p) with K^T K the inverse of the noise covariance."""
+        """Return K (p, p) with K^T K the inverse of the noise covariance."""
         return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
-        """F_x (n, k, p, r): what x contributes to the gradient of the prediction, noise whitened to I.
+        """Return F_x (n, k, p, r): the gradient of the prediction with respect to x, noise whitened to I.
 
         F_u = H^-1 dG in open loop; in closed loop what x causes at y and u enters the prediction as well
         ([bombois-least-costly], below (4) and (15), for one channel).
@@ -132,7 +132,7 @@ class Experiment(Coordinates):
         return self._whiten(np.einsum("pq,nkqr->nkpr", self.noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return what white e of covariance I contributes, noise whitened to I, (n, k, p, p)."""
+        """Return the gradient for white e of covariance I, noise whitened to I, (n, k, p, p)."""
         K = self.noise_whitener
         gradient = self._source.noise_gradient(w)
         if len(K) == 1:
@@ -140,7 +140,7 @@ class Experiment(Coordinates):
         return self._whiten(np.einsum("pq,nkqs,st->nkpt", K, gradient, np.linalg.inv(K), optimize=True))
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r), in these coordinates."""
+        """Return dG/dtheta (n, k, p, r), in these coordinates."""
         return self._whiten(self.model.plant_gradient(w))
 
     def entry_gradient(self, w: ArrayLike, output: int, input: int) -> ComplexArray:
@@ -156,7 +156,7 @@ class Experiment(Coordinates):
         return np.tensordot(gradient, self._inverse_factor, axes=(1, 1)).transpose(0, 3, 1, 2)
 
     def information_density(self, w: ArrayLike) -> NDArray:
-        """D (n, k, k) or (n, k, k, r, r) with M = M0 + (1/2 pi) integral tr(D Phi) dw, for all N samples.
+        """Return D (n, k, k) or (n, k, k, r, r): M = M0 + (1/2 pi) integral tr(D Phi) dw, all N samples.
 
         [mohan-spectral], (3), made Hermitian in the channels and symmetric in the parameters.
         """
@@ -167,23 +167,23 @@ class Experiment(Coordinates):
         return (0.5 * self.samples) * (half + half.swapaxes(1, 2))
 
     def information_factor(self, w: ArrayLike) -> ComplexArray:
-        """F (n, k, p, r) whose products F_l^* F_m are `information_density`."""
+        """Return F (n, k, p, r) whose products F_l^* F_m are `information_density`."""
         return np.sqrt(self.samples) * self.excitation_gradient(w)
 
     def value_density(self, weight: Array, w: ArrayLike) -> NDArray:
-        """(n,) or (n, r, r): the density of tr(Y (M - M0)), Y = `weight` (k, k) symmetric."""
+        """Return the density of tr(Y (M - M0)), Y = `weight` (k, k) symmetric: (n,) or (n, r, r)."""
         return self.valued(self.products(np.atleast_1d(np.asarray(w, dtype=float))), weight)
 
     def products(self, w: Array) -> WeightedProducts:
-        """What `value_density` needs of the frequencies, whatever the weight."""
+        """Return the part of `value_density` that depends on the frequencies, not on the weight."""
         return WeightedProducts.of(self.excitation_gradient, w)
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
-        """`value_density` where the products are at hand."""
+        """Return `value_density` where the products are at hand."""
         return self.squeezed(self.samples * products.at(weight))
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
-        """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x, x or moves, of all channels or of one."""
+        """Return D (n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x, x or moves (one channel or all)."""
         if kind == "moves":
             moving = np.abs(self._moving(w)) ** 2
             density = self.power_density("input", w, channel)
@@ -195,11 +195,11 @@ class Experiment(Coordinates):
         return self.squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
 
     def depends_on_plant(self, kind: PowerKind) -> bool:
-        """Whether a power is that of a signal that the plant takes part in, not of x itself."""
+        """Return whether a power depends on the plant, so that it is not the power of x itself."""
         return kind == "output" or (kind in ("input", "moves") and self.loop is not None)
 
     def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
-        """Return from x to the outputs, the inputs, their moves or x itself, (n, p or r, r)."""
+        """Return the response to x of the outputs, inputs, their moves or x itself, (n, p or r, r)."""
         if kind == "moves":
             return self._moving(w)[:, None, None] * self.response("input", w)
         if not self.depends_on_plant(kind):
@@ -210,7 +210,7 @@ class Experiment(Coordinates):
         return y if kind == "output" else u
 
     def _moving(self, w: ArrayLike) -> ComplexArray:
-        """Return 1 - q^-1, of samples that are held, (n,)."""
+        """Return 1 - q^-1 at the frequencies, for held samples, (n,)."""
         return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
     def squeezed(self, density: NDArray) -> NDArray:
@@ -227,11 +227,11 @@ class Experiment(Coordinates):
 
     @property
     def baseline_information(self) -> Array:
-        """Return what is known without any excitation, by the noise and by `prior`, (k, k)."""
+        """Return the information (k, k) without any excitation, by the noise and by `prior`."""
         return self.noise_information + self.prior_information
 
     def of_length(self, information: Array, samples: int) -> Array:
-        """M (k, k) of this many samples of the same excitation, from M of `self.samples`."""
+        """Return M (k, k) of this many samples of the same excitation, from M of `self.samples`."""
         known = self.prior_information
         return known + samples / self.samples * (information - known)
 
@@ -256,7 +256,7 @@ class Experiment(Coordinates):
         return self.whitened_by(power, (excited, raw.excitation_gradient(excited.nodes)), (around, noise))
 
     def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
-        """Nodes for excitation that is flat over the band, and for the noise, with these singularities."""
+        """Return nodes for flat excitation over the band, and for the noise, with these singularities."""
         return band_quadrature(near, self.band), band_quadrature(near, (0.0, np.pi))
 
     def whitened_by(
@@ -289,7 +289,7 @@ class Experiment(Coordinates):
 
 
 def _real_products(F: ComplexArray) -> NDArray[np.float64]:
-    """Re sum over channels of F_l F_m^*: (n, k, p, r) -> (n, k, k)."""
+    """Return Re sum over channels of F_l F_m^* (n, k, k), for F (n, k, p, r)."""
     if F.shape[2:] == (1, 1):
         columns = F[:, :, 0, 0].T
         real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
@@ -302,7 +302,7 @@ def _real_products(F: ComplexArray) -> NDArray[np.float64]:
 
 
 def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
-    """sqrt(weight) F as real rows: (n, k, p, r) -> (2 n p r, k)."""
+    """Return sqrt(weight) F as real rows (2 n p r, k), for F (n, k, p, r)."""
     flat = F.transpose(0, 2, 3, 1) * np.sqrt(weights)[:, None, None, None]
     flat = flat.reshape(-1, F.shape[1])
     return np.concatenate([flat.real, flat.imag])
@@ -324,7 +324,7 @@ def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.
     """Return the information (S, k, k) of a sample of each of S plants without any excitation.
 
     Args:
-        gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.
+        gradients: (n, S, k, p, p) at frequencies (n,): the gradient for white e of covariance I.
         singularities: of all of them.
     """
 

@@ -16,7 +16,7 @@ from inputdesign_cli.information.record_transforms import RecordTransforms
 
 
 class _Answers(Protocol):
-    """What a plant, or its loop, answers to a record from rest."""
+    """Holds the response of a plant, or of its loop, to a record from rest."""
 
     def signals(self, of: PowerKind, record: Array) -> Array: ...
 
@@ -27,7 +27,7 @@ class _Answers(Protocol):
 
 @dataclass(frozen=True)
 class FiniteRecord:
-    """The plant or its loop, from rest, as it answers records of `samples` samples of the excitation.
+    """Computes responses of the plant or its loop, from rest, to `samples` samples of the excitation.
 
     Args:
         step: time between samples in the unit of time of the experiment's frequencies (1 for rad/sample).
@@ -57,12 +57,12 @@ class FiniteRecord:
 
     @cached_property
     def known(self) -> Array:
-        """(k, k): M0, what is known without any excitation; that of the noise is scaled to the samples."""
+        """Return M0 (k, k), known without any excitation; the noise part is scaled to the samples."""
         share = self.samples / self.experiment.samples
         return self.experiment.prior_information + share * self.experiment.noise_information
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return what the samples (n, r) alone cause at inputs or outputs, from rest, (n, channels)."""
+        """Return the response of inputs or outputs to the samples (n, r) alone, from rest, (n, channels)."""
         return record if self._is_record(of) else self._answers.signals(of, record)
 
     def mean_squares(self, of: PowerKind, record: Array) -> Array:
@@ -71,7 +71,7 @@ class FiniteRecord:
 
     @property
     def each(self) -> list[FiniteRecord]:
-        """One for every plant."""
+        """Return one `FiniteRecord` for every plant."""
         return [self]
 
     def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
@@ -84,7 +84,7 @@ class FiniteRecord:
         return weights if self._is_record(of) else self._answers.adjoint(of, weights)
 
     def _is_record(self, of: PowerKind) -> bool:
-        """Whether a signal is the excitation itself."""
+        """Return whether a signal is the excitation itself."""
         return of == "excitation" or (of == "input" and self.experiment.loop is None)
 
     @cached_property
@@ -97,22 +97,22 @@ class FiniteRecord:
 class FiniteRecords(FiniteRecord):
     """Evaluates a record at several plants at once; information matrices are stacked.
 
-    Signals are computed at the first plant, which is that of `experiment`; the `others` follow it.
+    Signals are computed at the first plant, which `experiment` has; the `others` follow it.
     """
 
     others: tuple[Experiment, ...] = ()
 
     def information(self, record: Array) -> NDArray[np.float64]:
-        """Return each as in `FiniteRecord` (1 + others, k, k)."""
+        """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
         return np.array([plant.information(record) for plant in self.each])
 
     @cached_property
     def known(self) -> NDArray[np.float64]:
-        """Return each as in `FiniteRecord` (1 + others, k, k)."""
+        """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
         return np.array([plant.known for plant in self.each])
 
     @cached_property
     def each(self) -> list[FiniteRecord]:
-        """One for every plant, the first of them that of `experiment`."""
+        """Return one `FiniteRecord` for every plant, the first for the plant of `experiment`."""
         plants = (self.experiment, *self.others)
         return [FiniteRecord(plant, self.samples, self.step) for plant in plants]

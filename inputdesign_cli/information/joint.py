@@ -31,7 +31,7 @@ Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array]
 
 
 def jointly_whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
-    """Each in coordinates where M = I by this power, see `Experiment.whitened`."""
+    """Return each experiment in coordinates where M = I by this power, see `Experiment.whitened`."""
     return [whitened for group in _groups(experiments) for whitened in _whitened(group, power)]
 
 
@@ -51,7 +51,7 @@ def _whitened(experiments: Sequence[Experiment], power: float | Array) -> list[E
 
 
 def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
-    """Return `noise_information` of each (S, k, k)."""
+    """Return `noise_information` of each experiment (S, k, k)."""
     return np.concatenate([_noise(group) for group in _groups(experiments)])
 
 
@@ -77,7 +77,7 @@ def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -
 def mean_cost(
     experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
 ) -> NDArray:
-    """(n,) or (n, r, r): the mean over plants of one structure of the density of a weighted sum of powers.
+    """Return the mean over plants of the density of a weighted sum of powers, (n,) or (n, r, r).
 
     Args:
         weights: each of a kind and of a channel or all.
@@ -90,7 +90,7 @@ def mean_cost(
 def _cost(
     experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
 ) -> NDArray:
-    """The sum over the plants."""
+    """Return the sum over the plants."""
     first, total = experiments[0], np.zeros(())
     loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
     y, u = excited(loops, w) if loops else (None, None)
@@ -129,7 +129,7 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
     entries[first_of, second_of] = entries[second_of, first_of] = np.arange(first_of.size)
 
     def density(w: Array) -> NDArray[np.float64]:
-        """(n, S, k (k + 1) / 2): products are symmetric."""
+        """Return the products (n, S, k (k + 1) / 2), which are symmetric."""
         columns = whiteners @ _excitation_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
         real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
         products = real[:, first_of] * real[:, second_of]
@@ -140,14 +140,14 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
 
 
 def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
-    """Return what x contributes to the gradients of the predictions, in raw parameters, (S, n, k, p, r)."""
+    """Return the part of x in the gradients of the predictions, in raw parameters, (S, n, k, p, r)."""
     if experiments[0].loop is not None:
         return excitation_gradients([e.loop for e in experiments if e.loop is not None], w)
     return input_gradients(experiments[0].model, [e.model for e in experiments], w)
 
 
 def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
-    """Return what e contributes (S, n, k, p, p)."""
+    """Return the part of e in the gradients of the predictions (S, n, k, p, p)."""
     if experiments[0].loop is not None:
         return disturbance_gradients([e.loop for e in experiments if e.loop is not None], w)
     return noise_gradients(experiments[0].model, [e.model for e in experiments], w)

@@ -34,13 +34,13 @@ Values = Callable[[Array], NDArray]
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Nodes and weights with (1 / 2 pi) integral over [-hi, hi] of an even f = sum weights f(nodes)."""
+    """Holds nodes and weights: (1 / 2 pi) integral over [-hi, hi] of an even f = sum weights f(nodes)."""
 
     nodes: Array
     weights: Array
 
     def part(self, which: slice) -> Quadrature:
-        """Some of the nodes with their weights."""
+        """Return some of the nodes with their weights."""
         return Quadrature(self.nodes[which], self.weights[which])
 
 
@@ -81,7 +81,7 @@ def graded_quadrature(
     refine: int = 0,
     knots: Array = _NONE,
 ) -> Quadrature:
-    """Panels on [lo, hi] for integrands with the given singularities times cos(highest_lag w).
+    """Return panels on [lo, hi] for integrands with the given singularities times cos(highest_lag w).
 
     Args:
         singularities: complex points (angle + j damping) of the frequency plane, see
@@ -125,9 +125,9 @@ def integrate(
 ) -> NDArray[np.float64]:
     """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
-    Halving gains twelve digits or none. Where it gains none and the change is already small, what
-    is left is rounding of the integrand (gradients in the whitened coordinates of a plant whose
-    parameters are nearly indistinguishable), which no rule can mend.
+    Halving gains twelve digits or none. Where it gains none and the change is already small, only rounding of
+    the integrand remains, which no rule can mend. It occurs in whitened coordinates of a plant whose
+    parameters are nearly indistinguishable.
 
     Args:
         several: values are large, as for several channels: they are computed at few nodes at a time.
@@ -175,7 +175,7 @@ def integrate(
 def _summed(
     values: Values, sums: Sums, rules: Sequence[Quadrature], at_once: int
 ) -> list[NDArray[np.float64]]:
-    """The sums on each of the rules."""
+    """Return the sums on each of the rules."""
     nodes = np.concatenate([rule.nodes for rule in rules])
     ends = np.cumsum([rule.nodes.size for rule in rules]).tolist()
     found: list[list[NDArray[np.float64]]] = [[] for _ in rules]
@@ -218,7 +218,7 @@ def integrate_band(
 
 
 def band_quadrature(singularities: ComplexArray, band: tuple[float, float]) -> Quadrature:
-    """One graded rule on the band in any unit of frequency."""
+    """Return one graded rule on the band in any unit of frequency."""
     unit = (band[1] - band[0]) / np.pi
     near: ComplexArray = np.asarray(singularities, dtype=complex) * (1.0 / unit + 0j)
     rule = graded_quadrature(near, lo=band[0] / unit, hi=band[1] / unit)

@@ -21,7 +21,7 @@ Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 
 @dataclass(frozen=True)
 class RecordFilters:
-    """Filters records of one channel; `model` is that of the experiment."""
+    """Filters records of one channel; `model` is the experiment's model."""
 
     experiment: Experiment
     model: PolynomialModel
@@ -35,7 +35,7 @@ class RecordFilters:
         return cls(experiment, model)
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return what the samples (n, 1) alone cause at the input or the output, as (n, 1)."""
+        """Return the response of the input or the output to the samples (n, 1) alone, as (n, 1)."""
         numerator, denominator = self._responses[of]
         return filtered(numerator, denominator, record, axis=0)
 
@@ -44,7 +44,7 @@ class RecordFilters:
         return self.signals(of, weights[::-1])[::-1]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """(n, k, 1): psi of the prediction, in the coordinates of the experiment, noise whitened to 1."""
+        """Return psi (n, k, 1), the gradient of the prediction, in these coordinates, noise whitened to 1."""
         sources, samples = self._sources(record), len(record)
         raw = np.zeros((samples, self.experiment.size))
         for column, parameter in enumerate(self.model.parameters):
@@ -71,8 +71,8 @@ class RecordFilters:
     def _sources(self, record: Array) -> dict[str, Array]:
         """Return the gradient with respect to a coefficient of A, B or F, but for its delay, (n,).
 
-        Minus the derivatives of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters follow each
-        other: in one product of their denominators twice the same pole costs half the digits.
+        It is minus the derivative of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters run
+        one after the other: a double pole in one product of their denominators costs half the digits.
         """
         m, letters = self.model, {p.letter for p in self.model.parameters}
         B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]

@@ -35,7 +35,7 @@ class RecordTransforms:
     step: float
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return what the samples (n, r) alone cause at inputs or outputs, (n, channels)."""
+        """Return the response of inputs or outputs to the samples (n, r) alone, (n, channels)."""
         answer = np.einsum("ncr,nr->nc", self._responses(of), self._transform(record))
         return self._back(answer)
 
@@ -47,7 +47,7 @@ class RecordTransforms:
         return falling * np.fft.irfft(answer, self._length, axis=0)[: self.samples]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """(n, k, p): psi of the prediction, in the coordinates of the experiment, noise whitened to I."""
+        """Return psi (n, k, p), the gradient of the prediction, in these coordinates, noise whitened to I."""
         transform = self._transform(record)
         model = self.experiment.model
         if self.experiment.size * model.outputs * model.inputs * len(transform) <= _KEPT:
@@ -64,7 +64,7 @@ class RecordTransforms:
         return np.fft.rfft(record * self._weights[:, None], self._length, axis=0)
 
     def _back(self, transform: ComplexArray) -> NDArray[np.float64]:
-        """(n, ..) samples of a transform (frequencies, ..) of weighted ones."""
+        """Return (n, ..) samples of a transform (frequencies, ..) of weighted ones."""
         weights = self._weights.reshape(-1, *(1 for _ in transform.shape[1:]))
         return np.fft.irfft(transform, self._length, axis=0)[: self.samples] / weights
 
@@ -75,7 +75,7 @@ class RecordTransforms:
 
     @cached_property
     def _decay(self) -> float:
-        """rho, zero where the padding outlasts the memory."""
+        """Return rho, zero where the padding outlasts the memory."""
         outlasts = self._padded == self._length and not self._integrates
         return 0.0 if outlasts else _FORGOTTEN / self._length
 
@@ -87,12 +87,12 @@ class RecordTransforms:
 
     @property
     def _integrates(self) -> bool:
-        """Whether there is no response at frequency zero."""
+        """Return whether there is no response at frequency zero."""
         return float(np.min(np.abs(self.experiment.singularities), initial=1.0)) < 1e-9
 
     @cached_property
     def _padded(self) -> int:
-        """A length past the memory of the plant, a power of two."""
+        """Return a length past the memory of the plant, a power of two."""
         experiment = self.experiment
         damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
             self.step if experiment.model.continuous else 1.0
@@ -112,7 +112,7 @@ class RecordTransforms:
         return {}
 
     def _responses(self, of: PowerKind) -> ComplexArray:
-        """(n, channels, r) at all frequencies of the transform."""
+        """Return the responses (n, channels, r) at all frequencies of the transform."""
         if of not in self._kept:
             self._kept[of] = self.experiment.response(of, self._frequencies)
         return self._kept[of]

@@ -1,1 +1,1 @@
-"""A local page that follows a spec, a campaign or a sweep: what it shows, and who serves it."""
+"""A local page that follows a spec, a campaign or a sweep: its content, and its server."""

@@ -1,6 +1,6 @@
 """The pages that follow a spec, and the files whose changes they follow.
 
-A page shows the new design beside the last good one, and what is wrong, at its line.
+A page shows the new design beside the last good one, and each error at its line.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def stamp(paths: Sequence[Path]) -> Stamp:
 
 
 def wait_for_change(paths: Sequence[Path], before: Stamp) -> Stamp:
-    """Return once some file differs from `before`, and has stopped to: the new stamp."""
+    """Wait until some file differs from `before` and changes no more, and return the new stamp."""
     while (now := stamp(paths)) == before:
         time.sleep(_EVERY)
     # An editor may write in pieces, or take the file away for a moment.
@@ -51,7 +51,7 @@ def _later(paths: Sequence[Path]) -> Stamp:
 
 @dataclass(frozen=True)
 class Followed:
-    """A spec as it is followed; `designs` are what pages say of the newest good design and the one before."""
+    """A spec as it is followed; `designs` describe the newest good design and the one before on the pages."""
 
     name: str
     state: str = "computing"  # computing, done, failed
@@ -61,11 +61,11 @@ class Followed:
     awaits: str = "computes whenever it is saved"
 
     def computing(self) -> Followed:
-        """The same while it is computed anew."""
+        """Return the followed spec with the state of a new computation."""
         return replace(self, state="computing", told="The file was saved: computing ..", errors=())
 
     def solved(self, run: Path, clock: str, seconds: float, *, pictures: bool = True) -> Followed:
-        """With the design in `run` and nothing wrong; without `pictures` these are still being drawn."""
+        """Return the followed spec with the design in `run`; without `pictures` these are yet to be drawn."""
         made = run_page(run, pictures=pictures) | {"clock": clock}
         told = (
             f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
@@ -73,19 +73,19 @@ class Followed:
         return replace(self, state="done", told=told, designs=(made, *self.designs[:1]), errors=())
 
     def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:
-        """Return the page with what is wrong; `lines` are the lines of `file`, the spec as it was read."""
+        """Return the page with the error; `lines` are the lines of `file`, the spec as it was read."""
         listed = tuple(_placed(diagnostic, lines, file) for diagnostic in error.diagnostics)
         number = f"{len(listed)} errors" if len(listed) > 1 else "One error"
         return replace(self, state="failed", told=f"{number}: the last good design stays.", errors=listed)
 
     @property
     def page(self) -> str:
-        """The page as it is now."""
+        """Return the current page."""
         return filled("watch.html", {"title": f"{self.name}: {self.state}", **vars(self)})
 
 
 def followed_page(report: str) -> str:
-    """The page of a report, with what makes a browser follow it."""
+    """Return the page of a report, with the script that makes a browser follow it."""
     told = '<p id="connection" class="bad" role="status"></p>'
     return report.replace("</head>", '<script src="follow.js" defer></script>\n</head>', 1).replace(
         "</body>", f"{told}\n</body>", 1
@@ -98,7 +98,7 @@ def message_page(name: str, told: str, awaits: str = "computes whenever it is sa
 
 
 def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str, object]:
-    """A diagnostic for the page, with the lines about its place."""
+    """Return a diagnostic for the page, with the lines about its place."""
     place = diagnostic.location
     shown: list[tuple[str, str, bool]] = []
     where = ""

@@ -1,6 +1,6 @@
 """The server of one page: loopback only, behind a path that nobody can guess, and no file at all.
 
-A page of another site cannot read it: the Host header must name the loopback interface (so that a name of
+A page of another site cannot read it. The Host header must name the loopback interface (so that a name of
 that site which leads here is refused), and the path holds a secret. Other users of the machine do not know
 that path either.
 """
@@ -31,7 +31,7 @@ _POLICY = (
 
 
 class Board:
-    """One page, and a number that grows whenever it changes."""
+    """Holds one page, and a number that grows whenever it changes."""
 
     def __init__(self) -> None:
         self._changed = Condition()
@@ -46,7 +46,7 @@ class Board:
 
     @property
     def page(self) -> tuple[str, int]:
-        """The page, and its number."""
+        """Return the page, and its number."""
         with self._changed:
             return self._page, self._version
 
@@ -59,7 +59,7 @@ class Board:
 
 @contextmanager
 def serving(board: Board, port: int = 0) -> Iterator[str]:
-    """Serve the page of a board while the block runs; its address.
+    """Serve the page of a board while the block runs, and yield its address.
 
     Args:
         port: 0 takes a free one.
@@ -95,7 +95,7 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away while it waits for news is none for the terminal."""
+        """Print nothing where a browser goes away while it waits for a new page."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -110,7 +110,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _SLOWEST
 
     def do_GET(self) -> None:
-        """One of three answers, or none."""
+        """Send the page, its script or the newest number; refuse any other request."""
         try:
             asked = urlsplit(self.path)
         except ValueError:  # such as http://[::1
@@ -134,7 +134,7 @@ class _Handler(BaseHTTPRequestHandler):
     do_HEAD = do_GET
 
     def _from_here(self) -> bool:
-        """Whether the browser asked for this machine by its own name, and for no page of another site."""
+        """Return whether the browser asked for this machine by its own name, not from another site's page."""
         named = self.headers.get_all("Host") or []
         return (
             len(named) == 1 and named[0] in self.hosts and self.headers.get("Sec-Fetch-Site") != "cross-site"

@@ -1,7 +1,7 @@
 """Many runs of one simulated experiment, in batches that any executor may compute.
 
-The batches and their random streams follow from the number of runs and the seed alone, never from where or in
-which order they are computed: the same numbers on one process, on several and on a cluster.
+The batches and their random streams follow from the number of runs and the seed alone, never from place or
+order of computation. One process, several and a cluster give the same numbers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Seed = int | np.random.SeedSequence
 
 @dataclass(frozen=True)
 class _Batch(Generic[Answer]):
-    """What a worker needs to know of a batch: the same function for all, a stream of its own."""
+    """Holds all that a worker needs for a batch: the same function for all, a stream of its own."""
 
     index: int
     function: Callable[[int, np.random.Generator], Answer]
@@ -42,11 +42,11 @@ def run_batches(
 
     Args:
         function: draws all that is random from `rng`; it can be pickled, with what all batches share.
-        seed: of the streams of all batches.
+        seed: the seed of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 
     Raises:
-        IdesignError: `worker-lost`; otherwise what `function` and the executor raise.
+        IdesignError: `worker-lost`; otherwise the errors of `function` and the executor.
     """
     root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
     batches = (

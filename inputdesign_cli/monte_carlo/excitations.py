@@ -18,39 +18,39 @@ from inputdesign_cli.spectrum import Basis, LinesBasis, TabulatedSpectrum
 
 
 class Excitation(Protocol):
-    """What the runs apply."""
+    """An excitation that the runs apply."""
 
     @property
     def name(self) -> str:
-        """How results call it."""
+        """Return the name of the excitation in results."""
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Records (runs, samples, r), each a realisation of its own."""
+        """Return records (runs, samples, r), each a realisation of its own."""
 
     def information(self, experiment: Experiment) -> Array:
-        """Return its information in theory, (k, k) in raw parameters, prior information included."""
+        """Return the information matrix in theory, (k, k) in raw parameters, prior information included."""
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """One record (samples, r), `step` apart, that all runs apply."""
+    """Holds one record (samples, r), `step` apart, that all runs apply."""
 
     name: str
     record: Array
     step: float
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """The same record for each run."""
+        """Return the same record for each run."""
         return np.broadcast_to(self.record, (runs, *self.record.shape))
 
     def information(self, experiment: Experiment) -> Array:
-        """Of the samples themselves."""
+        """Return the information matrix of the samples themselves."""
         return FiniteRecord(experiment, len(self.record), self.step).information(self.record)
 
 
 @dataclass(frozen=True)
 class Redrawn:
-    """Records of a spectrum, generated anew in each run, each channel scaled to its power exactly.
+    """Draws records of a spectrum, new ones in each run, each channel scaled to its power exactly.
 
     `basis` and `x` are the spectrum that the generator realises.
     """
@@ -64,7 +64,7 @@ class Redrawn:
     def flat(
         cls, name: str, method: str, powers: Array, band: tuple[float, float], samples: int, step: float
     ) -> Redrawn:
-        """Independent inputs of these powers (r,), each flat over a band in the unit of the experiment."""
+        """Build independent inputs of these powers (r,), flat over a band in the unit of the experiment."""
         white = TabulatedSpectrum.white(powers, band)
         spectrum = DesignedSpectrum.of(white, np.ones(1), inputs=powers.size, step=step)
         settings = SignalSettings(method, phases="orthogonal" if powers.size > 1 else "random")
@@ -72,7 +72,7 @@ class Redrawn:
         return cls(name, SignalGenerator(spectrum, settings, samples, edges), white, np.ones(1))
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Records of the generator's kind of signal."""
+        """Return records of the generator's kind of signal."""
         values = np.stack([self.generator.values(rng) for _ in range(runs)])
         records = np.repeat(values, self.generator.settings.hold, axis=1)
         found = np.mean(records**2, axis=1, keepdims=True)
@@ -87,35 +87,35 @@ class Redrawn:
         return np.array([float(self.x @ self.basis.integrals(one, nowhere)) for one in densities])
 
     def information(self, experiment: Experiment) -> Array:
-        """Of the spectrum."""
+        """Return the information matrix of the spectrum."""
         return spectral_information(self.basis, self.x, experiment)
 
 
 @dataclass(frozen=True)
 class Reapplied:
-    """Each record of an excitation applied in `times` runs: some kinds of signals take long to make."""
+    """Applies each record of an excitation in `times` runs: some kinds of signals take long to make."""
 
     excitation: Excitation
     times: int
 
     @property
     def name(self) -> str:
-        """That of the excitation."""
+        """Return the name of the excitation."""
         return self.excitation.name
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Return its records, one after the other, repeated."""
+        """Return the records of the excitation, one after the other, repeated."""
         records = self.excitation.draw(-(-runs // self.times), samples, rng)
         return np.repeat(records, self.times, axis=0)[:runs]
 
     def information(self, experiment: Experiment) -> Array:
-        """That of the excitation."""
+        """Return the information matrix of the excitation."""
         return self.excitation.information(experiment)
 
 
 @dataclass(frozen=True)
 class InPhase:
-    """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels.
+    """Draws sinusoids of `amplitudes` (L, r) at `frequencies` (L,), rad per step, in phase over the channels.
 
     `basis` and `x` are their spectrum.
     """
@@ -127,13 +127,13 @@ class InPhase:
     x: Array
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Records of random phases."""
+        """Return records of random phases."""
         return np.stack(
             [in_phase_record(self.frequencies, self.amplitudes, samples, rng) for _ in range(runs)]
         )
 
     def information(self, experiment: Experiment) -> Array:
-        """Of the sinusoids."""
+        """Return the information matrix of the sinusoids."""
         return spectral_information(self.basis, self.x, experiment)
 
 

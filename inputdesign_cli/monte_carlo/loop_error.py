@@ -1,7 +1,7 @@
 """Monte Carlo study of a controller designed on an identified model: losses of the loop for each input.
 
-Each run identifies an ARX model by least squares, designs the model-reference (or internal-model)
-controller on it, and compares the true loop with the one that the true plant would have given. The difference
+Each run identifies an ARX model by least squares and designs the model-reference (or internal-model)
+controller on it. It compares the true loop with the one that the true plant would have given. The difference
 is exact, see `error_filters`; v is the noise at the output.
 """
 
@@ -39,13 +39,13 @@ _LONGEST_GRID = 2**16
 
 @dataclass(frozen=True)
 class LossStudy:
-    """Losses of the closed loop over all runs with one input.
+    """Holds the losses of the closed loop over all runs with one input.
 
     Attributes:
         loss: (runs,) square root of the sum over the simulated samples of |y - y0|^2.
         exact: (runs,) the same from the H2 norm of each run's loop, the reference averaged out.
-        estimates: (runs, k).
-        unstable: how many estimates gave an unstable loop; their losses are left out.
+        estimates: the parameters (runs, k).
+        unstable: the number of estimates with an unstable loop; their losses are left out.
         power: (inputs,) mean squares of the inputs applied.
     """
 
@@ -68,7 +68,7 @@ def study_losses(
     """Try several inputs on the true system of `problem`, all with the same noise and reference.
 
     Args:
-        problem: of an ARX plant and a law that states its loop.
+        problem: the problem of an ARX plant and a law that states its loop.
         inputs: name -> spectrum on the harmonics of the record.
         executor: where batches of the runs are computed (default: in this process).
 
@@ -92,7 +92,7 @@ def _losses(
     runs: int,
     rng: np.random.Generator,
 ) -> dict[str, tuple[Array, Array, Array, Array]]:
-    """For each input loss (runs,), exact loss (runs,), estimates (runs, k), mean squares (runs, inputs)."""
+    """Return for each input losses (runs,), exact ones, estimates (runs, k), mean squares (runs, inputs)."""
     plant = problem.plant
     entering = _entering(problem, desired, runs, samples, rng)
     drive = noise_drive(plant.inputs, samples, runs, rng)
@@ -110,7 +110,7 @@ def _losses(
 
 
 def _noise(plant: MatrixPlant, runs: int, samples: int, rng: np.random.Generator) -> Array:
-    """What e contributes to y, (runs, samples, p), from rest; channels come first in memory."""
+    """Return the part (runs, samples, p) of y due to e, from rest; channels come first in memory."""
     white = rng.standard_normal((plant.outputs, runs, samples))
     e = np.tensordot(np.linalg.cholesky(plant.covariance), white, axes=1)
     silent = np.zeros((1, 1, plant.inputs))
@@ -131,7 +131,7 @@ def _largest_root(denominator: Array) -> Array:
 def _entering(
     problem: LoopErrorProblem, desired: DesiredLoop, runs: int, samples: int, rng: np.random.Generator
 ) -> Array:
-    """r - v (runs, samples, n) through the common filter of all runs, from rest; channels first in memory."""
+    """Return r - v (runs, samples, n) through the common filter of all runs, from rest; channels first."""
     coloured, common = problem.reference_filter, prefilter(desired)
     source = rng.standard_normal((problem.plant.outputs, runs, samples))
     source *= np.sqrt(problem.reference_variance)[:, None, None]
@@ -162,7 +162,7 @@ def _simulated(numerator: Array, denominator: Array, entering: Array, stable: ND
 def _mean_square(
     problem: LoopErrorProblem, desired: DesiredLoop, numerator: Array, denominator: Array, radius: Array
 ) -> Array:
-    """(runs,): E|y - y0|^2 of each loop, by a rule on the circle that is exact to the decay of its poles."""
+    """Return E|y - y0|^2 of each loop (runs,), by a rule on the circle exact to the decay of its poles."""
     stable = radius < 1
     common = prefilter(desired)
     slowest = max(float(radius[stable].max(initial=0.0)), float(np.abs(common.poles).max(initial=0.0)))
@@ -234,7 +234,7 @@ def error_filters(plant: MatrixPlant, desired: DesiredLoop, A: Array, B: Array) 
 
 
 def prefilter(desired: DesiredLoop) -> TransferMatrix:
-    """The part of the filter from r - v to y - y0 that is the same in all runs, applied first."""
+    """Return the part of the filter from r - v to y - y0 that is common to all runs and applied first."""
     F, d = desired.free.common_fraction()
     if not _is_scalar(F):
         return desired.free
@@ -242,18 +242,18 @@ def prefilter(desired: DesiredLoop) -> TransferMatrix:
 
 
 def _is_scalar(numerator: Array) -> bool:
-    """Whether a matrix of polynomials (n, n, l) is a multiple of I."""
+    """Return whether a matrix of polynomials (n, n, l) is a multiple of I."""
     return np.array_equal(numerator, np.eye(len(numerator))[:, :, None] * numerator[0, 0])
 
 
 def _trimmed(polynomials: Array) -> Array:
-    """Without coefficients at the end that vanish in all runs."""
+    """Return polynomials without the last coefficients that vanish in all runs."""
     held = np.flatnonzero(np.any(polynomials.reshape(-1, polynomials.shape[-1]) != 0, axis=0))
     return polynomials[..., : int(held[-1]) + 1 if held.size else 1]
 
 
 def _times(left: Array, right: Array) -> Array:
-    """Polynomials (.., l) times one polynomial (m,)."""
+    """Return polynomials (.., l) times one polynomial (m,)."""
     product = np.zeros((*left.shape[:-1], left.shape[-1] + right.size - 1))
     for lag, factor in enumerate(right):
         product[..., lag : lag + left.shape[-1]] += factor * left
@@ -266,7 +266,7 @@ def _plus(left: Array, right: Array) -> Array:
 
 
 def _resized(polynomial: Array, size: int) -> Array:
-    """Padded with zeros at the end, or cut there."""
+    """Return polynomials padded with zeros at the end, or cut there."""
     missing = size - polynomial.shape[-1]
     if missing <= 0:
         return polynomial[..., :size]
@@ -274,5 +274,5 @@ def _resized(polynomial: Array, size: int) -> Array:
 
 
 def _on_diagonal(polynomials: Array, n: int) -> Array:
-    """(runs, n, n, l) from (runs, l)."""
+    """Return diagonal matrices of polynomials, (runs, n, n, l) from (runs, l)."""
     return polynomials[:, None, None] * np.eye(n)[:, :, None]

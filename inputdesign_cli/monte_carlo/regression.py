@@ -22,7 +22,7 @@ Contender = Literal["white", "binary"]
 
 @dataclass(frozen=True)
 class Estimates:
-    """What the runs gave: estimates (runs, m) and errors (runs,) of the quantity of interest."""
+    """Holds the estimates (runs, m) and the errors (runs,) of the quantity of interest."""
 
     theta: NDArray[np.float64]
     error: Array
@@ -37,7 +37,7 @@ def run_experiments(
     seed: Seed,
     executor: Executor | None = None,
 ) -> Estimates:
-    """Least-squares estimates of theta_1 from `runs` records of the regressors Phi (N, n)."""
+    """Estimate theta_1 by least squares from `runs` records of the regressors Phi (N, n)."""
     samples, m = Phi.shape[0], regression.m
     smoother = np.asarray(np.linalg.pinv(Phi[:, :m]), dtype=float)
     estimated = partial(_estimates, Phi @ theta, float(np.sqrt(regression.variance)), smoother)
@@ -51,7 +51,7 @@ def run_experiments(
 def contending_regressors(
     kind: Contender, shape: tuple[int, ...], *, delayed: int | None, energy: float, rng: np.random.Generator
 ) -> Array:
-    """White Gaussian or binary regressors Phi (N, n) of this energy, trace Phi^T Phi.
+    """Return white Gaussian or binary regressors Phi (N, n) of this energy, trace Phi^T Phi.
 
     Args:
         shape: (N, channels) of the signals to apply.

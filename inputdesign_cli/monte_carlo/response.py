@@ -1,4 +1,4 @@
-"""Monte Carlo of a nonparametric frequency response: how far estimates scatter at each line."""
+"""Monte Carlo study of a nonparametric frequency response: the scatter of the estimates at each line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BATCH_SAMPLES = 1_000_000
 
 @dataclass(frozen=True)
 class ResponseStudy:
-    """Means and standard deviations (L, p, r) of estimates of G over `runs` experiments."""
+    """Holds means and standard deviations (L, p, r) of estimates of G over `runs` experiments."""
 
     mean: ComplexArray
     deviation: NDArray[np.float64]
@@ -36,7 +36,7 @@ def study_response(
     seed: Seed,
     executor: Executor | None = None,
 ) -> ResponseStudy:
-    """Estimates from `runs` experiments with the input u (N, r), each from rest with noise of its own.
+    """Estimate G from `runs` experiments with the input u (N, r), each from rest with noise of its own.
 
     Args:
         executor: where batches of the runs are computed (default: in this process).

@@ -1,4 +1,4 @@
-"""What a finite number of runs can show: confidence limits of a fraction, the spread of covariances."""
+"""Statistics of a finite number of runs: confidence limits of a fraction, the spread of covariances."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _DRAWS = 2000
 
 
 def binomial_limits(successes: int, runs: int, *, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact two-sided confidence limits of a probability, [clopper-pearson-1934]."""
+    """Return exact two-sided confidence limits of a probability, [clopper-pearson-1934]."""
     tail = 0.5 * (1.0 - confidence)
     lower = 0.0 if successes == 0 else scipy.special.betaincinv(successes, runs - successes + 1, tail)
     upper = 1.0 if successes == runs else scipy.special.betaincinv(successes + 1, runs - successes, 1 - tail)
@@ -21,9 +21,9 @@ def binomial_limits(successes: int, runs: int, *, confidence: float = 0.95) -> t
 def wishart_range(
     size: int, runs: int, rng: np.random.Generator, *, confidence: float = 0.99
 ) -> tuple[float, float]:
-    """Where the eigenvalues of the sample covariance of `runs` vectors N(0, I) lie, all at once.
+    """Return a range for all eigenvalues of the sample covariance of `runs` vectors N(0, I) at once.
 
-    From draws of the Wishart distribution by the decomposition of [bartlett-1933].
+    The Wishart distribution is drawn from by the decomposition of [bartlett-1933].
     """
     degrees = runs - 1
     lower = np.tril(rng.standard_normal((_DRAWS, size, size)), -1)
@@ -35,7 +35,7 @@ def wishart_range(
 
 
 def whitened_eigenvalues(estimates: Array, information: Array) -> Array:
-    """(k,): eigenvalues of the sample covariance of `estimates` (runs, k) in units of M^-1, near one."""
+    """Return the eigenvalues (k,) of the covariance of `estimates` (runs, k) in units of M^-1, near one."""
     centred = estimates - estimates.mean(axis=0)
     # Through a factor of M with a unit diagonal: M itself may have a condition number of 1e12.
     scale = np.sqrt(np.diag(information))

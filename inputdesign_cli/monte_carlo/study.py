@@ -26,7 +26,7 @@ _OUTPUTS_AT_ONCE = 100
 
 @dataclass(frozen=True)
 class Study:
-    """What is tried, and on what.
+    """Holds the experiment on the design model and on the true system.
 
     Attributes:
         nominal, true: the experiment on the design model and on the true system; the same object where
@@ -43,7 +43,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Tried:
-    """The runs of one excitation on one system.
+    """Holds the runs of one excitation on one system.
 
     Attributes:
         information: (k, k) in theory, or None if the true system has other parameters than the model.
@@ -89,7 +89,7 @@ def _run(
     with an error of its own in each run.
 
     Args:
-        model: of which the structure is estimated; the search begins at its parameters.
+        model: the model whose structure is estimated; the search begins at its parameters.
     """
     system = true.model
     e = _noise(true, runs, rng)
@@ -111,14 +111,14 @@ def _run(
 
 
 def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> Array:
-    """e (runs, samples, p) of a system."""
+    """Draw e (runs, samples, p) of a system."""
     system = true.model
     white = rng.standard_normal((runs, true.samples, system.outputs))
     return np.asarray(white @ np.linalg.cholesky(system.covariance).T)
 
 
 def responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple[Array, Array], ...]:
-    """Inputs (runs, samples, r) and outputs (runs, samples, p) from rest: of r alone, and of r and e."""
+    """Return u (runs, samples, r) and y (runs, samples, p) from rest: due to r alone, and to r and e."""
     if true.loop is None:
         y_r, y_e = true.model.simulate(r, e, step)
         return (r, r), (y_r, y_r + y_e)
@@ -129,7 +129,7 @@ def responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple[
 def _again_where_lost(
     again: Callable[[Array, Array], Estimate], u: Array, y: Array, found: BatchEstimate
 ) -> BatchEstimate:
-    """The same, each run whose search did not settle estimated anew from several starts."""
+    """Return the estimates, each run whose search did not settle estimated anew from several starts."""
     theta, noise, information = found.theta.copy(), found.noise.copy(), found.information.copy()
     converged, steps = found.converged.copy(), found.steps.copy()
     lost = np.flatnonzero(~converged).tolist()
@@ -145,11 +145,11 @@ def _again_where_lost(
 
 
 def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
-    """Estimates (runs, k) combined with earlier ones.
+    """Combine estimates (runs, k) with earlier estimates.
 
     Args:
         prior: the information (k, k) of the earlier estimates, which may be singular.
-        centre: (k,), about which they scatter.
+        centre: the parameters (k,) about which they scatter.
     """
     values, vectors = np.linalg.eigh(prior)
     root: NDArray[np.float64] = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -161,16 +161,16 @@ def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.rando
 def searched_run(
     nominal: Experiment, record: Array, step: float, rng: np.random.Generator, earlier: Earlier | None
 ) -> tuple[Estimate, bool]:
-    """The minima that the search of `identify` finds, and whether the best one is that of the nominal plant.
+    """Return the minima that the search of `identify` finds, and whether the nominal plant's is the best.
 
-    The estimate is the minimum that is nearest to the nominal parameters; its rivals are the others, whose
+    The estimate is the minimum that is nearest to the nominal parameters; its rivals are the others. Their
     excess is negative where they explain the record better.
 
     Args:
         nominal: the experiment, in raw parameters.
         record: (n, r), the excitation.
         step: time between samples in the unit of the experiment's frequencies.
-        earlier: what counts along.
+        earlier: the earlier estimates that are combined with the record.
 
     Raises:
         SpecError: see `identify`.

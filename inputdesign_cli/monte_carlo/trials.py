@@ -1,4 +1,4 @@
-"""What many runs of one excitation gave, and how far the estimated models are from the true system."""
+"""The results of many runs of one excitation, and the errors of the estimated models."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from inputdesign_cli.plant import Model
 
 @dataclass(frozen=True)
 class PredictedError:
-    """What the design predicts over frequency: r_u and, if one is asked for, r_adm, (n,) each.
+    """Holds the error over frequency that the design predicts: r_u and, if asked for, r_adm, (n,) each.
 
     `w` (n,) is in the unit of the experiment. Several entries of G stand one after the other, each over its
     own frequencies: `entries` holds the entry (output, input) of each value, (n, 2). Without it the
@@ -32,11 +32,11 @@ class PredictedError:
 
 @dataclass(frozen=True)
 class Trials:
-    """What many runs of one excitation gave.
+    """Holds the results of many runs of one excitation.
 
     Attributes:
         true: the experiment on the true system.
-        model: of which the structure was estimated.
+        model: the model whose structure was estimated.
         theta: (runs, k) estimates; `converged` (runs,).
         power: mean squares that the excitation causes, channel by channel: input, output, excitation.
         total_power: mean squares of inputs and outputs, noise included.
@@ -53,7 +53,7 @@ class Trials:
 
     @classmethod
     def joined(cls, parts: Sequence[Trials]) -> Trials:
-        """All batches of one study as one; mean squares are weighted by the number of runs."""
+        """Join all batches of one study; mean squares are weighted by the number of runs."""
         weights = [len(part.theta) for part in parts]
 
         def averaged(entries: Sequence[dict[PowerKind, list[float]]]) -> dict[PowerKind, list[float]]:
@@ -72,16 +72,16 @@ class Trials:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The estimated parameters."""
+        """Return the names of the estimated parameters."""
         return self.model.names
 
     @property
     def truth(self) -> Array:
-        """theta (k,) of the true system, which may have other parameters."""
+        """Return theta (k,) of the true system, which may have other parameters."""
         return self.true.model.theta
 
     def errors(self, predicted: PredictedError) -> Array:
-        """|G_hat - G_0| (runs, n) at the frequencies and entries of the prediction, or its Frobenius norm."""
+        """Return |G_hat - G_0| (runs, n) at the predicted frequencies and entries, or its Frobenius norm."""
         w, where = np.unique(predicted.w, return_inverse=True)
         true = self.true.model.plant_at(w)
         parts = []
@@ -94,7 +94,7 @@ class Trials:
         return np.array(parts)
 
     def bound(self, predicted: PredictedError, information: Array) -> Array:
-        """r_u (n,) on the true system at the frequencies and entries of the prediction."""
+        """Return r_u (n,) on the true system at the frequencies and entries of the prediction."""
 
         def at(w: Array, entry: Entry | None) -> Array:
             true, limit = self.true, Absolute(1.0)  # of r_adm, which is not stated

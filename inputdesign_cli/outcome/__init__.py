@@ -1,4 +1,4 @@
-"""What a question returns: typed results, and their form as JSON."""
+"""Typed results of a question, and their form as JSON."""
 
 from inputdesign_cli.outcome.campaign import Campaign as Campaign
 from inputdesign_cli.outcome.codec import (

@@ -1,4 +1,4 @@
-"""What is said of a campaign: its records, its rounds and its plans."""
+"""The entry of a campaign in a result: its records, its rounds and its plans."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PlanKind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 
 @dataclass(frozen=True)
 class PartRecord:
-    """A record of a part, compared with its plan.
+    """Holds a record of a part, compared with its plan.
 
     Attributes:
         file: its name in the directory; `given`: the name of the user's file.
@@ -35,7 +35,7 @@ class PartRecord:
 
 @dataclass(frozen=True)
 class PlanClaim:
-    """What is proved of the design behind a plan."""
+    """Holds the proof of the design behind a plan."""
 
     status: str
     objective: Objective
@@ -44,7 +44,7 @@ class PlanClaim:
 
 @dataclass(frozen=True)
 class PlannedPart:
-    """A part to be applied.
+    """Describes a part to be applied.
 
     Attributes:
         samples: of the part; `planned_samples`: of the whole plan.
@@ -72,7 +72,7 @@ class PlannedPart:
 
 @dataclass(frozen=True)
 class Round:
-    """A decision after some records, with the estimate that it rests on."""
+    """Holds a decision after some records, with the estimate that it rests on."""
 
     samples: int
     energy: float
@@ -87,7 +87,7 @@ class Round:
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """The records and decisions of an experiment in parts.
+    """Holds the records and decisions of an experiment in parts.
 
     Attributes:
         version: of the form of the directory.
@@ -113,15 +113,15 @@ class Campaign:
 
     @property
     def done(self) -> int:
-        """Samples that have been applied, in records that count or not."""
+        """Return the number of samples that have been applied, in records that count or not."""
         return sum(record.samples for record in self.records)
 
     @property
     def plan(self) -> PlannedPart | None:
-        """The part that is due; None if the campaign has ended."""
+        """Return the part that is due; None if the campaign has ended."""
         return self.rounds[-1].plan if self.rounds else None
 
     @property
     def plans(self) -> tuple[PlannedPart, ...]:
-        """Every plan, in order."""
+        """Return every plan, in order."""
         return tuple(one.plan for one in self.rounds if one.plan is not None)

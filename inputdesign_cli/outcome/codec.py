@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class OutcomeError(ValueError):
-    """Plain data do not have the form of the result that they should hold."""
+    """Says that plain data do not have the form of the result that they should hold."""
 
 
 NULL = {"null": True}

@@ -1,4 +1,4 @@
-"""What figures show: plain data, nothing to compute; `figures.plots` draws each kind.
+"""Content of figures: plain data, nothing to compute; `figures.plots` draws each kind.
 
 Frequencies are in rad per time unit, spectra in the convention of the contract (power = integral over the
 normalised circle / 2 pi).
@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 
 
 class Curves:
-    """What one figure shows; `figures.plots` draws each kind."""
+    """Holds the content of one figure; `figures.plots` draws each kind."""
 
 
 @dataclass(frozen=True)
 class SpectrumCurves(Curves):
-    """The spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
+    """Holds the spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
 
     frequency: Array  # (n,) rad per time unit
     spectrum: NDArray[np.complex128]  # (n, r, r), Hermitian; real powers will do
@@ -35,7 +35,7 @@ class SpectrumCurves(Curves):
 
 @dataclass(frozen=True)
 class DirectionCurves(Curves):
-    """The plant's gains in its principal directions, and the input's power in each of them."""
+    """Holds the plant's gains in its principal directions, and the input's power in each of them."""
 
     frequency: Array  # (n,)
     gain: Array  # (n, inputs), singular values of G, largest first
@@ -46,7 +46,7 @@ class DirectionCurves(Curves):
 
 @dataclass(frozen=True)
 class LossCurves(Curves):
-    """What the runs of a Monte Carlo study lost, input by input."""
+    """Holds the losses in the runs of a Monte Carlo study, input by input."""
 
     losses: Mapping[str, Array]  # name -> (runs,)
     theory: Mapping[str, float] = field(default_factory=dict)  # name -> mean
@@ -54,7 +54,7 @@ class LossCurves(Curves):
 
 @dataclass(frozen=True)
 class BoundPanel:
-    """Model error against admissible error over frequency, of one entry of G; all arrays (n,)."""
+    """Holds model error and admissible error over frequency, of one entry of G; all arrays (n,)."""
 
     frequency: Array
     r_u: Array
@@ -72,7 +72,7 @@ class BoundPanel:
 
 @dataclass(frozen=True)
 class BoundCurves(Curves):
-    """Model error against admissible error, entry by entry, of one of several plants or of the only one."""
+    """Holds model error and admissible error, entry by entry, of one of several plants or the only one."""
 
     panels: tuple[BoundPanel, ...]
     of_several: bool = False
@@ -80,7 +80,7 @@ class BoundCurves(Curves):
 
 @dataclass(frozen=True)
 class NyquistCurves(Curves):
-    """The loop C G of one channel over frequency, and how far r_u lets it stray; arrays (n,)."""
+    """Holds the loop gain C G of one channel over frequency, and its error discs by r_u; arrays (n,)."""
 
     frequency: Array
     loop: NDArray[np.complex128]
@@ -91,7 +91,7 @@ class NyquistCurves(Curves):
 
 @dataclass(frozen=True)
 class ResponsePanel:
-    """An entry of G from data alone, the radius of its confidence disc, and that of a model; all (n,)."""
+    """Holds an entry of G from data alone, the radius of its confidence disc, and a model's; all (n,)."""
 
     frequency: Array
     G: NDArray[np.complex128]
@@ -103,14 +103,14 @@ class ResponsePanel:
 
 @dataclass(frozen=True)
 class ResponseCurves(Curves):
-    """The frequency response without a model beside that of a model, entry by entry."""
+    """Holds the frequency response without a model beside that of a model, entry by entry."""
 
     panels: tuple[ResponsePanel, ...]
 
 
 @dataclass(frozen=True)
 class DeviationPanel:
-    """Standard deviations of an entry of a frequency response, and what is admitted, at lines; all (n,)."""
+    """Holds standard deviations of an entry of G at lines, and the admitted ones; all (n,)."""
 
     frequency: Array
     G_abs: Array
@@ -124,14 +124,14 @@ class DeviationPanel:
 
 @dataclass(frozen=True)
 class DeviationCurves(Curves):
-    """Standard deviations of a frequency response, entry by entry."""
+    """Holds standard deviations of a frequency response, entry by entry."""
 
     panels: tuple[DeviationPanel, ...]
 
 
 @dataclass(frozen=True)
 class OptimalityCurves(Curves):
-    """The equivalence-theorem ratio over frequency: at most one everywhere, one on the support."""
+    """Holds the equivalence-theorem ratio over frequency: at most one, and one on the support."""
 
     frequency: Array
     ratio: Array
@@ -140,7 +140,7 @@ class OptimalityCurves(Curves):
 
 @dataclass(frozen=True)
 class FanCurves(Curves):
-    """r_u / r_adm over frequency at many plants; of several entries of G the largest."""
+    """Holds r_u / r_adm over frequency at many plants; of several entries of G the largest."""
 
     frequency: Array  # (n,)
     ratios: Array  # (plants, n)
@@ -169,14 +169,14 @@ class EstimateCurves(Curves):
 
 @dataclass(frozen=True)
 class RatioCurves(Curves):
-    """The largest r_u / r_adm of the true plant in many runs, way by way of experimenting: (runs,)."""
+    """Holds the largest r_u / r_adm of the true plant in many runs, way by way: (runs,)."""
 
     ratios: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
 class TradeCurves(Curves):
-    """Cost over that of the spectrum of the design that knows the plant, against the share within r_adm.
+    """Holds the cost relative to the design that knows the plant, and the share of runs within r_adm.
 
     Of each way: mean, 5 % and 95 % of the cost; the share and its 95 % limits. `record`: cost of the record
     that the design delivers which knows the plant.
@@ -188,7 +188,7 @@ class TradeCurves(Curves):
 
 @dataclass(frozen=True)
 class Ellipse:
-    """The predicted confidence region of a pair of parameters: their values and (2, 2) covariances."""
+    """Holds the predicted confidence region of a pair of parameters: values and (2, 2) covariances."""
 
     names: tuple[str, str]
     center: Array  # (2,)
@@ -198,7 +198,7 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class EllipseCurves(Curves):
-    """Confidence ellipses of some pairs, all at one `probability`."""
+    """Holds confidence ellipses of some pairs, all at one `probability`."""
 
     pairs: tuple[Ellipse, ...]
     probability: float = 0.95
@@ -206,7 +206,7 @@ class EllipseCurves(Curves):
 
 @dataclass(frozen=True)
 class CloudCurves(Curves):
-    """Estimates of many runs in some planes of the parameters, and what theory predicts."""
+    """Holds estimates of many runs in some planes of the parameters, and the theoretical covariance."""
 
     names: tuple[str, ...]
     pairs: tuple[tuple[int, int], ...]
@@ -218,7 +218,7 @@ class CloudCurves(Curves):
 
 @dataclass(frozen=True)
 class ErrorBandPanel:
-    """Quantiles over many runs of |G_hat - G_0| over frequency, against what was predicted; arrays (n,)."""
+    """Holds quantiles over many runs of |G_hat - G_0| over frequency, and the prediction; arrays (n,)."""
 
     frequency: Array
     quantiles: Mapping[float, Array]  # probability -> (n,)
@@ -230,7 +230,7 @@ class ErrorBandPanel:
 
 @dataclass(frozen=True)
 class ErrorBandCurves(Curves):
-    """The errors of the models of `runs` experiments with the input `name`, entry by entry."""
+    """Holds the errors of the models of `runs` experiments with the input `name`, entry by entry."""
 
     panels: tuple[ErrorBandPanel, ...]
     name: str = "design"
@@ -239,7 +239,7 @@ class ErrorBandCurves(Curves):
 
 @dataclass(frozen=True)
 class FitPanel:
-    """A recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
+    """Holds a recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
 
     y: Array
     predicted: Array
@@ -251,7 +251,7 @@ class FitPanel:
 
 @dataclass(frozen=True)
 class FitCurves(Curves):
-    """A model against the data that it was estimated from, output by output, over `time` (n,)."""
+    """Holds the fit of a model to the data of its estimate, output by output, over `time` (n,)."""
 
     time: Array
     panels: tuple[FitPanel, ...]
@@ -260,7 +260,7 @@ class FitCurves(Curves):
 
 @dataclass(frozen=True)
 class ResidualCurves(Curves):
-    """Normalised correlations of p residuals among each other and with r past inputs, over lags (samples).
+    """Holds normalised correlations of p residuals with each other and with r past inputs, over lags.
 
     `whiteness` and `independence` are the probabilities of the two tests.
     """
@@ -276,7 +276,7 @@ class ResidualCurves(Curves):
 
 @dataclass(frozen=True)
 class OrderCurves(Curves):
-    """How well structures simulate data, `unseen` or their own: per family the fit over the parameters."""
+    """Holds the fit of structures to data, `unseen` or their own, over the number of parameters."""
 
     fits: Mapping[str, tuple[Array, Array]]  # family -> numbers of parameters, per cent
     chosen: tuple[float, float]
@@ -287,7 +287,7 @@ class OrderCurves(Curves):
 
 @dataclass(frozen=True)
 class PredictedPanel:
-    """What the record causes at an output from rest, and the standard deviation of the noise; arrays (n,)."""
+    """Holds the output that the record causes from rest, and the deviation of its noise; arrays (n,)."""
 
     name: str  # "y1"
     values: Array
@@ -298,7 +298,7 @@ class PredictedPanel:
 
 @dataclass(frozen=True)
 class SignalCurves(Curves):
-    """The record to be applied: `time` (n,), one array (n,) a channel; below, what it is to cause."""
+    """Holds the record to be applied: `time` (n,), an array (n,) for each channel; below, the outputs."""
 
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
@@ -312,7 +312,7 @@ class SignalCurves(Curves):
 
 @dataclass(frozen=True)
 class ErrorCurves(Curves):
-    """Mean-squared error of a shape of moments over the energy; all arrays (n,)."""
+    """Holds the mean squared error of moments of one shape over the energy; all arrays (n,)."""
 
     energy: Array
     bias_squared: Array
@@ -324,7 +324,7 @@ class ErrorCurves(Curves):
 
 @dataclass(frozen=True)
 class MomentsCurves(Curves):
-    """The moments of regressors, and the lines of the periodic input that has them (if it is one input)."""
+    """Holds the moments of regressors, and the lines of the periodic input that has them (for one input)."""
 
     R: Array  # (n, n)
     estimated: int  # how many of the n are estimated

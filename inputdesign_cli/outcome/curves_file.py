@@ -1,4 +1,4 @@
-"""figures.json: what the figures of a run show, so that a page draws them again, in its own size."""
+"""figures.json: the content of the figures of a run, so that a page draws them again, in its own size."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def curves_json(curves: Mapping[str, Curves]) -> bytes:
 
 
 def _plain(value: object) -> object:
-    """Return what JSON has no type for: complex numbers, and arrays that are not contiguous."""
+    """Return values without a type in JSON: complex numbers, and arrays that are not contiguous."""
     if not isinstance(value, np.ndarray):
         raise TypeError(f"a figure cannot hold a {type(value).__name__}")
     if np.iscomplexobj(value):

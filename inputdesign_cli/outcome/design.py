@@ -1,4 +1,4 @@
-"""What is said of a designed or given excitation: objective, accuracy, information, and its record."""
+"""Entries for a designed or given excitation: objective, accuracy, information, and its record."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Deviations = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Objective:
-    """The value that the delivered design attains, with proved bounds on all others.
+    """Holds the value that the delivered design attains, with proved bounds on all others.
 
     `value` is recomputed from the spectrum. `lower_bound` (`upper_bound` of a maximum) holds for this
     type of spectrum, `any_spectrum_bound` for every spectrum, `any_structure_bound` for all moments.
@@ -36,7 +36,7 @@ class Objective:
 
 @dataclass(frozen=True)
 class Powers:
-    """Mean squares of input, output and excitation, one for each channel."""
+    """Holds mean squares of input, output and excitation, one for each channel."""
 
     input: tuple[float, ...] | None = None
     output: tuple[float, ...] | None = None
@@ -51,7 +51,7 @@ class Powers:
 
 @dataclass(frozen=True)
 class Coverage:
-    """Shares of estimates within r_adm with their 95 % limits, where alpha was calibrated.
+    """Holds shares of estimates within r_adm with their 95 % limits, where alpha was calibrated.
 
     `exact` and `linear` are shares of `draws` from asymptotic theory, `kept` that of simulated `runs`.
     `asked` and `chi_squared_alpha` say what was asked for and which alpha is replaced.
@@ -71,7 +71,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class ModelError:
-    """The largest r_u/r_adm over all frequencies (rad per time unit), where it stands, and alpha of r_u."""
+    """Holds the largest r_u/r_adm over frequency, its frequency (rad per time unit), and alpha of r_u."""
 
     alpha: float
     worst_ratio: float | None = None
@@ -82,7 +82,7 @@ class ModelError:
 
 @dataclass(frozen=True)
 class Loop:
-    """The controller of a loop and the margins that are kept; times in the user's unit, phase in degrees."""
+    """Holds the controller of a loop and the margins kept; times in the user's unit, phase in degrees."""
 
     nominal_peak: float | None = None
     max_sensitivity: float | None = None
@@ -96,7 +96,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class RequirementMet:
-    """A requirement with its largest ratio to what is admitted (1: just met), and its frequency."""
+    """Holds a requirement with its largest ratio to the admitted error (1: just met), and its frequency."""
 
     name: str
     worst_ratio: float
@@ -108,7 +108,7 @@ class RequirementMet:
 
 @dataclass(frozen=True)
 class Information:
-    """The information matrix (k, k) of the experiment in raw parameters, and its inverse."""
+    """Holds the information matrix (k, k) of the experiment in raw parameters, and its inverse."""
 
     parameters: tuple[str, ...]
     matrix: Array
@@ -118,7 +118,7 @@ class Information:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The type of a spectrum, and what that type says of itself."""
+    """Holds the type of a spectrum, and the numbers that describe a spectrum of that type."""
 
     type: str
     details: Mapping[str, object] = others()
@@ -126,7 +126,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class White:
-    """White excitation that meets the same accuracy, or that exhausts the same limits."""
+    """Holds white excitation that meets the same accuracy, or that exhausts the same limits."""
 
     cost: float | None = None
     power: Powers | None = None
@@ -140,14 +140,14 @@ class White:
 
 @dataclass(frozen=True)
 class Baseline:
-    """What the design is compared with."""
+    """Holds the excitation that the design is compared with."""
 
     white: White | None = None
 
 
 @dataclass(frozen=True)
 class LimitUse:
-    """A limit with what the design uses of it.
+    """Holds a limit with the part that the design uses.
 
     Limits on the density of a spectrum have a `kind`, a `worst_ratio` and its `frequency`.
     """
@@ -165,7 +165,7 @@ class LimitUse:
 
 @dataclass(frozen=True)
 class Solver:
-    """How the design was found."""
+    """Describes how the design was found."""
 
     method: str
     tolerance: float | None = None
@@ -178,7 +178,7 @@ class Solver:
 
 @dataclass(frozen=True)
 class Rival:
-    """Other parameters that explain data nearly as well: -2 log likelihood is `excess` higher.
+    """Holds other parameters that explain data nearly as well: -2 log likelihood is `excess` higher.
 
     Their G differs by up to `ratio` times the `measure`, at `frequency` (rad per time unit).
     """
@@ -192,7 +192,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Foreseen:
-    """Other minima that a simulated record of the design leaves."""
+    """Holds other minima of the likelihood of a simulated record of the design."""
 
     rivals: tuple[Rival, ...] = ()
 
@@ -202,7 +202,7 @@ Channels = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Moves:
-    """The changes of a record of held values: how many, the largest, and the shortest dwell (time)."""
+    """Holds the changes of a record of held values: their number, the largest, the shortest dwell (time)."""
 
     count: int
     largest: Channels
@@ -211,11 +211,11 @@ class Moves:
 
 @dataclass(frozen=True)
 class Signal:
-    """Sizes of the samples, one entry a channel, and what the samples themselves attain.
+    """Holds sizes of the samples, an entry for each channel, and the accuracy of the samples themselves.
 
     `worst_ratio` is the largest ratio of the requirements. `of_limits` are the shares of limits on single
     samples that it takes. `begun_anywhere` is the growth of its errors where the start is unknown (None
-    without bound); it is absent (NaN here) where the start does not matter.
+    without bound). It is absent (NaN here) where the start does not matter.
     """
 
     samples: int
@@ -250,7 +250,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class LossMoments:
-    """Mean, standard deviation and (of runs) standard error."""
+    """Holds mean, standard deviation and (of runs) standard error of a loss."""
 
     mean: float
     sd: float
@@ -259,7 +259,7 @@ class LossMoments:
 
 @dataclass(frozen=True)
 class TheoreticalLoss:
-    """N E||y - y0||^2 of the model structure, and the moments of its root."""
+    """Holds the error N E||y - y0||^2 of the model structure, and the moments of its root."""
 
     value: float
     loss: LossMoments
@@ -267,7 +267,7 @@ class TheoreticalLoss:
 
 @dataclass(frozen=True)
 class ActivePower:
-    """A power limit of the design, what is attained, and its multiplier."""
+    """Holds a power limit of the design, the attained power, and its multiplier."""
 
     power: str
     max: float
@@ -278,7 +278,7 @@ class ActivePower:
 
 @dataclass(frozen=True)
 class ClosedLoopError:
-    """The control law, the covariance that was used, and what theory expects; `band` in rad per time unit."""
+    """Holds the control law, the covariance used, and the theoretical loss; `band` in rad per time unit."""
 
     law: str
     covariance: str
@@ -291,7 +291,7 @@ class ClosedLoopError:
 
 @dataclass(frozen=True)
 class MeanSquaredError:
-    """The error with its parts, squared bias and variance."""
+    """Holds the error with its parts, squared bias and variance."""
 
     value: float
     bias_squared: float
@@ -302,7 +302,7 @@ class MeanSquaredError:
 
 @dataclass(frozen=True)
 class Moments:
-    """The matrix R (n, n) of the regressors: summed over the samples."""
+    """Holds the matrix R (n, n) of the regressors: summed over the samples."""
 
     structure: str
     estimated: int
@@ -314,7 +314,7 @@ class Moments:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How the value `of` changes with what the design rests on."""
+    """Holds the derivatives of the value `of` with respect to the assumptions of the design."""
 
     of: str
     neglected_norm: float

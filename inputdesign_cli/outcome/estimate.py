@@ -1,4 +1,4 @@
-"""What is said of data: an estimate or measured response, a verdict, and a model that was found in a log."""
+"""Entries for data: an estimate or measured response, a verdict, and a model that was found in a log."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from inputdesign_cli.outcome.design import RequirementMet, Rival
 
 @dataclass(frozen=True)
 class DetectionLines:
-    """Lines that are not excited, so that nonlinearities of odd and even degree show there."""
+    """Holds lines that are not excited, so that nonlinearities of odd and even degree show there."""
 
     odd: Array
     even: Array
@@ -38,7 +38,7 @@ class SilentLine:
 
 @dataclass(frozen=True)
 class MeasuredLines:
-    """The lines, the periods that count, and the largest deviation over the admitted one.
+    """Holds the lines, the periods that count, and the largest deviation over the admitted one.
 
     Of a measurement without lines of a spec, only the method and how far a model lies outside are there.
     """
@@ -67,7 +67,7 @@ class MeasuredLines:
 
 @dataclass(frozen=True)
 class Test:
-    """A chi-squared test: statistic, degrees of freedom, and the probability of more by chance."""
+    """Holds a chi-squared test: statistic, degrees of freedom, and the probability of more by chance."""
 
     statistic: float
     degrees_of_freedom: int
@@ -77,14 +77,14 @@ class Test:
 
 @dataclass(frozen=True)
 class PriorAgreement:
-    """The probability that prior and data differ as much by chance."""
+    """Holds the probability that prior and data differ as much by chance."""
 
     probability: float
 
 
 @dataclass(frozen=True)
 class Identification:
-    """Parameters by name with standard deviations, variance of the noise, and tests of the residuals.
+    """Holds parameters with standard deviations, variance of the noise, and tests of the residuals.
 
     A measurement without a model has its `method` alone. `fit_percent` is None for an unstable model.
     """
@@ -115,7 +115,7 @@ Verdict = Literal["met", "missed", "undecided"]
 
 @dataclass(frozen=True)
 class Neglected:
-    """A parameter that the model does without: how far it moves G over what is admitted.
+    """Holds a parameter that the model does without, and its effect on G over the admitted error.
 
     `may_move` is an upper limit of that, with 95 %.
     """
@@ -129,7 +129,7 @@ class Neglected:
 
 @dataclass(frozen=True)
 class Nominal:
-    """How far the estimate lies from the plant of the spec."""
+    """Holds the distance of the estimate from the plant of the spec."""
 
     deviations: float
     statistic: float
@@ -142,7 +142,7 @@ class Nominal:
 
 @dataclass(frozen=True)
 class Assessment:
-    """The verdict with its reasons, and the accuracy that a designed top-up would reach.
+    """Holds the verdict with its reasons, and the accuracy that a designed top-up would reach.
 
     `undecided` are the reasons against a verdict, `causes` their kinds. `left` is the largest ratio after the
     top-up, `experiments` how often it has to be applied (`periods`: how many periods have to count).
@@ -170,7 +170,7 @@ Fit = float | tuple[float | None, ...] | None
 
 @dataclass(frozen=True)
 class Validation:
-    """Fits of simulation and one-step prediction to data that the estimate has not seen."""
+    """Holds fits of simulation and one-step prediction to data that the estimate has not seen."""
 
     simulation_fit_percent: Fit = field(default=None, metadata=NULL)
     prediction_fit_percent: Fit = field(default=None, metadata=NULL)
@@ -179,7 +179,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class Structure:
-    """A structure that was tried: its orders and delays, and how it fits.
+    """Holds a structure that was tried: its orders and delays, and its fit.
 
     `failed` are the tests of its residuals that fail. `certain` is whether no parameter of the plant deviates
     by more than half its value.
@@ -200,7 +200,7 @@ class Structure:
 
 @dataclass(frozen=True)
 class ExploredOutput:
-    """The structure that was chosen for an output, and all that were tried."""
+    """Holds the structure that was chosen for an output, and all that were tried."""
 
     output: str
     structure: Structure
@@ -214,7 +214,7 @@ class ExploredOutput:
 
 @dataclass(frozen=True)
 class FeedbackInput:
-    """An input that may answer the outputs, with the probability of that by chance."""
+    """Holds an input that may answer the outputs, with the probability of that by chance."""
 
     input: str
     probability: float
@@ -222,7 +222,7 @@ class FeedbackInput:
 
 @dataclass(frozen=True)
 class Exploration:
-    """How the log was prepared, what was tried, and whether the model deserves trust."""
+    """Holds the preparation of the log, the structures tried, and whether the model deserves trust."""
 
     channels: Mapping[str, str]
     sample_time: float

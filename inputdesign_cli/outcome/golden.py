@@ -1,4 +1,4 @@
-"""Golden files: how they are read, and how `idesign check` and the tests compare results with them.
+"""Golden files: their format, and how `idesign check` and the tests compare results with them.
 
 A golden file holds runs, and each run the quantities to find in its result:
 
@@ -48,7 +48,7 @@ def _result_path(path: str) -> str:
 
 
 class Quantity(Section):
-    """One number of a result: where it stands, what it should be, how far off it may be and why."""
+    """Holds a number of a result: its place, the expected value, the tolerance and its reason."""
 
     path: Annotated[Text, AfterValidator(_result_path)]
     expected: Number
@@ -59,7 +59,7 @@ class Quantity(Section):
     label: Text = ""
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """There is one tolerance, and it is above 0."""
+        """Check that there is one tolerance, and that it is above 0."""
         if (self.absolute is None) == (self.relative is None):
             message, hint = "{key} needs one tolerance", "give either absolute or relative"
             yield PathDiagnostic("golden-tolerance", message, hint)
@@ -69,17 +69,17 @@ class Quantity(Section):
 
     @property
     def tolerance(self) -> float:
-        """The largest deviation that passes, in the quantity's own unit."""
+        """Return the largest deviation that passes, in the quantity's own unit."""
         return self.absolute if self.absolute is not None else (self.relative or 0.0) * abs(self.expected)
 
     @property
     def name(self) -> str:
-        """The label, or the path in its place."""
+        """Return the label, or the path in its place."""
         return self.label or self.path
 
 
 class GoldenRun(Section):
-    """One run of one spec, and what to look at in its result. `spec` is relative to the golden file."""
+    """Describes a run of a spec, with the numbers to check. `spec` is relative to the golden file."""
 
     name: Text
     spec: FileName
@@ -93,7 +93,7 @@ class _Content(Section):
     runs: Several[GoldenRun]
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The names of the runs differ."""
+        """Check that the names of the runs differ."""
         names = [run.name for run in self.runs]
         for i, name in enumerate(names):
             if name in names[:i]:
@@ -103,14 +103,14 @@ class _Content(Section):
 
 @dataclass(frozen=True)
 class Golden:
-    """The content of one golden file."""
+    """Holds the content of one golden file."""
 
     file: Path
     title: str
     runs: tuple[GoldenRun, ...]
 
     def spec_of(self, run: GoldenRun) -> Path:
-        """The spec of a run, relative to the current folder."""
+        """Return the spec of a run, relative to the current folder."""
         return self.file.parent / run.spec
 
 
@@ -143,7 +143,7 @@ def load_golden(path: Path) -> Golden:
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the comparison; without a `computed` number, `note` says why it is None."""
+    """Holds a line of the comparison; without a `computed` number, `note` says why it is None."""
 
     golden: str
     run: str
@@ -153,12 +153,12 @@ class Row:
 
     @property
     def deviation(self) -> float | None:
-        """Computed minus expected."""
+        """Return the computed minus the expected value."""
         return None if self.computed is None else self.computed - self.quantity.expected
 
     @property
     def passed(self) -> bool:
-        """Whether it was computed and lies within its tolerance."""
+        """Return whether the number was computed and lies within its tolerance."""
         return self.deviation is not None and abs(self.deviation) <= self.quantity.tolerance
 
     def as_dict(self) -> dict[str, Any]:
@@ -177,7 +177,7 @@ class Row:
 
 
 def compare(golden: Golden, results: Mapping[str, Result | IdesignError]) -> list[Row]:
-    """One row a quantity; `results` goes by the names of the runs. A run without a result fails its rows."""
+    """Return a row for each quantity; `results` by names of runs. A run without a result fails its rows."""
     rows = []
     for run in golden.runs:
         result = results.get(run.name)

@@ -26,7 +26,7 @@ Blocks = dict[str, dict[str, Plain]]
 
 @singledispatch
 def blocks_of(model: Model) -> Blocks:
-    """`plant` and `noise` of a model; polynomials that are 1 are left out.
+    """Return `plant` and `noise` of a model; polynomials that are 1 are left out.
 
     Raises:
         TypeError: models of this kind have no words.
@@ -105,7 +105,7 @@ def _(model: Reparametrised) -> Blocks:
 
 
 def _put(block: Plain, place: Place, value: float) -> None:
-    """The value at its place in nested mappings and lists."""
+    """Put the value at its place in nested mappings and lists."""
     *steps, last = place
     for step in steps:
         block = block[step]
@@ -114,7 +114,7 @@ def _put(block: Plain, place: Place, value: float) -> None:
 
 @singledispatch
 def predictor_of(model: Model) -> dict[str, list[Array]]:
-    """The polynomials of a model that must be stable, by letter: C, D and F; none of a plant in s."""
+    """Return the polynomials of a model that must be stable, by letter: C, D, F; none of a plant in s."""
     return {}
 
 

@@ -1,4 +1,4 @@
-"""What the kinds of objective of a result are called: in a summary, on a page, on an axis."""
+"""Names of the kinds of objective of a result: in a summary, on a page, on an axis."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from inputdesign_cli.outcome.design import White
 
 @dataclass(frozen=True)
 class Objective:
-    """The words for one `objective.kind`."""
+    """Holds the words for one `objective.kind`."""
 
     name: str  # of the value
     asked: str  # what the summary says was asked
@@ -21,7 +21,7 @@ class Objective:
 
     @property
     def axis(self) -> str:
-        """The value on an axis."""
+        """Return the name of the value on an axis."""
         return self.label or self.name
 
 
@@ -77,7 +77,7 @@ UNKNOWN = Objective("value", "", "The value is {}")
 
 
 def objective(kind: str | None) -> Objective:
-    """The words for a kind; plain ones for a result without an objective."""
+    """Return the words for a kind; plain ones for a result without an objective."""
     return OBJECTIVES.get(kind or "", UNKNOWN)
 
 
@@ -86,7 +86,7 @@ WHITE = ("white", "white, same cost")
 
 
 def white_labels(kind: str | None, white: White, samples: int) -> tuple[str, str]:
-    """Return what curves of white excitation are called: the baseline, and that with equal means.
+    """Return the labels of white excitation in curves: the baseline, and that with equal means.
 
     Args:
         kind: of the objective; None without one.

@@ -1,4 +1,4 @@
-"""Record what a run was made from, so that a run of something else does not replace it by name.
+"""Record the source of a run, so that a run of something else does not replace it by name.
 
 `made_from` in `result.json` names the spec and the data relative to the run directory: a project that is
 moved as a whole keeps its runs. `asked_sha256` is the digest of the spec as it was read, if the `spec.yaml`
@@ -21,7 +21,7 @@ from inputdesign_cli.regular_file import read_regular
 
 @dataclass(frozen=True)
 class Origin:
-    """What a run is made from: files, the spec first, and the spec as it was read, with overrides.
+    """Holds the source of a run: files, the spec first, and the spec as it was read, with overrides.
 
     `overwrite` is whether the run of something else may be replaced, `judges` whether the run has a verdict.
     """
@@ -41,7 +41,7 @@ class Origin:
         ]
 
     def entry(self, target: Path, written: str) -> dict[str, object]:
-        """Return what `result.json` says of it; `written` is the `spec.yaml` of the run."""
+        """Return the entry of `result.json` on the source; `written` is the `spec.yaml` of the run."""
         asked = {"asked_sha256": digest(self.asked)} if self.asked and self.asked != written else {}
         return {"made_from": self.seen_from(target), **asked}
 

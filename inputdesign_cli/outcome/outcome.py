@@ -1,4 +1,4 @@
-"""The outcome of a question: what `result.json` holds, typed."""
+"""The outcome of a question: the content of `result.json`, typed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from inputdesign_cli.outcome.simulation import Simulation
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What was asked and found, section by section; sections that a question does not have are None.
+    """Holds the question and the answer, section by section; a section is None if the question lacks it.
 
     `notes` are the messages of the `findings`. `provenance` has what the writer of a run adds: environment,
     digests, and the names of its files.
@@ -79,7 +79,7 @@ class Outcome:
     provenance: Mapping[str, object] = others()
 
     def saying(self, findings: Iterable[Finding]) -> Self:
-        """Return the same outcome with further findings and their notes."""
+        """Return the outcome with further findings and their notes."""
         more = tuple(findings)
         if not more:
             return self

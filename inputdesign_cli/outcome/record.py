@@ -1,4 +1,4 @@
-"""What a run directory says of itself, whoever has written it: its result, and which files are of the run."""
+"""Read the result of a run directory, and list the files of its run, whoever has written it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _DAMAGES = (ArithmeticError, AttributeError, LookupError, OSError, RecursionErro
 
 
 def load_result(directory: Path) -> dict[str, Any]:
-    """The content of `result.json`, of which only `format` and `files` are checked.
+    """Return the content of `result.json`, of which only `format` and `files` are checked.
 
     Raises:
         DataError: `run-missing`, `run-unreadable`.
@@ -64,7 +64,7 @@ def listed_files(directory: Path) -> list[str]:
 
 
 def owned_files(directory: Path) -> list[str]:
-    """Names of the files in `directory` that go when its run is replaced: its own and the page about it."""
+    """Return the names of files in `directory` that go when its run is replaced: its own and its page."""
     listed = listed_files(directory)
     if not listed:
         return []
@@ -74,7 +74,7 @@ def owned_files(directory: Path) -> list[str]:
 
 
 def is_page(path: Path) -> bool:
-    """Whether a file is a page that `idesign report` wrote."""
+    """Return whether a file is a page that `idesign report` wrote."""
     try:
         return PAGE_MARK in read_regular(path, 1000)
     except OSError:
@@ -82,7 +82,7 @@ def is_page(path: Path) -> bool:
 
 
 def unreadable(file: Path, why: str) -> DataError:
-    """The error about a record that cannot be used."""
+    """Return the error about a record that cannot be used."""
     message = f"{file} cannot be read as the result of a run: {why}"
     return DataError.because("run-unreadable", message, hint="run the spec again")
 
@@ -97,14 +97,14 @@ def readable(file: Path) -> Iterator[None]:
 
 
 def _finite(text: str) -> float:
-    """A number of a result; idesign writes no other."""
+    """Return a number of a result; idesign writes no other than finite ones."""
     if not math.isfinite(value := float(text)):
         raise ValueError(f"{text} is no finite number")
     return value
 
 
 def is_plain(name: object) -> bool:
-    """Whether it names a file in the directory itself, and none elsewhere."""
+    """Return whether a name is of a file in the directory itself, and none elsewhere."""
     if not isinstance(name, str) or name in ("", os.curdir, os.pardir) or set(name) & {"/", "\0"}:
         return False
     try:

@@ -1,4 +1,4 @@
-"""Replace one run by another: whole whenever the writer is killed, and put right by the next call.
+"""Replace one run by another: whole whenever the writer is killed, and repaired by the next call.
 
 Everything happens in a folder of work inside the directory of the run, under a lock that ends with its
 process. The folder holds `new`, the files of the new run, and `old`, the files of the run that leaves, while
@@ -46,7 +46,7 @@ def workplace(target: Path) -> Iterator[Path]:
 
 
 def heal(target: Path) -> None:
-    """Put right what a killed process left in `target`: it has the run before, or the next one.
+    """Repair `target` after a killed process: it has the run before, or the next one.
 
     Raises:
         OutputError: `output-busy`.
@@ -107,7 +107,7 @@ def locked(path: Path, patience: float = 0.0) -> Iterator[bool]:
 
 @contextmanager
 def _alone(target: Path) -> Iterator[Path]:
-    """Hold the lock of a directory; the folder of work is gone before and after."""
+    """Hold the lock of a directory; the folder of work is removed before and after."""
     work = target / _WORK
     with locked(target / _LOCK, _PATIENCE) as held:
         if not held:
@@ -125,7 +125,7 @@ def _alone(target: Path) -> Iterator[Path]:
 
 
 def _is_folder(path: Path) -> bool:
-    """Not through a link: what is done here is not to reach other places."""
+    """Return whether a path is a folder and no link: other places are not to be reached."""
     return path.is_dir() and not path.is_symlink()
 
 

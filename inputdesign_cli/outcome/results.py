@@ -1,4 +1,4 @@
-"""What a design, an analysis or a study hands to the record and the report: plain data, nothing to compute.
+"""Results of a design, an analysis or a study for the record and the report: plain data, nothing to compute.
 
 `result` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
 are in rad per time unit, spectra in the convention of the contract (power = integral over the normalised
@@ -27,14 +27,14 @@ Result = Mapping[str, Json]
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one CSV file: header name (with its unit, `frequency_rad_per_s`) -> values (n,)."""
+    """Holds columns of one CSV file: header name (with its unit, `frequency_rad_per_s`) -> values (n,)."""
 
     columns: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
 class Results:
-    """One run: the outcome and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
+    """Holds one run: the outcome with its tables and curves, which go by file stem ("bound")."""
 
     outcome: Outcome
     resolved_spec: str  # YAML text of the spec with all overrides applied
@@ -45,7 +45,7 @@ class Results:
 
     @cached_property
     def result(self) -> Result:
-        """The outcome as plain data: the content of result.json."""
+        """Return the outcome as plain data: the content of result.json."""
         found: Result = plain(self.outcome)
         return found
 
@@ -66,17 +66,17 @@ class Results:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the k parameters that are estimated."""
+        """Return the names of the k parameters that are estimated."""
         return self._informed.parameters
 
     @property
     def information(self) -> Array:
-        """The information matrix (k, k) of the experiment."""
+        """Return the information matrix (k, k) of the experiment."""
         return self._informed.matrix
 
     @property
     def covariance(self) -> Array:
-        """The covariance (k, k) of the estimates: the inverse of the information matrix."""
+        """Return the covariance (k, k) of the estimates: the inverse of the information matrix."""
         found = self._informed.covariance
         if found is None:
             raise AttributeError("this experiment leaves a parameter undetermined: there is no covariance")
@@ -90,17 +90,17 @@ class Results:
 
     @property
     def signal(self) -> Array:
-        """(n, r): the record to be applied, as signal.csv has it."""
+        """Return the record to be applied as (n, r), as signal.csv has it."""
         _, *channels = self.tables["signal"].columns.values()
         return np.stack(channels, axis=1)
 
     @property
     def bound(self) -> Mapping[str, Array]:
-        """The columns of bound.csv: frequency_rad_per_s, r_u, r_adm, .."""
+        """Return the columns of bound.csv: frequency_rad_per_s, r_u, r_adm, .."""
         return self.tables["bound"].columns
 
     def spectrum(self, w: ArrayLike) -> NDArray[np.complex128]:
-        """(.., r, r): the spectrum at frequencies `w`, a number or an array (..), in rad per time unit.
+        """Return the spectrum (.., r, r) at frequencies `w`, a number or an array (..), in rad per time unit.
 
         A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
         and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
@@ -118,7 +118,7 @@ class Results:
         return np.stack(columns, axis=1).reshape(shape).astype(complex)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the head of the result."""
+        """Return the head of the result for a notebook."""
         found = self.outcome
         rows = [("status", found.status or ""), ("samples", str(found.samples or ""))]
         if found.objective is not None:

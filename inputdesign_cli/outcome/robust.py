@@ -1,4 +1,4 @@
-"""What is said of a design that serves several plants."""
+"""Entries for a design that serves several plants."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Parameters = Mapping[str, float]
 
 @dataclass(frozen=True)
 class ActivePlant:
-    """A plant that binds: its number (0 is that of the spec), and its share of the admissible error."""
+    """Holds a plant that binds: its number (0: that of the spec), and its share of the admissible error."""
 
     scenario: int
     share: float
@@ -20,7 +20,7 @@ class ActivePlant:
 
 @dataclass(frozen=True)
 class DearestPlant:
-    """The plant at which the experiment costs most."""
+    """Holds the plant at which the experiment costs most."""
 
     scenario: int
     cost: float
@@ -28,7 +28,7 @@ class DearestPlant:
 
 @dataclass(frozen=True)
 class LostPlant:
-    """A plant at which no model keeps what is asked; `peak` is the peak of its sensitivity function."""
+    """Holds a plant at which no model keeps the requirement; `peak` is that of its sensitivity function."""
 
     scenario: int
     parameters: Parameters
@@ -37,7 +37,7 @@ class LostPlant:
 
 @dataclass(frozen=True)
 class FloorUse:
-    """Numbers of the plants that are held to a share of the r_adm of the plant of the spec only."""
+    """Holds the numbers of plants that are held only to a share of the r_adm of the plant of the spec."""
 
     share: float
     raised: tuple[int, ...] = ()
@@ -47,7 +47,7 @@ class FloorUse:
 
 @dataclass(frozen=True)
 class SearchedPlant:
-    """The worst plant that an ascent over the region found; nothing is proved of others."""
+    """Holds the worst plant that an ascent over the region found; nothing is proved of others."""
 
     proved: bool
     region: str
@@ -62,7 +62,7 @@ class SearchedPlant:
 
 @dataclass(frozen=True)
 class Risk:
-    """Shares of plants that may be missed, with the stated confidence, before and after the design."""
+    """Holds shares of plants that may be missed, with the stated confidence, before and after the design."""
 
     confidence: float
     after: float
@@ -71,7 +71,7 @@ class Risk:
 
 @dataclass(frozen=True)
 class BeyondLimits:
-    """How many of the fresh plants take single samples beyond a limit, and the largest share of it."""
+    """Holds the number of fresh plants with single samples beyond a limit, and the largest share of it."""
 
     draws: int
     largest: float
@@ -79,7 +79,7 @@ class BeyondLimits:
 
 @dataclass(frozen=True)
 class FreshPlants:
-    """How many of other plants from the same distribution miss what is asked."""
+    """Holds the number of other plants from the same distribution that miss the accuracy."""
 
     draws: int
     rejected: int
@@ -96,7 +96,7 @@ class FreshPlants:
 
 @dataclass(frozen=True)
 class DrawnEstimates:
-    """The share of the admissible error that estimates of the binding plants reach with this confidence."""
+    """Holds the share of the admissible error at estimates of the binding plants, with this confidence."""
 
     draws: int
     confidence: float
@@ -105,7 +105,7 @@ class DrawnEstimates:
 
 @dataclass(frozen=True)
 class Robust:
-    """The accuracy that a design keeps at every plant, or that a given excitation gives there.
+    """Holds the accuracy that a design keeps at every plant, or that a given excitation gives there.
 
     `support` counts the plants that bind a design, `missed` the plants that a given excitation misses.
     """

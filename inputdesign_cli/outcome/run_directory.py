@@ -120,7 +120,7 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
 
 
 def read_run(directory: Path) -> dict[str, Any]:
-    """The content of `result.json` of a whole run.
+    """Return the content of `result.json` of a whole run.
 
     Raises:
         DataError: `run-missing` (no such directory, or no run in it), `run-incomplete` (one of its files is
@@ -158,7 +158,7 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
 def _write_files(
     results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
 ) -> list[str]:
-    """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
+    """Write all files of the run into `folder`, on the disc on return; return names, the result last."""
     tables = {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
     texts = {name: encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
     contents = {**texts, **results.files, **figures}
@@ -188,7 +188,7 @@ def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, 
 
 @contextmanager
 def output_errors(target: Path) -> Iterator[None]:
-    """Turn what the operating system refuses into an `OutputError`."""
+    """Turn errors of the operating system into an `OutputError`."""
     try:
         yield
     except OSError as error:

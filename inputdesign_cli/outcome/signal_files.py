@@ -13,7 +13,7 @@ _A_LINE = 4
 
 
 def mat_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
-    """For MATLAB: columns under their names, which have no units, and `sample_time`."""
+    """Return a file for MATLAB: columns under their names, which have no units, and `sample_time`."""
     import scipy.io
 
     content: dict[str, object] = {name.split()[0]: values[:, None] for name, values in channels.items()}
@@ -24,7 +24,7 @@ def mat_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
 
 
 def npz_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
-    """For numpy: columns under their names, and `sample_time`."""
+    """Return a file for numpy: columns under their names, and `sample_time`."""
     buffer = io.BytesIO()
     arrays = {name.split()[0]: values for name, values in channels.items()}
     np.savez(buffer, allow_pickle=False, **arrays, sample_time=np.asarray(sample_time))
@@ -32,7 +32,7 @@ def npz_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
 
 
 def header_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
-    """For C: an array of doubles for each channel but time, with their length and sample time."""
+    """Return a C header: an array of doubles for each channel but time, their length and sample time."""
     signals = {name: values for name, values in channels.items() if not name.startswith("time")}
     unit = next((name.removeprefix("time_") for name in channels if name.startswith("time_")), "s")
     samples = len(next(iter(signals.values())))

@@ -1,4 +1,4 @@
-"""What is said of many simulated experiments."""
+"""Entries for many simulated experiments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Limits = tuple[float, float]
 
 @dataclass(frozen=True)
 class Spread:
-    """The mean over the runs, and what 95 % of them stay below."""
+    """Holds the mean over the runs, and the value that 95 % of them stay below."""
 
     mean: float
     quantile_95: float | None = None
@@ -23,7 +23,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Range:
-    """The least, largest and mean ratio over lines and entries."""
+    """Holds the least, largest and mean ratio over lines and entries."""
 
     least: float
     largest: float
@@ -32,7 +32,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Violations:
-    """Runs whose error leaves r_adm: how many, where (quantiles 0.05, 0.5, 0.95), and the largest ratio."""
+    """Holds runs beyond r_adm: number, quantiles 0.05, 0.5, 0.95 of their frequency, the largest ratio."""
 
     runs: int
     frequency_quantiles: Array
@@ -41,7 +41,7 @@ class Violations:
 
 @dataclass(frozen=True)
 class RatioAt:
-    """A largest ratio and its frequency."""
+    """Holds a largest ratio and its frequency."""
 
     worst_ratio: float
     frequency: float
@@ -49,7 +49,7 @@ class RatioAt:
 
 @dataclass(frozen=True)
 class TheoryOfError:
-    """What theory expects of the mean squared error and of the mean estimate."""
+    """Holds the mean squared error and the mean estimate in theory."""
 
     mse: float
     mean_estimate: tuple[float, ...]
@@ -57,7 +57,7 @@ class TheoryOfError:
 
 @dataclass(frozen=True)
 class OnDesignModel:
-    """Fractions of runs in which the true system is the design model."""
+    """Holds fractions of runs in which the true system is the design model."""
 
     within_r_adm: float | None = None
     within_r_adm_limits: Limits | None = None
@@ -69,7 +69,7 @@ class OnDesignModel:
 
 @dataclass(frozen=True)
 class ExactLoss:
-    """The loss and its square for each run by H2 norms."""
+    """Holds the loss and its square for each run by H2 norms."""
 
     loss: LossMoments
     squared: LossMoments
@@ -77,7 +77,7 @@ class ExactLoss:
 
 @dataclass(frozen=True)
 class Searched:
-    """Runs whose search of starting values ended elsewhere, or left another minimum."""
+    """Holds the numbers of records searched from several starts, ended elsewhere, and with rival minima."""
 
     runs: int
     elsewhere: int
@@ -86,7 +86,7 @@ class Searched:
 
 @dataclass(frozen=True)
 class TriedInput(OnDesignModel):
-    """What one input gave in the runs; each kind of question fills its own fields.
+    """Holds the results of the runs with one input; each kind of question fills its own fields.
 
     `within_*` are fractions of runs whose error stays within a bound at all frequencies, with 95 % limits.
     """
@@ -133,7 +133,7 @@ class TriedInput(OnDesignModel):
 
 @dataclass(frozen=True)
 class Improvement:
-    """One minus the loss of the design over that of white noise: in the runs and in theory."""
+    """Holds one minus the loss of the design over that of white noise: in the runs and in theory."""
 
     measured: float
     theory: float
@@ -141,7 +141,7 @@ class Improvement:
 
 @dataclass(frozen=True)
 class Simulation:
-    """The Monte Carlo study: how it was made, and what each input gave."""
+    """Holds the Monte Carlo study: its settings, and the results with each input."""
 
     runs: int
     seed: int

@@ -16,7 +16,7 @@ from inputdesign_cli.regular_file import read_regular
 
 
 def csv_text(table: Table) -> str:
-    """A header line and one line a row, the fewest digits from which reading gives back every bit.
+    """Return a header line and a line for each row, in the fewest digits that give back every bit.
 
     Raises:
         ValueError: A column that is not a real vector, or columns of different lengths.
@@ -57,12 +57,12 @@ def _unescaped(cell: str) -> str:
 
 
 def shortest(value: float) -> str:
-    """The shortest text of a number from which it can be read back, a whole one without its point."""
+    """Return the shortest text of a number that gives it back, a whole one without its point."""
     return repr(value).removesuffix(".0")
 
 
 def _shortest(values: Array) -> list[str]:
-    """The shortest text of each of (n,) numbers, a whole one without its point."""
+    """Return the shortest text of each of (n,) numbers, a whole one without its point."""
     if not np.all(np.isfinite(values)):
         return [shortest(value) for value in values.tolist()]
     if not values.size:
@@ -75,7 +75,7 @@ def _shortest(values: Array) -> list[str]:
 
 
 def read_csv(path: Path) -> dict[str, Array]:
-    """The columns of a file that `csv_text` made: name -> (n,)."""
+    """Read the columns of a file that `csv_text` made: name -> (n,)."""
     return csv_columns(read_regular(path))
 
 

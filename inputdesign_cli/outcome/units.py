@@ -27,17 +27,17 @@ class Units:
 
     @property
     def frequency(self) -> float:
-        """What an experiment's frequency is divided by to be in rad per time unit."""
+        """Return the divisor that turns an experiment's frequency into rad per time unit."""
         return self.sample_time if self.sampled else 1.0
 
     @property
     def step(self) -> float:
-        """The time between samples in the unit of the experiment's frequencies: 1, or `sample_time`."""
+        """Return the time between samples in the unit of the experiment's frequency: 1, or `sample_time`."""
         return 1.0 if self.sampled else self.sample_time
 
     @property
     def per_time(self) -> str:
-        """The unit of frequencies, for sentences: rad/s."""
+        """Return the unit of frequencies, for sentences: rad/s."""
         return f"rad/{self.time_unit}"
 
     def length(self, samples: int, section: str = "experiment") -> str:
@@ -47,31 +47,31 @@ class Units:
         return f"{section}.samples: {samples}"
 
     def named(self, w: float) -> str:
-        """A frequency of an experiment for a sentence, in the user's unit: 0.15 rad/s."""
+        """Return a frequency of an experiment for a sentence, in the user's unit: 0.15 rad/s."""
         return f"{w / self.frequency:.4g} {self.per_time}"
 
     @property
     def frequency_header(self) -> str:
-        """The header of a column of frequencies: frequency_rad_per_s."""
+        """Return the header of a column of frequencies: frequency_rad_per_s."""
         return f"frequency_rad_per_{self.time_unit}"
 
     @property
     def time_header(self) -> str:
-        """The header of a column of times: time_s."""
+        """Return the header of a column of times: time_s."""
         return f"time_{self.time_unit}"
 
     @property
     def excitation(self) -> str:
-        """What is designed: r in closed loop, u in open loop."""
+        """Return the signal that is designed: r in closed loop, u in open loop."""
         return "r" if self.closed_loop else "u"
 
     @property
     def excitations(self) -> tuple[str, ...]:
-        """The columns of the record: u1, u2, .., in closed loop r1, r2, .."""
+        """Return the names of the columns of the record: u1, u2, .., in closed loop r1, r2, .."""
         return tuple(f"{self.excitation}{a + 1}" for a in range(self.inputs))
 
     def label(self, channel: str) -> str:
-        """What the user calls a channel, with its unit: `valve (%)`; empty where nothing is stated.
+        """Return the user's name of a channel, with its unit: `valve (%)`; empty where none is stated.
 
         An excitation r1 is added to u1 and has its unit.
         """
@@ -94,11 +94,11 @@ class Units:
 
     @property
     def single(self) -> bool:
-        """One input and one output."""
+        """Return whether there is one input and one output."""
         return self.inputs == self.outputs == 1
 
     def entry(self, output: int, input: int) -> str:
-        """An entry of G, counted from zero, as it stands in names of parameters: `[2,1]`; nothing for one."""
+        """Return an entry of G, counted from zero, as in names of parameters: `[2,1]`; nothing for one."""
         return "" if self.single else f"[{output + 1},{input + 1}]"
 
     def suffix(self, output: int, input: int) -> str:
@@ -108,7 +108,7 @@ class Units:
 
 @dataclass(frozen=True)
 class Header:
-    """What heads every result: the title, the spec as resolved (YAML), and the units."""
+    """Holds the head of every result: the title, the spec as resolved (YAML), and the units."""
 
     title: str
     resolved_spec: str

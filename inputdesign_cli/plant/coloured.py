@@ -1,7 +1,7 @@
 """Add coloured noise, by polynomials in q^-1, or drift to any model.
 
 With H = H0 C / (D (1 - q^-1)) the prediction errors of output i are the model's, filtered once more:
-epsilon_i = (D_i (1 - q^-1) / C_i) epsilon0_i ([ljung-1999], Section 4.2). What integrates is known and has no
+epsilon_i = (D_i (1 - q^-1) / C_i) epsilon0_i ([ljung-1999], Section 4.2). The integrator is known and has no
 parameter, so that it is no more than this filter: signals are differenced, and noise is summed.
 """
 
@@ -38,13 +38,13 @@ _DIFFERENCE = np.array([1.0, -1.0])
 
 @dataclass(frozen=True)
 class Coloured(Around, Parametrised):
-    """`plant` with H0, its noise filtered by C_i / (D_i Delta_i); H0 is diagonal.
+    """A model `plant` with H0 whose noise is filtered by C_i / (D_i Delta_i); H0 is diagonal.
 
     Attributes:
         C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
             the parameters of the plant.
-        held: of each D, whether it is known; then it may have roots on the unit circle, and the gradient with
-            respect to its coefficients is not asked for (and given as zero).
+        held: of each D, whether it is known. Then it may have roots on the unit circle, and the gradient with
+            respect to its coefficients is not needed (and given as zero).
         drift: whether the noise integrates, Delta = 1 - q^-1; one for all outputs or one an output.
     """
 
@@ -56,12 +56,12 @@ class Coloured(Around, Parametrised):
 
     @property
     def inner(self) -> SampledPlant:
-        """The plant with its own noise."""
+        """Return the plant with its own noise."""
         return cast(SampledPlant, self.plant)
 
     @cached_property
     def own_parameters(self) -> tuple[Parameter, ...]:
-        """The coefficients of C and D."""
+        """Return the coefficients of C and D."""
         return tuple(
             one
             for letter, rows in (("c", self.C), ("d", self.D))
@@ -75,12 +75,12 @@ class Coloured(Around, Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """Return the parameters on which G depends, (k,)."""
+        """Return whether G depends on each parameter, (k,)."""
         return np.concatenate([self.plant.in_plant, np.zeros(len(self.own_parameters), dtype=bool)])
 
     @cached_property
     def fixed(self) -> tuple[Array, ...]:
-        """What is known of the filter of each output, a polynomial: D where it is held, and Delta."""
+        """Return the known polynomial in the noise filter of each output: D where it is held, and Delta."""
         return tuple(
             np.convolve(d if held else np.ones(1), _DIFFERENCE if drifts else np.ones(1))
             for d, held, drifts in zip(*map(self._per_output, (self.D, self.held, self.drift)), strict=True)
@@ -88,7 +88,7 @@ class Coloured(Around, Parametrised):
 
     @cached_property
     def inverse_filters(self) -> tuple[tuple[Array, Array], ...]:
-        """Output by output D Delta and C: their quotient filters the prediction errors of the plant."""
+        """Return D Delta and C of each output: their quotient filters the prediction errors of the plant."""
         free = [
             np.ones(1) if held else d
             for d, held in zip(self._per_output(self.D), self._per_output(self.held), strict=True)
@@ -103,13 +103,13 @@ class Coloured(Around, Parametrised):
 
     @cached_property
     def estimated_roots(self) -> ComplexArray:
-        """Return the roots in z of C and of the parts of D that are estimated."""
+        """Return the roots in z of C and of the estimated parts of D."""
         free = [d for d, held in zip(self.D, self.held, strict=True) if not held]
         return all_roots([*self.C, *free])
 
     @property
     def integrates(self) -> bool:
-        """Whether some noise has infinite power at frequency zero."""
+        """Return whether some noise has infinite power at frequency zero."""
         return any(abs(np.sum(p)) < 1e-9 for p in self.fixed)
 
     @property
@@ -124,7 +124,7 @@ class Coloured(Around, Parametrised):
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
+        """Return the poles of G and of all gradients, as points of the frequency plane."""
         return np.concatenate([self.plant.singularities, logarithmic_distance(self.estimated_roots)])
 
     @property
@@ -149,18 +149,18 @@ class Coloured(Around, Parametrised):
         )
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
+        """Return the frequency response G as (n, p, r)."""
         return self.plant.plant_at(self._beside_zero(w))
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
         return self._with_own(self.plant.plant_gradient(self._beside_zero(w)))
 
     @cached_property
     def _nearest(self) -> float:
-        """The frequency below which all is taken to be as it is there; zero unless plant and noise integrate.
+        """Return the frequency below which all is taken as constant; zero unless plant and noise integrate.
 
-        What the plant integrates, the prediction differences: their product is finite at frequency zero.
+        The prediction differences where the plant integrates: their product is finite at frequency zero.
         """
         near = np.abs(self.plant.singularities)
         if not self.integrates or np.all(near > INTEGRATES):
@@ -181,17 +181,17 @@ class Coloured(Around, Parametrised):
         return np.stack([evaluate(a, q) / evaluate(b, q) for a, b in self.inverse_filters], axis=-1)
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dG/dtheta (n, k, p, r)."""
+        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
         beside = self._beside_zero(w)
         return self._with_own(self.plant.input_gradient(beside) * self._inverse_at(beside)[:, None, :, None])
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dH/dtheta (n, k, p, p)."""
+        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
         e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
         return self._with_own(self.plant.noise_gradient(w), w, e)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """(n, k, p, m), see `Model`."""
+        """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         of_signals = self.plant.prediction_gradient(w, y, u, np.zeros_like(e))
         of_errors = self.plant.prediction_gradient(w, np.zeros_like(y), np.zeros_like(u), e)
         return self._with_own(of_signals * self._inverse_at(w)[:, None, :, None] + of_errors, w, e)
@@ -199,7 +199,7 @@ class Coloured(Around, Parametrised):
     def _with_own(
         self, of_plant: ComplexArray, w: ArrayLike | None = None, e: NDArray | None = None
     ) -> ComplexArray:
-        """A gradient (n, k, p, m) from that of the plant; C and D show in what e (n, p, m) causes."""
+        """Return a gradient (n, k, p, m): that of the plant, then the slopes in C and D by e (n, p, m)."""
         shape = (len(of_plant), len(self.own_parameters), *of_plant.shape[2:])
         own = np.zeros(shape, dtype=complex)
         if w is not None and e is not None:
@@ -213,7 +213,7 @@ class Coloured(Around, Parametrised):
         return np.concatenate([of_plant, own], axis=1)
 
     def below(self, letter: str, output: int) -> tuple[Array | None, float]:
-        """C or D of an output, and the sign of its gradient; None of a D that is held."""
+        """Return C or D of an output, and the sign of its gradient; None of a D that is held."""
         if letter == "c":
             return self._per_output(self.C)[output], 1.0
         return None if self._per_output(self.held)[output] else self._per_output(self.D)[output], -1.0
@@ -226,12 +226,12 @@ class Coloured(Around, Parametrised):
         return replace(self, plant=plant, C=tables["c"], D=tables["d"])
 
     def shaped(self, e: Array) -> Array:
-        """e (.., n, p) through C / (D Delta), from rest."""
+        """Return e (.., n, p) filtered by C / (D Delta), from rest."""
         shaped = [filtered(b, a, e[..., i]) for i, (a, b) in enumerate(self.inverse_filters)]
         return np.stack(shaped, axis=-1)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""
         return self.plant.simulate(u, self.shaped(e), step)
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:

@@ -40,7 +40,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
     an entry that is absent has none.
 
     `delay` holds a list of one dead time for each entry, an empty list for entries that act at once; it is
-    empty where all do. `entries` are the ones present; if None, zeros of the numerators say so.
+    empty where all do. `entries` are the present entries; if None, zeros of the numerators say so.
     """
 
     numerator: Rows
@@ -85,17 +85,17 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
         return len(self.numerator)
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return len(self.numerator[0])
 
     @cached_property
     def active(self) -> tuple[tuple[int, int], ...]:
-        """The entries that are not absent."""
+        """Return the entries that are not absent."""
         if self.entries is not None:
             return self.entries
         places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
@@ -103,7 +103,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """See `Model`: (p, r)."""
+        """Return the entries of G that may act without delay, (p, r), see `Model`."""
         found = np.zeros((self.outputs, self.inputs), dtype=bool)
         for i, j in self.active:
             equal = self.numerator[i][j].size == self.denominator[i][j].size
@@ -139,7 +139,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return float(np.sum(self._delays((output, input))))
 
     def _delays(self, place: tuple[int, int]) -> Array:
-        """A list of the dead time of an entry, or of none."""
+        """Return a list of the dead time of an entry, empty where it has none."""
         return self.delay[place[0]][place[1]] if self.delay else np.zeros(0)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousModel:
@@ -157,18 +157,18 @@ class ContinuousModel(Parametrised, WhiteNoise):
         )
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What the interpolation of u (.., n, r) within its band causes (.., n, p), and e itself."""
+        """Return the response (.., n, p) to the band-limited interpolation of u (.., n, r), and e itself."""
         return self.driven(u, Intersample(step, hold=False)), e
 
     def driven(self, u: Array, intersample: Intersample) -> Array:
-        """What samples u (.., n, r) cause at the outputs (.., n, p), from rest."""
+        """Return the outputs (.., n, p) that samples u (.., n, r) cause, from rest."""
         y = np.zeros((*u.shape[:-1], self.outputs))
         for i, j in self.active:
             y[..., i] += intersample.caused(self.held(i, j, intersample.sample_time), u[..., j])
         return y
 
     def held(self, output: int, input: int, sample_time: float) -> HeldEntry:
-        """One entry as samples drive it."""
+        """Return one entry as samples drive it."""
         rows = (self.numerator, self.denominator)
         above, below = (part[output][input] for part in rows)
         late = self._delays((output, input))
@@ -176,13 +176,13 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles in s of all entries."""
+        """Return the poles in s of all entries."""
         parts = [polynomial_roots(self.denominator[i][j]) for i, j in self.active]
         return np.concatenate(parts)
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
+        """Return the poles of G and of all gradients, as points of the frequency plane."""
         return _frequency_plane(self.poles)
 
     @property
@@ -191,14 +191,14 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return float(np.exp(np.max(self.poles.real, initial=-np.inf)))
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         return _frequency_plane(
             np.concatenate([polynomial_roots(p[output][input]) for p in (self.numerator, self.denominator)])
         )
 
     @property
     def memory(self) -> float:
-        """The longest dead time."""
+        """Return the longest dead time."""
         return max((self.dead_time(i, j) for i, j in self.active), default=0.0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
@@ -207,7 +207,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return np.array([p.letter == DELAY and place in p.places for p in self.parameters], dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as numerator over denominator, gradients (n, k); the numerator has the dead time."""
+        """Return one entry of G as a fraction, with gradients (n, k); the numerator has the dead time."""
         s = 1j * np.atleast_1d(np.asarray(w))
         above = np.zeros((s.size, len(self.parameters)), dtype=complex)
         below = np.zeros_like(above)
@@ -220,7 +220,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return Fraction(numerator, self._below(s, output, input), late[:, None] * above, below)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
+        """Return the frequency response G as (n, p, r)."""
         s = 1j * np.atleast_1d(np.asarray(w))
         G = np.zeros((s.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
@@ -229,7 +229,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
         s = 1j * np.atleast_1d(np.asarray(w))
         gradient = np.zeros((s.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
         for index, parameter in enumerate(self.parameters):
@@ -244,7 +244,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return gradient
 
     def _late(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
-        """What the dead time of an entry does to it."""
+        """Return the factor by which the dead time of an entry multiplies it."""
         return np.asarray(np.exp(-s * self.dead_time(i, j)), dtype=complex)
 
     def _below(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
@@ -252,5 +252,5 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
 
 def _frequency_plane(poles: ComplexArray) -> ComplexArray:
-    """Poles in s as frequency + j damping."""
+    """Return poles in s as frequency + j damping."""
     return np.abs(poles.imag) + 1j * np.abs(poles.real)

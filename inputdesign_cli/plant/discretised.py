@@ -13,7 +13,7 @@ from inputdesign_cli.plant.transfer import Rational, product_of
 
 
 def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], period: float) -> Rational:
-    """The zero-order-hold sample of a transfer function in s (descending powers), in q^-1 (ascending).
+    """Return the zero-order-hold sample of a transfer function in s (descending powers), in q^-1 (ascending).
 
     `period` is in the unit of time of s. Any leading delay stays in the numerator.
     """
@@ -51,7 +51,7 @@ def hold_entries(
 
 
 def _held(above: Sequence[float], below: Sequence[float], period: float, delay: float) -> Rational:
-    """One entry, with its dead time."""
+    """Return one entry with its dead time, sampled behind a hold."""
     if not delay:
         return zero_order_hold(above, below, period)
     low, high = (np.trim_zeros(np.array(p[::-1], dtype=float), "b") for p in (above, below))
@@ -69,7 +69,7 @@ _SUM = np.array([1.0, 1.0])
 def discretised(
     numerator: Sequence[float], factors: Sequence[Sequence[float]], period: float, rule: Rule
 ) -> Rational:
-    """A proper transfer function in s in q^-1.
+    """Return the discretisation in q^-1 of a proper transfer function in s.
 
     Args:
         numerator: descending in s; `factors` of the denominator likewise.
@@ -85,7 +85,7 @@ def discretised(
 
 
 def _substituted(descending: Sequence[float] | Array, order: int, period: float, rule: Rule) -> Array:
-    """A polynomial at s = (1 - q^-1) / (h or h/2 (1 + q^-1)), times the denominator to the power `order`."""
+    """Return a polynomial at s = (1 - q^-1) / (h or h/2 (1 + q^-1)), times the denominator^`order`."""
     total = np.zeros(order + 1)
     for power, coefficient in enumerate(descending[::-1]):
         ups = [_DIFFERENCE] * power
@@ -99,7 +99,7 @@ def _substituted(descending: Sequence[float] | Array, order: int, period: float,
 def pid(
     gain: float, integral: float | None, derivative: float, filtering: float, period: float, rule: Rule
 ) -> Rational:
-    """Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)) in q^-1; its integrator is a factor of its own.
+    """Return Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)) in q^-1; its integrator is a factor of its own.
 
     Args:
         integral: Ti, None for no integral action; `derivative` Td, `filtering` Tf.
@@ -118,7 +118,7 @@ def pid(
 
 
 def _added(parts: Sequence[Rational]) -> Rational:
-    """The sum of parts that have no pole in common."""
+    """Return the sum of parts that have no pole in common."""
     below = tuple(factor for part in parts for factor in part.denominator)
     total = np.zeros(1)
     for part in parts:

@@ -1,4 +1,4 @@
-"""Difference equations: what a filter in q^-1 makes of samples, from rest."""
+"""Difference equations: filter samples by a filter in q^-1, from rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _LARGE = 50_000
 
 
 def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis: int = -1) -> NDArray:
-    """The values along an axis through numerator / denominator, ascending in q^-1, from rest.
+    """Return values filtered along an axis by numerator / denominator, ascending in q^-1, from rest.
 
     Args:
         numerator, denominator: (m,), (k,); denominator[0] is not zero.
@@ -41,7 +41,7 @@ def _of_rows(b: NDArray, a: NDArray, rows: NDArray) -> NDArray:
 
 
 def _recursion(a: NDArray, driven: NDArray) -> NDArray:
-    """Rows y (m, n) with sum_i a_i y(t - i) = driven(t): a triangular system with few diagonals."""
+    """Solve sum_i a_i y(t - i) = driven(t) for rows y (m, n): a triangular system with few diagonals."""
     samples = driven.shape[1]
     order = min(a.size, samples) - 1
     diagonals = np.empty((order + 1, samples), dtype=driven.dtype)

@@ -23,7 +23,7 @@ _FLAT = 1e-12
 
 
 def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
-    """Roots z = exp(j s) as points s of the frequency plane: real part the angle, imaginary the damping."""
+    """Return roots z = exp(j s) as points s of the frequency plane: angle + j damping."""
     z = np.asarray(roots, dtype=complex)
     z = z[np.abs(z) > 1e-6]
     return np.abs(np.angle(z)) + 1j * np.abs(np.log(np.abs(z)))
@@ -32,12 +32,11 @@ def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
 def graded_grid(
     singularities: ArrayLike, lo: float, hi: float, *, points: int = 1000, knots: ArrayLike = ()
 ) -> Array:
-    """A grid on [lo, hi] in rad/sample that resolves every pole and zero near the axis.
+    """Return a grid on [lo, hi] in rad/sample that resolves every pole and zero near the axis.
 
-    Linear and logarithmic spacing together, and around each of the `singularities` (complex points
-    of the frequency plane, see `logarithmic_distance`) even steps of a fortieth of its distance to
-    the axis, then offsets that grow geometrically. `knots` (breakpoints of tables) are included as
-    they are.
+    Linear and logarithmic spacing are joined. Around each of the `singularities` (complex points of the
+    frequency plane, see `logarithmic_distance`) come even steps of a fortieth of its distance to the axis.
+    Beyond these offsets grow geometrically. `knots` (breakpoints of tables) are included as they are.
     """
     span = hi - lo
     parts = [_spaced(float(lo), float(hi), points), np.asarray(knots, dtype=float)]
@@ -63,9 +62,9 @@ def _spaced(lo: float, hi: float, points: int) -> Array:
 
 
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
-    """One grid for several plants, everywhere about as fine as the finest of theirs.
+    """Return one grid for several plants, everywhere about as fine as the finest of theirs.
 
-    Poles that lie side by side share their points: the number of points grows with the places at which there
+    Poles that lie side by side share their points. The number of points grows with the places at which there
     are poles, not with the number of plants.
     """
     parts = [np.empty(0), *(graded_grid(singularities, lo, hi) for singularities in plants)]
@@ -138,7 +137,7 @@ def local_maxima(
 
 
 def _within_reach(values: Array, around: NDArray[np.intp], above: float) -> NDArray[np.intp]:
-    """The peaks of a grid beside which the function may exceed `above`.
+    """Return the peaks of a grid beside which the function may exceed `above`.
 
     The cells `around` are refined: there it has less room to rise, in proportion to the steps at least.
 
@@ -163,7 +162,7 @@ def _peaks(values: Array, above: float) -> NDArray[np.intp]:
 
 
 def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The peaks of these between which the values fall by more than rounding; of others the highest."""
+    """Return the peaks between which the values fall by more than rounding; of others the highest."""
     dips, heights = np.minimum.reduceat(values, index)[:-1], values[index]
     lower = np.minimum(heights[:-1], heights[1:])
     if np.all(lower - dips > _FLAT * np.abs(lower)):

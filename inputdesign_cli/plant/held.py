@@ -34,14 +34,14 @@ _ON_BOUNDARY = 1e-9
 
 @dataclass(frozen=True)
 class HeldEntry:
-    """e^(-delay s) b / a behind a hold, as rows on what samples cause.
+    """A transfer function e^(-delay s) b / a behind a hold, as rows that read states driven by samples.
 
-    That is, column by column: the states (1, s, .., s^{n-1}) / a and the same over a^2; the delayed input,
-    where b has the degree of a; and where there is a `delay` (which may be zero), the derivatives of the
-    first n states, and of the input, with respect to it.
+    The columns are the states (1, s, .., s^{n-1}) / a, these over a^2, and the delayed input, where b has the
+    degree of a. Where there is a `delay` (which may be zero), the derivatives with respect to it follow: of
+    the first n states, and of the input.
 
-    The unit of time is the geometric mean of the time constants, which keeps the companion form tame;
-    `unit` is what it is in the time of the spec, so that s = s' unit.
+    The unit of time is the geometric mean of the time constants, which keeps the companion form tame. `unit`
+    is its length in the time of the spec, so that s = s' unit.
     """
 
     numerator: Array  # ascending in s, padded to the length of the denominator
@@ -56,7 +56,7 @@ class HeldEntry:
     def of(
         cls, numerator: Array, denominator: Array, sample_time: float, delay: float | None = None
     ) -> HeldEntry:
-        """b / a, ascending in s, held over `sample_time` after a dead time."""
+        """Return b / a, ascending in s, held over `sample_time` after a dead time."""
         n = denominator.size - 1
         padded = np.zeros(n + 1)
         padded[: numerator.size] = numerator
@@ -75,12 +75,12 @@ class HeldEntry:
 
     @property
     def order(self) -> int:
-        """n, the degree of the denominator."""
+        """Return n, the degree of the denominator."""
         return self.denominator.size - 1
 
     @property
     def direct(self) -> float:
-        """What acts without delay but the dead time: b / a at infinite frequency."""
+        """Return b / a at infinite frequency, the gain that acts without delay but the dead time."""
         return float(self.numerator[-1])
 
     @cached_property
@@ -90,24 +90,24 @@ class HeldEntry:
 
     @cached_property
     def entries(self) -> Array:
-        """Return how u(k - lag) and u(k - lag - 1) enter the states, (2 order, 2)."""
+        """Return the columns by which u(k - lag) and u(k - lag - 1) enter the states, (2 order, 2)."""
         n = 2 * self.order
         whole, early = self._held[:n, n], self._after_fraction[:n, n]
         return np.stack([early, whole - early], axis=1)
 
     @property
     def lag(self) -> int:
-        """d, the whole samples of the dead time."""
+        """Return d, the whole samples of the dead time."""
         return self._split[0]
 
     @property
     def direct_lag(self) -> int:
-        """The samples by which what acts at once is late: it is not there before the fraction is over."""
+        """Return the samples after which the direct gain acts: a fraction counts as a whole sample."""
         return self.lag + (self._fraction > 0.0)
 
     @cached_property
     def _split(self) -> tuple[int, float]:
-        """Whole samples of the dead time, and what is left of it in the time of the spec."""
+        """Return the whole samples of the dead time, and the remaining fraction in the time of the spec."""
         return whole_samples(self.delay or 0.0, self.sample_time)
 
     @property
@@ -123,25 +123,25 @@ class HeldEntry:
 
     @cached_property
     def _pulse(self) -> Array:
-        """Return how u(k - d - 1) - u(k - d) enters the derivatives of the first states, (order,)."""
+        """Return the gains by which u(k - d - 1) - u(k - d) enters the states' derivatives, (order,)."""
         n = self.order
         return np.asarray(self.unit * self._after_fraction[:n, n - 1])
 
     @cached_property
     def _after_fraction(self) -> Array:
-        """The exponential over what is left of a sample after the fraction."""
+        """Return the matrix exponential over the rest of a sample after the fraction."""
         return self._exponential(self.sample_time - self._fraction) if self._fraction else self._held
 
     @cached_property
     def gain(self) -> Array:
-        """The row of the output."""
+        """Return the row of the output."""
         row = self.row(self.numerator - self.direct * self.denominator, 1)
         if self.biproper:
             row[2 * self.order] = self.direct
         return row
 
     def responses(self, z: ComplexArray) -> ComplexArray:
-        """Return what held samples cause, at points z of the unit circle, (m, columns)."""
+        """Return the responses to held samples at points z of the unit circle, (m, columns)."""
         late = z ** -float(self.lag)
         entries = self.entries if self._fraction else self.entries[:, :1]
         driven = entries.T[:1] + entries.T[1:] / z[:, None] if self._fraction else entries.T
@@ -173,11 +173,11 @@ class HeldEntry:
 
     @cached_property
     def _triangular(self) -> tuple[ComplexArray, ComplexArray]:
-        """The transition in triangular form, and its basis.
+        """Return the transition in triangular form, and its basis.
 
-        The second copy of the states depends on the first, and integrators on the other states of theirs.
-        Only these are turned (into Schur's form), so that the ones of integrators stay ones, and a state in
-        which they cancel is free of them near frequency zero.
+        The second copy of the states depends on the first, and integrators on the other states of their copy.
+        Only these are turned (into Schur's form), so that the ones of integrators stay ones. A state in which
+        they cancel is then free of them near frequency zero.
         """
         n, m = self.order, integrators(self.denominator)
         turn = np.eye(n, dtype=complex)
@@ -187,9 +187,9 @@ class HeldEntry:
         return np.triu(basis.conj().T @ self.transition @ basis), basis
 
     def interpolated(self, w: Array | ComplexArray) -> ComplexArray:
-        """Return what the interpolation of samples causes, at frequencies w, without a hold, (m, columns).
+        """Return the responses to interpolated samples, without a hold, at frequencies w, (m, columns).
 
-        With w - j sigma of samples that are weighted with e^(-sigma t).
+        At w - j sigma the samples are weighted with e^(-sigma t).
         """
         s = 1j * w[:, None] / self.unit
         scaled = self.denominator * self.unit ** (np.arange(self.order + 1.0) - self.order)
@@ -224,7 +224,7 @@ class HeldEntry:
         return kept
 
     def gradient(self, letter: str, power: int) -> Array:
-        """The row of the gradient with respect to one coefficient, or to the dead time."""
+        """Return the row of the gradient with respect to one coefficient, or to the dead time."""
         if letter == DELAY:
             return self._late_gain
         above = np.zeros(power + 1)
@@ -240,7 +240,7 @@ class HeldEntry:
 
     @property
     def _late_gain(self) -> Array:
-        """The row of the output, on the derivatives with respect to the dead time."""
+        """Return the row of the output on the derivatives with respect to the dead time."""
         n, row = self.order, np.zeros(self.columns)
         start = 2 * n + self.biproper
         row[start : start + n] = self.gain[:n]
@@ -250,12 +250,12 @@ class HeldEntry:
 
     @property
     def columns(self) -> int:
-        """Number of columns of the responses."""
+        """Return the number of columns of the responses."""
         once = self.order + self.biproper
         return self.order + once + (0 if self.delay is None else once)
 
     def row(self, coefficients: Array, copy: int) -> Array:
-        """The row that reads coefficients(s) / a^copy off the states; powers of s carry their unit."""
+        """Return the row that reads coefficients(s) / a^copy off the states; powers of s carry their unit."""
         row = np.zeros(self.columns)
         trimmed = np.asarray(coefficients, dtype=float)[: self.order]
         powers = np.arange(trimmed.size) - copy * self.order
@@ -265,7 +265,7 @@ class HeldEntry:
 
     @cached_property
     def sampled(self) -> tuple[Array, Array]:
-        """Numerator and denominator in q^-1, ascending: of the entry behind the hold."""
+        """Return numerator and denominator of the entry behind the hold, in q^-1, ascending."""
         n = self.order
         below = np.asarray(np.poly(self.transition[:n, :n]) if n else np.ones(1), dtype=float)
         above = np.zeros(self.lag + n + 2)
@@ -279,7 +279,7 @@ class HeldEntry:
 
     @cached_property
     def roots(self) -> ComplexArray:
-        """Poles and zeros in z, those at the origin left out."""
+        """Return the poles and zeros in z, those at the origin left out."""
         if not self.order:
             return np.zeros(0, dtype=complex)
         above, below = self.sampled
@@ -288,7 +288,7 @@ class HeldEntry:
 
 
 def whole_samples(delay: float, sample_time: float) -> tuple[int, float]:
-    """Whole samples of a dead time, and what is left of it in the unit of time."""
+    """Return the whole samples of a dead time, and the remaining fraction in the unit of time."""
     samples = delay / sample_time
     whole = int(np.floor(samples + _ON_BOUNDARY))
     left = samples - whole
@@ -296,12 +296,12 @@ def whole_samples(delay: float, sample_time: float) -> tuple[int, float]:
 
 
 def integrators(denominator: Array) -> int:
-    """The number of poles at s = 0 of a denominator with ascending coefficients."""
+    """Return the number of poles at s = 0 of a denominator with ascending coefficients."""
     return int(np.flatnonzero(denominator)[0])
 
 
 def polynomial_roots(coefficients: Array) -> ComplexArray:
-    """Roots of a polynomial with ascending coefficients, those at zero exact."""
+    """Return the roots of a polynomial with ascending coefficients, those at zero exact."""
     trimmed = np.trim_zeros(coefficients)
     zeros = np.trim_zeros(coefficients, "b").size - trimmed.size
     others = ascending.polyroots(trimmed) if trimmed.size else trimmed
@@ -314,13 +314,13 @@ _DECAY = 4.0
 
 @dataclass(frozen=True)
 class Intersample:
-    """Instants `sample_time` apart between which signals are held (`hold`), or band-limited."""
+    """The intersample behaviour: signals are held (`hold`) over `sample_time`, or band-limited."""
 
     sample_time: float
     hold: bool
 
     def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
-        """The columns (.., N, columns) of an entry that samples (.., N) drive from rest.
+        """Return the columns (.., N, columns) of an entry that samples (.., N) drive from rest.
 
         Measured outputs are never held, whatever the input is.
         """
@@ -340,5 +340,5 @@ class Intersample:
         return np.asarray(driven[..., :samples, :] / weights[:, None])
 
     def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
-        """The output (.., N) of an entry that samples u (.., N) drive."""
+        """Return the output (.., N) of an entry that samples u (.., N) drive."""
         return np.asarray(self.responses(entry, u, hold=self.hold) @ entry.gain)

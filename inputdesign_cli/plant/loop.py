@@ -50,13 +50,13 @@ class Loop:
         [R  -N] [y]   [R H e]
         [P   Q] [u] = [Q r  ]
 
-    in which nothing has poles on or outside the unit circle: unstable and integrating poles of plant and
-    controller are zeros of R and Q, so that what they cause in the loop stays finite.
+    in which nothing has poles on or outside the unit circle. Unstable and integrating poles of plant and
+    controller are zeros of R and Q, so that their effect in the loop stays finite.
 
-    Poles and signals come from the states of G and of the rows of C: one polynomial in q^-1 would lose the
+    Poles and signals come from the states of G and of the rows of C. One polynomial in q^-1 would lose the
     digits of poles that crowd at z = 1 when sampling is fast. States that feedback does not reach are poles
-    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has
-    a delay.
+    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has a
+    delay.
     """
 
     model: SampledPlant
@@ -64,7 +64,7 @@ class Loop:
 
     @cached_property
     def _states(self) -> tuple[Array, Array, Array]:
-        """x(t + 1) = A x + B [y; u] + .. R H e, `instantaneous` [y; u] = C x + [R H e; r]."""
+        """Return x(t + 1) = A x + B [y; u] + .. R H e with `instantaneous` [y; u] = C x + [R H e; r]."""
         plant, controller = self.model.realisation, self.controller.realisation
         from_u = np.concatenate([plant.B, np.zeros((len(controller.A), self.model.inputs))])
         from_y = np.concatenate([np.zeros((len(plant.A), self.model.outputs)), controller.B])
@@ -76,19 +76,19 @@ class Loop:
 
     @cached_property
     def closed_poles(self) -> ComplexArray:
-        """All poles of the loop in z; it is internally stable when they lie inside the unit circle."""
+        """Return all poles of the loop in z; it is internally stable when they lie inside the unit circle."""
         A, B, C = self._states
         poles = np.linalg.eigvals(A + B @ np.linalg.solve(self.instantaneous, C)).astype(complex)
         return poles[np.argsort(np.abs(poles - 1.0))][self.model.repeated_integrators :]
 
     @cached_property
     def instantaneous(self) -> Array:
-        """(p + r, p + r): [I, -G; C, I] at infinite frequency, what acts without delay."""
+        """Return the gains without delay, [I, -G; C, I] at infinite frequency, as (p + r, p + r)."""
         G, C = self.model.realisation.D, self.controller.realisation.D
         return np.block([[np.eye(len(G)), -G], [C, np.eye(len(C))]])
 
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
-        """y (.., n, p) and u (.., n, r) for samples r (.., n, r) and e (.., n, p), from rest."""
+        """Return y (.., n, p) and u (.., n, r) for samples r (.., n, r) and e (.., n, p), from rest."""
         (A, B, C), v = self._states, self.model.forcing(e)
         at_once = np.linalg.inv(self.instantaneous).T
         found = np.concatenate([v, r], axis=-1) @ at_once
@@ -103,7 +103,7 @@ class Loop:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of all that the excitation and the noise cause, as points of the frequency plane."""
+        """Return the poles of all responses to excitation and noise, as points of the frequency plane."""
         return logarithmic_distance(np.concatenate([self.closed_poles, self.model.predictor_poles]))
 
     @property
@@ -118,25 +118,25 @@ class Loop:
 
     @property
     def integrates(self) -> bool:
-        """Whether filters of the prediction are infinite at frequency zero; what the loop causes is not."""
+        """Return whether filters of the prediction are infinite at frequency zero; the loop stays finite."""
         near = np.abs(self.model.predictor_poles - 1.0) < INTEGRATES
         return self.model.integrates or bool(np.any(near))
 
     @cached_property
     def nearest(self) -> float:
-        """The frequency below which all is taken to be as it is there."""
+        """Return the frequency below which all responses are taken as constant."""
         if not self.integrates:
             return 0.0
         near = np.abs(logarithmic_distance(self.closed_poles))
         return BESIDE * float(np.min(near, initial=1.0))
 
     def beside_zero(self, w: ArrayLike) -> ComplexArray | Array:
-        """The frequencies `w`, moved off zero where the loop integrates; those off the axis stay."""
+        """Return the frequencies `w`, moved off zero where the loop integrates; those off the axis stay."""
         return beside_zero(w, self.nearest)
 
     @property
     def memory(self) -> float:
-        """How long, in samples, signals matter beyond what the poles remember."""
+        """Return the number of samples for which signals matter beyond the memory of the poles."""
         return self.model.memory + self.controller.memory
 
     def check_stability(self) -> None:
@@ -186,38 +186,38 @@ class Loop:
             )
 
     def excited(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """What r causes at normalised frequencies `w`: G S_i (n, p, r) at y, S_i = (I + C G)^-1 at u."""
+        """Return the responses to r: G S_i (n, p, r) at y, S_i = (I + C G)^-1 (n, r, r) at u."""
         y, u = excited([self], w)
         return y[0], u[0]
 
     def disturbed(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """What e causes: S_o H (n, p, p) at y with S_o = (I + G C)^-1, and -C S_o H (n, r, p) at u."""
+        """Return the responses to e: S_o H (n, p, p) at y, -C S_o H (n, r, p) at u; S_o = (I + G C)^-1."""
         y, u = disturbed([self], w)
         return y[0], u[0]
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
+        """Return the sensitivity function S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at `w`, rad/sample."""
         left, p = _lefts_at([self], w)[0], self.model.outputs
         y, minus_u = _solved(left, left[:, :, :p] * (np.arange(left.shape[1]) < p)[:, None], p)
         return y, -minus_u
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return what r contributes to the gradient of the prediction, (n, k, p, r)."""
+        """Return the prediction gradient due to r, (n, k, p, r)."""
         return excitation_gradients([self], w)[0]
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return what e contributes, through the noise model and around the loop, (n, k, p, p)."""
+        """Return the prediction gradient due to e, by the noise model and around the loop, (n, k, p, p)."""
         return disturbance_gradients([self], w)[0]
 
 
 def excited(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-    """`Loop.excited` of loops around plants of one structure: (S, n, p, r) at y, (S, n, r, r) at u."""
+    """Return `Loop.excited` of loops around plants of one structure: (S, n, p, r) at y, (S, n, r, r) at u."""
     left, p = _lefts_at(loops, w), loops[0].model.outputs
     return _solved(left, left[..., p:] * (np.arange(left.shape[-1]) >= p)[:, None], p)
 
 
 def disturbed(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-    """`Loop.disturbed` of loops around plants of one structure: (S, n, p, p) at y, (S, n, r, p) at u."""
+    """Return `Loop.disturbed` of loops around plants of one structure, (S, n, p, p) and (S, n, r, p)."""
     left, p = _lefts_at(loops, w), loops[0].model.outputs
     right = np.zeros((*left.shape[:-1], p), dtype=complex)
     if _alike(loops):
@@ -229,7 +229,7 @@ def disturbed(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, Comple
 
 
 def _alike(loops: Sequence[Loop]) -> bool:
-    """Whether all are read off at the same frequencies."""
+    """Return whether all loops are evaluated at the same frequencies."""
     return len({loop.nearest for loop in loops}) == 1
 
 
@@ -252,7 +252,7 @@ def _lefts_at(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
 
 
 def _solved(left: ComplexArray, right: ComplexArray, outputs: int) -> tuple[ComplexArray, ComplexArray]:
-    """y and u (.., columns) of left [y; u] = right (.., p + r, columns); of two unknowns by Cramer's rule."""
+    """Solve left [y; u] = right (.., p + r, columns) for y and u; two unknowns by Cramer's rule."""
     if left.shape[-1] == 2:
         (a, b), (c, d) = (tuple(left[..., i, j, None] for j in (0, 1)) for i in (0, 1))
         top, bottom = right[..., 0, :], right[..., 1, :]
@@ -264,13 +264,13 @@ def _solved(left: ComplexArray, right: ComplexArray, outputs: int) -> tuple[Comp
 
 
 def excitation_gradients(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
-    """(S, n, k, p, r): `Loop.excitation_gradient` of loops around plants of one structure."""
+    """Return `Loop.excitation_gradient` of loops around plants of one structure, as (S, n, k, p, r)."""
     y, u = excited(loops, w)
     return _prediction_gradients(loops, w, y, u, np.zeros_like(y))
 
 
 def disturbance_gradients(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
-    """(S, n, k, p, p): `Loop.noise_gradient` of loops around plants of one structure."""
+    """Return `Loop.noise_gradient` of loops around plants of one structure, as (S, n, k, p, p)."""
     y, u = disturbed(loops, w)
     return _prediction_gradients(loops, w, y, u, np.broadcast_to(np.eye(y.shape[-1], dtype=complex), y.shape))
 
@@ -287,7 +287,7 @@ def _prediction_gradients(
 
 
 def close_loop(model: Model, controller: TransferMatrix) -> Loop:
-    """The loop of a model under a controller.
+    """Return the loop of a model under a controller.
 
     Raises:
         SpecError: `not-supported` for a plant that is not sampled.

@@ -1,4 +1,4 @@
-"""What every model with several inputs and outputs answers, and how its parameters are named."""
+"""The protocol of models with several inputs and outputs, and the names of their parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from inputdesign_cli.plant.transfer import StateSpace
 
 @dataclass(frozen=True)
 class Fraction:
-    """G = numerator / denominator at n frequencies, both affine in theta: (n,), their gradients (n, k)."""
+    """An entry numerator / denominator of G, both affine in theta, (n,), with their gradients (n, k)."""
 
     numerator: ComplexArray
     denominator: ComplexArray
@@ -26,7 +26,7 @@ class Fraction:
 
 
 class Model(Protocol):
-    """y = G(theta) u + H(theta) e with p outputs, r inputs, k parameters and e of a full covariance.
+    """A model y = G(theta) u + H(theta) e: p outputs, r inputs, k parameters, e of a full covariance.
 
     Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
     plane are frequency + j damping (see `logarithmic_distance`).
@@ -34,35 +34,35 @@ class Model(Protocol):
 
     @property
     def continuous(self) -> bool:
-        """Whether frequencies are in rad per time unit."""
+        """Return whether frequencies are in rad per time unit."""
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
 
     @property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
 
     @property
     def covariance(self) -> Array:
-        """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
+        """Return the covariance (p, p) of e; in continuous time of the noise on each output sample."""
 
     @property
     def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): the entries of G that may act without delay, whether or not they do at these parameters."""
+        """Return the entries of G that may act without delay at some parameters, (p, r)."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the k parameters."""
+        """Return the names of the k parameters."""
 
     @property
     def theta(self) -> Array:
-        """Return values of the parameters (k,)."""
+        """Return the values of the parameters (k,)."""
 
     @property
     def flaw(self) -> str | None:
-        """Return why the parameters describe no plant, as a negative dead time, or None if they do."""
+        """Return why the parameters are not valid, as a negative dead time, or None if they are."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
@@ -70,14 +70,14 @@ class Model(Protocol):
 
     @property
     def dead_times(self) -> NDArray[np.bool_]:
-        """Return the parameters that move a dead time, (k,)."""
+        """Return whether each parameter moves a dead time, (k,)."""
 
     @property
     def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
+        """Return the poles of G and of all gradients, as points of the frequency plane."""
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        """Return the poles and zeros of one entry of G, as points of the frequency plane."""
 
     @property
     def radius(self) -> float:
@@ -88,38 +88,38 @@ class Model(Protocol):
 
     @property
     def memory(self) -> float:
-        """How long, in samples or in time units, signals matter beyond what the poles remember."""
+        """Return the samples, or time units, for which signals matter beyond the memory of the poles."""
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return the parameters in which numerator and denominator of an entry of G are not affine, (k,)."""
+        """Return whether numerator or denominator of an entry of G is not affine in each parameter, (k,)."""
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
         """Return one entry of G as a `Fraction`, where no free parameter bends it."""
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
+        """Return the frequency response G as (n, p, r)."""
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
         """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest.
+        """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest.
 
         Args:
             step: time between samples of a plant in continuous time; others know theirs.
         """
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dG/dtheta (n, k, p, r): the gradient of the one-step prediction that u causes."""
+        """Return H^-1 dG/dtheta as (n, k, p, r), the gradient of the one-step prediction due to u."""
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
+        """Return H^-1 dH/dtheta as (n, k, p, p), the gradient of the one-step prediction due to e."""
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """psi = -d epsilon / d theta (n, k, p, m) of the one-step prediction.
+        """Return psi = -d epsilon / d theta, the gradient of the one-step prediction, as (n, k, p, m).
 
         `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
         outputs, inputs and prediction errors epsilon.
@@ -138,28 +138,28 @@ class SampledPlant(Model, Protocol):
 
     @property
     def noise_gain(self) -> Array:
-        """Return how R H e enters the states besides its way through the outputs, (states, p)."""
+        """Return the gains by which R H e enters the states besides the way by the outputs, (states, p)."""
 
     @property
     def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the filters that make the gradient of the prediction of y, u and e."""
+        """Return the poles in z of the filters from y, u and e to the gradient of the prediction."""
 
     @property
     def repeated_integrators(self) -> int:
-        """The integrators of the realisation that take no part in G."""
+        """Return the number of integrators of the realisation that take no part in G."""
 
     @property
     def integrates(self) -> bool:
-        """Whether some noise has infinite power at frequency zero."""
+        """Return whether some noise has infinite power at frequency zero."""
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """R (n, p, p) and N (n, p, r)."""
+        """Return R (n, p, p) and N (n, p, r)."""
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:
-        """R H (n, p, p)."""
+        """Return R H as (n, p, p)."""
 
     def forcing(self, e: Array) -> Array:
-        """R H e (.., n, p) of samples e, from rest."""
+        """Return R H e (.., n, p) of samples e, from rest."""
 
 
 DELAY = "delay"
@@ -168,7 +168,7 @@ DELAY = "delay"
 
 @dataclass(frozen=True)
 class Parameter:
-    """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
+    """A coefficient: its polynomial, its power, and its channels; a common one acts in several places."""
 
     letter: str
     power: int
@@ -178,7 +178,7 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """Letter, power and channels, as `b1`, `f2[1,2]` or `delay[1,2]`."""
+        """Return letter, power and channels, as `b1`, `f2[1,2]` or `delay[1,2]`."""
         return f"{self.letter}{'' if self.letter == DELAY else self.power}{self.label}"
 
 
@@ -188,7 +188,7 @@ def entry_label(output: int, input: int, *, single: bool) -> str:
 
 
 def row_parameters(letter: str, rows: Sequence[Array], outputs: int, inputs: int) -> list[Parameter]:
-    """The coefficients of A, C or D after the first: of one common to all outputs, or of one an output."""
+    """Return the coefficients of A, C or D after the first, common to all outputs or output by output."""
     found = []
     for i, values in enumerate(rows):
         common = len(rows) == 1
@@ -251,14 +251,14 @@ def prediction_gradients(
 def lefts_at(
     model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike
 ) -> tuple[ComplexArray, ComplexArray]:
-    """R (S, n, p, p) and N (S, n, p, r): `left_at`, in the same way."""
+    """Return R (S, n, p, p) and N (S, n, p, r): `left_at`, in the same way."""
     R, N = zip(*(each.left_at(w) for each in models), strict=True)
     return np.stack(R), np.stack(N)
 
 
 @singledispatch
 def forcings_at(model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike) -> ComplexArray:
-    """(S, n, p, p): `forcing_at`, in the same way."""
+    """Return `forcing_at` as (S, n, p, p), in the same way."""
     return np.stack([each.forcing_at(w) for each in models])
 
 
@@ -267,26 +267,26 @@ class Listed(Model, Protocol):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """(k,): in the order of theta."""
+        """Return the parameters in the order of theta, (k,)."""
 
 
 class Parametrised:
-    """What a model knows by its list of `parameters`."""
+    """Derives the properties of a model from its list of `parameters`."""
 
     if TYPE_CHECKING:
 
         @property
         def parameters(self) -> tuple[Parameter, ...]:
-            """All of them, in the order of theta."""
+            """Return all parameters, in the order of theta."""
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the k parameters."""
+        """Return the names of the k parameters."""
         return tuple(parameter.name for parameter in self.parameters)
 
     @cached_property
     def theta(self) -> Array:
-        """Return values of the parameters (k,)."""
+        """Return the values of the parameters (k,)."""
         return np.array([parameter.value for parameter in self.parameters])
 
     @property
@@ -316,20 +316,20 @@ class Parametrised:
 
 
 class WhiteNoise:
-    """H = I: the prediction is G u, so that e reaches its gradient through u alone."""
+    """Predicts G u, since H = I: e reaches the gradient of the prediction through u alone."""
 
     if TYPE_CHECKING:
 
         @property
         def outputs(self) -> int:
-            """Number of outputs p."""
+            """Return the number of outputs p."""
 
         @property
         def theta(self) -> Array:
-            """Return values of the parameters (k,)."""
+            """Return the values of the parameters (k,)."""
 
         def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-            """dG/dtheta (n, k, p, r)."""
+            """Return the gradient dG/dtheta as (n, k, p, r)."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
@@ -337,7 +337,7 @@ class WhiteNoise:
         return np.ones(self.theta.size, dtype=bool)
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
         return self.plant_gradient(w)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
@@ -345,17 +345,17 @@ class WhiteNoise:
         return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """dG/dtheta u (n, k, p, m), see `Model`."""
+        """Return dG/dtheta u as (n, k, p, m), see `Model`."""
         return np.asarray(self.plant_gradient(w) @ u[:, None])
 
 
 class Around(ABC):
-    """A model that is made of another one, `inner`, and answers as that does unless it says otherwise."""
+    """A model that is made of another one, `inner`, and answers like that one unless it says otherwise."""
 
     @property
     @abstractmethod
     def inner(self) -> SampledPlant:
-        """The other model."""
+        """Return the other model."""
 
     @property
     def continuous(self) -> bool:

@@ -18,7 +18,7 @@ _FORGOTTEN = 1e-24
 
 @dataclass(frozen=True)
 class NoiseSpectrum:
-    """Responses (p, n, p) of the outputs to impulses of independent unit sources, as long as they last."""
+    """Holds the responses (p, n, p) of outputs to impulses of independent unit sources, to their end."""
 
     impulses: NDArray[np.float64]
 
@@ -51,9 +51,9 @@ class NoiseSpectrum:
         return _power(self._folded(self.impulses, period)[:, harmonics])
 
     def averaged(self, period: int, harmonics: NDArray[np.int_], periods: int) -> Array:
-        """(L, p): what N times the mean square of the transform of N = `periods` periods is on average.
+        """Return N times the mean square of the transform of N = `periods` periods, on average, as (L, p).
 
-        Phi_v seen through the window of a finite record, which Fejer's kernel describes.
+        It is Phi_v through the window of a finite record, which Fejer's kernel describes.
         """
         n, samples = self.impulses.shape[1], period * periods
         length = 2 ** int(np.ceil(np.log2(2 * n)))
@@ -64,7 +64,7 @@ class NoiseSpectrum:
 
     @staticmethod
     def _folded(sequence: NDArray[np.float64], period: int) -> NDArray[np.complex128]:
-        """(.., period // 2 + 1, p): transforms at the harmonics of a period of sequences (.., n, p)."""
+        """Return transforms of sequences (.., n, p) at harmonics of a period, (.., period // 2 + 1, p)."""
         *several, n, p = sequence.shape
         padded = np.zeros((*several, -(-n // period) * period, p))
         padded[..., :n, :] = sequence

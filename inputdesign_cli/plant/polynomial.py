@@ -15,9 +15,9 @@ _MODERATE = 1e100  # quotients up to this are no overflow
 
 
 def unit_circle(w: ArrayLike) -> ComplexArray:
-    """q^-1 at normalised frequencies `w` (rad/sample), same shape.
+    """Return q^-1 at normalised frequencies `w` (rad/sample), in the same shape.
 
-    With w - j rho it is on a circle of radius e^-rho: the transform of signals weighted with e^(-rho t).
+    At w - j rho it is on a circle of radius e^-rho: the transform of signals weighted with e^(-rho t).
     """
     at = np.asarray(w)
     asked, known = _latest[0]
@@ -33,12 +33,12 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
 
 def frequencies_last(*shape: int) -> ComplexArray:
-    """Zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
+    """Return zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
     return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))
 
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
-    """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
+    """Return the value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
 
     Several polynomials (S, l) have values (S, ..).
     """
@@ -65,7 +65,7 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
-    """Roots in z = q of a polynomial in q^-1; leading zeros (pure delay) contribute none.
+    """Return the roots in z = q of a polynomial in q^-1; leading zeros (pure delay) contribute none.
 
     Trailing zeros are roots at the origin and are left out: they neither resonate nor destabilise.
     """
@@ -80,7 +80,7 @@ def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
 
 
 def all_roots(polynomials: Iterable[ArrayLike]) -> ComplexArray:
-    """All roots in z of several polynomials in one array."""
+    """Return all roots in z of several polynomials in one array."""
     return np.concatenate([np.zeros(0, dtype=complex), *map(roots_in_z, polynomials)])
 
 
@@ -89,7 +89,7 @@ _ROUNDING = 1e-13
 
 
 def stack(entries: Sequence[Sequence[Sequence[float] | Array]]) -> Array:
-    """Rows of columns of coefficient lists as one array (rows, columns, longest)."""
+    """Return rows of columns of coefficient lists as one array (rows, columns, longest)."""
     longest = max(len(p) for row in entries for p in row)
     full = np.zeros((len(entries), len(entries[0]), longest))
     for i, row in enumerate(entries):
@@ -113,7 +113,7 @@ def at(matrix: Array, q: ComplexArray) -> ComplexArray:
 
 
 def multiply(left: Array, right: Array) -> Array:
-    """The product of two matrices of polynomials (.., a, b, l) and (.., b, c, m)."""
+    """Return the product of two matrices of polynomials (.., a, b, l) and (.., b, c, m)."""
     size = left.shape[-1] + right.shape[-1] - 1
     shape = np.broadcast_shapes(left.shape[:-3], right.shape[:-3])
     product = np.zeros((*shape, left.shape[-3], right.shape[-2], size))
@@ -125,7 +125,7 @@ def multiply(left: Array, right: Array) -> Array:
 
 
 def determinant_and_adjugate(matrix: Array) -> tuple[Array, Array]:
-    """det (.., l) and adj (.., n, n, l) of square matrices of polynomials, by interpolation on the circle.
+    """Return det (.., l) and adj (.., n, n, l) of matrices of polynomials, by interpolation on the circle.
 
     The entries of the adjugate are minors, so no entry is divided by a determinant that may vanish.
     """
@@ -146,14 +146,14 @@ def determinant_and_adjugate(matrix: Array) -> tuple[Array, Array]:
 
 
 def _rounded(coefficients: Array, scale: Array) -> Array:
-    """The coefficients with rounding of the transforms set to zero: zeros mean delays, or no inverse.
+    """Return coefficients with rounding of the transforms set to zero: zeros mean delays, or no inverse.
 
-    `scale` bounds what they could be, the product of the sums of the rows that enter.
+    `scale` bounds their size: the product of the sums of the rows that enter.
     """
     return np.where(np.abs(coefficients) > _ROUNDING * scale, coefficients, 0.0)
 
 
 def delay_of(coefficients: Array) -> int:
-    """The number of leading coefficients that vanish in every entry; of a zero polynomial, all."""
+    """Return the number of leading coefficients that vanish in every entry; of a zero polynomial, all."""
     nonzero = np.flatnonzero(np.any(coefficients.reshape(-1, coefficients.shape[-1]) != 0, axis=0))
     return int(nonzero[0]) if nonzero.size else coefficients.shape[-1]

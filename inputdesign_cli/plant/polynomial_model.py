@@ -43,7 +43,7 @@ from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix, product_o
 
 @dataclass(frozen=True)
 class PolynomialModel(Parametrised):
-    """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
+    """A model A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
     are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
@@ -75,18 +75,18 @@ class PolynomialModel(Parametrised):
         F: ArrayLike = (1.0,),
         variance: float = 1.0,
     ) -> Self:
-        """One input and one output."""
+        """Return whether there is one input and one output."""
         a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
         return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
 
     @cached_property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
         return len(self.B)
 
     @cached_property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return len(self.B[0])
 
     @cached_property
@@ -107,7 +107,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def active(self) -> tuple[tuple[int, int], ...]:
-        """The entries (output, input) of G that are not absent."""
+        """Return the entries (output, input) of G that are not absent."""
         places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
         return tuple((i, j) for i, j in places if self.first[i][j] < self.B[i][j].size)
 
@@ -120,34 +120,34 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """See `Model`: (p, r)."""
+        """Return the entries of G that may act without delay, (p, r), see `Model`."""
         return np.array(
             [[(i, j) in self.active and not d for j, d in enumerate(row)] for i, row in enumerate(self.first)]
         )
 
     @property
     def memory(self) -> float:
-        """The longest polynomials in a row, in samples: what they filter is forgotten after that."""
+        """Return the samples after which inputs are forgotten: the longest polynomials in a row."""
         rows = (self.A, self.C, self.D, *self.B, *self.F)
         return float(sum(max(p.size for p in row) for row in rows))
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """Return the parameters on which G depends, (k,)."""
+        """Return whether G depends on each parameter, (k,)."""
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
 
     @cached_property
     def letters(self) -> frozenset[str]:
-        """The polynomials that have free coefficients."""
+        """Return the polynomials that have free coefficients."""
         return frozenset(parameter.letter for parameter in self.parameters)
 
     @property
     def outputs_count(self) -> bool:
-        """Whether the gradient of the prediction depends on past outputs: by coefficients of A alone."""
+        """Return whether the prediction gradient depends on past outputs: through coefficients of A alone."""
         return "a" in self.letters
 
     def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
-        """A, C or D as one polynomial an output, a common one repeated."""
+        """Return A, C or D as one polynomial an output, a common one repeated."""
         return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
 
     def row(self, rows: Sequence[Array], output: int) -> Array:
@@ -156,7 +156,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles in z of G, H and their gradients."""
+        """Return the poles in z of G, H and their gradients."""
         return np.concatenate([all_roots(self.A), self.predictor_poles])
 
     @cached_property
@@ -166,7 +166,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
+        """Return the poles of G and of all gradients, as points of the frequency plane."""
         return logarithmic_distance(self.poles)
 
     @property
@@ -175,13 +175,13 @@ class PolynomialModel(Parametrised):
         return float(np.abs(self.poles).max(initial=0.0))
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         polynomials = (self.row(self.A, output), self.F[output][input], self.B[output][input])
         return logarithmic_distance(all_roots(polynomials))
 
     @property
     def stable_outputs(self) -> tuple[bool, ...]:
-        """Output by output, whether its row of G is stable."""
+        """Return whether each output's row of G is stable."""
         rows = [
             [a, *(f for j, f in enumerate(fs) if (i, j) in self.active)]
             for i, (a, fs) in enumerate(zip(self.per_output(self.A), self.F, strict=True))
@@ -202,7 +202,7 @@ class PolynomialModel(Parametrised):
         return replace(self, A=a, B=b, C=c, D=d, F=f, covariance=noise, delays=self.first)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
+        """Return the frequency response G as (n, p, r)."""
         q = unit_circle(w)
         G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
@@ -211,7 +211,7 @@ class PolynomialModel(Parametrised):
         return G
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
-        """H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
+        """Return the noise filter H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
         q = unit_circle(w)
         H = np.zeros((q.size, self.outputs, self.outputs), dtype=complex)
         for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
@@ -219,7 +219,7 @@ class PolynomialModel(Parametrised):
         return H
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return (k,), True for parameters of A and F of the entry if both stand in its denominator."""
+        """Return a mask (k,) of parameters of A and F of the entry, if both stand in its denominator."""
         both = len(self.row(self.A, output)) > 1 and len(self.F[output][input]) > 1
         return np.array(
             [both and p.letter in "af" and (output, input) in p.places for p in self.parameters], dtype=bool
@@ -244,14 +244,14 @@ class PolynomialModel(Parametrised):
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
     def _shifts(self, q: ComplexArray) -> list[ComplexArray]:
-        """The powers of q up to the highest of a parameter."""
+        """Return the powers of q up to the highest of a parameter."""
         found = [np.ones_like(q), q]
         for _ in range(max((parameter.power for parameter in self.parameters), default=0) - 1):
             found.append(found[-1] * q)
         return found
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
         q = unit_circle(w)
         gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
@@ -270,19 +270,19 @@ class PolynomialModel(Parametrised):
         return gradient
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dG/dtheta (n, k, p, r)."""
+        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
         return _input_gradients(self, [self], w)[0]
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dH/dtheta (n, k, p, p)."""
+        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
         return _noise_gradients(self, [self], w)[0]
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
+        """Return psi (n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
         return _gradients([self], w, y.shape[2], y[None], u[None], e[None])[0]
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""
         y, v = np.zeros((*u.shape[:-1], self.outputs)), np.empty(e.shape)
         for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
             v[..., i] = filtered(c, np.convolve(a, d), e[..., i])

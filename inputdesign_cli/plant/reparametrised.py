@@ -1,7 +1,7 @@
 """Any model in other parameters than its coefficients, of which some may be known, by the chain rule.
 
-dG/dphi = sum_l dG/dtheta_l dtheta_l/dphi: whatever is asked of a model at the parameters phi follows from the
-model of its coefficients theta(phi) and the Jacobian J (K, k) of theta. What is known has no column in J.
+dG/dphi = sum_l dG/dtheta_l dtheta_l/dphi: all results at the parameters phi follow from the model of its
+coefficients theta(phi) and the Jacobian J (K, k) of theta. Known parameters have no column in J.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _RECENT = 4
 
 @dataclass(frozen=True)
 class Parametrisation:
-    """m parameters, k of them `free`, and the K coefficients of a model that follow from them.
+    """Holds m parameters, k of them `free`, and the K coefficients of a model that follow from them.
 
     Attributes:
-        labels: (m,) what the user calls them; `symbols` (m,) what `terms` (K,) call them.
+        labels: (m,) their names for the user; `symbols` (m,) their names in `terms` (K,).
         values: (m,); parameters that are not free are known.
     """
 
@@ -39,7 +39,7 @@ class Parametrisation:
 
     @classmethod
     def identity(cls, labels: Sequence[str], values: ArrayLike, known: Sequence[str]) -> Parametrisation:
-        """The coefficients themselves, some of them known."""
+        """Return the parametrisation by the coefficients themselves, some of them known."""
         symbols = tuple(f"p{i}" for i in range(len(labels)))
         free = np.array([label not in known for label in labels], dtype=bool)
         terms = tuple(Expression(symbol) for symbol in symbols)
@@ -47,7 +47,7 @@ class Parametrisation:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Return labels of the free ones (k,)."""
+        """Return the labels of the free parameters (k,)."""
         return tuple(label for label, free in zip(self.labels, self.free, strict=True) if free)
 
     @property
@@ -57,7 +57,7 @@ class Parametrisation:
 
     @property
     def affine(self) -> bool:
-        """Whether every coefficient is affine in the parameters."""
+        """Return whether every coefficient is affine in the parameters."""
         return all(term.affine for term in self.terms)
 
     def at(self, theta: ArrayLike) -> Parametrisation:
@@ -74,12 +74,12 @@ class Parametrisation:
 
     @cached_property
     def _recent(self) -> dict[bytes, Parametrisation]:
-        """Where `at` has been: a search asks for the same few points again and again."""
+        """Return the recent results of `at`: a search asks for the same few points again and again."""
         return {}
 
     @cached_property
     def coefficients(self) -> Array:
-        """Return NaN where a term is not defined, (K,)."""
+        """Return the coefficients (K,), NaN where a term is not defined."""
         return self._image.values
 
     @cached_property
@@ -89,7 +89,7 @@ class Parametrisation:
 
     @cached_property
     def moves(self) -> NDArray[np.bool_]:
-        """(K, k): which coefficient is an expression in which free parameter, whatever its slope is here."""
+        """Return whether each coefficient, as written, contains each free parameter, (K, k)."""
         listed = [[symbol in term.names for symbol in self.symbols] for term in self.terms]
         return np.array(listed, dtype=bool).reshape(len(self.terms), len(self.symbols))[:, self.free]
 
@@ -115,7 +115,7 @@ class Words:
     Attributes:
         plant: the section as it was written; None if it lists the coefficients of the model.
         places: label -> where its value stands in the section.
-        known: of plant and of noise, what is listed as known.
+        known: the parameters of plant and of noise that are listed as known.
     """
 
     plant: Mapping[str, object] | None = None
@@ -125,7 +125,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Reparametrised(Around):
-    """The model `coefficients` at the parameters of `parametrisation`, with k of them free."""
+    """A model whose `coefficients` follow from `parametrisation`, with k free parameters."""
 
     coefficients: Model
     parametrisation: Parametrisation
@@ -133,12 +133,12 @@ class Reparametrised(Around):
 
     @property
     def inner(self) -> SampledPlant:
-        """The model of the coefficients."""
+        """Return the model of the coefficients."""
         return cast(SampledPlant, self.coefficients)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return what the free parameters are called, (k,)."""
+        """Return the names of the free parameters, (k,)."""
         return self.parametrisation.names
 
     @property
@@ -154,22 +154,22 @@ class Reparametrised(Around):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """Return the parameters on which G depends, (k,)."""
+        """Return whether G depends on each parameter, (k,)."""
         return np.any(self.parametrisation.moves[self.coefficients.in_plant], axis=0)
 
     @cached_property
     def dead_times(self) -> NDArray[np.bool_]:
-        """Return the parameters that move a dead time, (k,)."""
+        """Return whether each parameter moves a dead time, (k,)."""
         return np.any(self.parametrisation.moves[self.coefficients.dead_times], axis=0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return what the coefficients of `bends` follow from, (k,); all, unless these are affine."""
+        """Return whether each parameter is in a coefficient that bends, (k,); all True unless affine."""
         if not self.parametrisation.affine:
             return np.ones(len(self.names), dtype=bool)
         return np.any(self.parametrisation.moves[self.coefficients.bends(output, input)], axis=0)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as numerator over denominator, gradients (n, k)."""
+        """Return one entry of G as numerator over denominator, with gradients (n, k)."""
         part, J = self.coefficients.entry_fraction(output, input, w), self.parametrisation.jacobian
         return replace(
             part,
@@ -178,19 +178,19 @@ class Reparametrised(Around):
         )
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dphi (n, k, p, r)."""
+        """Return the gradient dG/dphi as (n, k, p, r)."""
         return self._chained(self.coefficients.plant_gradient(w))
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dG/dphi (n, k, p, r)."""
+        """Return H^-1 dG/dphi as (n, k, p, r), the prediction gradient due to u."""
         return self._chained(self.coefficients.input_gradient(w))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dH/dphi (n, k, p, p)."""
+        """Return H^-1 dH/dphi as (n, k, p, p), the prediction gradient due to e."""
         return self._chained(self.coefficients.noise_gradient(w))
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """(n, k, p, m), see `Model`."""
+        """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         return self._chained(self.coefficients.prediction_gradient(w, y, u, e))
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Reparametrised:
@@ -200,6 +200,6 @@ class Reparametrised(Around):
         return replace(self, coefficients=coefficients, parametrisation=moved)
 
     def _chained(self, gradient: ComplexArray) -> ComplexArray:
-        """A gradient (n, K, ..) in the coefficients as one (n, k, ..) in the parameters."""
+        """Return a gradient (n, K, ..) in the coefficients as one (n, k, ..) in the parameters."""
         moved = np.moveaxis(gradient, 1, -1) @ self.parametrisation.jacobian
         return np.asarray(np.moveaxis(moved, -1, 1), dtype=complex)

@@ -20,8 +20,8 @@ from inputdesign_cli.plant.transfer import StateSpace
 class SampledModel(Parametrised, WhiteNoise):
     """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay in s.
 
-    Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
-    dG/da_k = -s^k b / a^2: each entry needs one state-space model of a^2, exact through one exponential.
+    Sampling is linear in G: the gradient of the sampled plant is the sampled dG/da_k = -s^k b / a^2. Each
+    entry needs one state-space model of a^2, exact through one exponential.
     """
 
     continuous_plant: ContinuousModel
@@ -31,12 +31,12 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
         return self.continuous_plant.outputs
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return self.continuous_plant.inputs
 
     @property
@@ -46,7 +46,7 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """See `Model`: (p, r)."""
+        """Return the entries of G that may act without delay, (p, r), see `Model`."""
         found = np.zeros((self.outputs, self.inputs), dtype=bool)
         for place, entry in self._entries.items():
             found[place] = entry.biproper and not entry.direct_lag
@@ -67,12 +67,12 @@ class SampledModel(Parametrised, WhiteNoise):
         return SampledModel(self.continuous_plant.at(theta, covariance), self.sample_time)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What u (.., n, r), held between samples, causes at the outputs (.., n, p), and e itself."""
+        """Return the outputs that u (.., n, r), held between samples, and e itself cause."""
         return self.continuous_plant.driven(u, Intersample(self.sample_time, hold=True)), e
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles in z of all entries."""
+        """Return the poles in z of all entries."""
         return np.exp(self.continuous_plant.poles * self.sample_time)
 
     @property
@@ -82,7 +82,7 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @cached_property
     def repeated_integrators(self) -> int:
-        """Return by how many the integrators of single entries exceed the integrators of the plant.
+        """Return the excess of the integrators of single entries over the integrators of the plant.
 
         The plant has as many simple ones as their gains have rank. No feedback moves the others, for they
         take no part in G.
@@ -142,7 +142,7 @@ class SampledModel(Parametrised, WhiteNoise):
         return self.poles
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """I and G, which has no poles outside the unit circle."""
+        """Return I and G, which has no poles outside the unit circle."""
         return self.forcing_at(w), self.plant_at(w)
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:
@@ -155,17 +155,17 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
+        """Return the poles of G and of all gradients, as points of the frequency plane."""
         return logarithmic_distance(self.poles)
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         entry = self._entries.get((output, input))
         return np.zeros(0, dtype=complex) if entry is None else logarithmic_distance(entry.roots)
 
     @property
     def memory(self) -> float:
-        """The longest dead time, in samples, and one for what is left of it."""
+        """Return the longest dead time in samples, its fraction of a sample counted as a whole one."""
         return max((entry.lag + 1.0 for entry in self._entries.values() if entry.delay), default=0.0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
@@ -173,11 +173,11 @@ class SampledModel(Parametrised, WhiteNoise):
         return np.ones(self.theta.size, dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """There is none."""
+        """Raise an error: no entry is a fraction that is affine in its parameters."""
         raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
+        """Return the frequency response G as (n, p, r)."""
         z = np.exp(1j * np.asarray(w))
         G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
         for (i, j), entry in self._entries.items():
@@ -185,7 +185,7 @@ class SampledModel(Parametrised, WhiteNoise):
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
         z = np.exp(1j * np.asarray(w))
         gradient = np.zeros((z.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
         responses = {place: entry.responses(z) for place, entry in self._entries.items()}

@@ -31,7 +31,7 @@ _INTEGRATES = 1e-7
 
 
 class Matrices(NamedTuple):
-    """A (n, n), B (n, r), C (p, n), D (p, r), K (n, p), and the dead time of the inputs."""
+    """Holds A (n, n), B (n, r), C (p, n), D (p, r), K (n, p), and the dead time of the inputs."""
 
     A: Array
     B: Array
@@ -42,7 +42,7 @@ class Matrices(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """The derivatives of A, of how u(t - d) and u(t - d - 1) enter the states, of C, D and K."""
+    """Holds the derivatives of A, C, D and K, and of the gains of u(t - d) and u(t - d - 1) on the states."""
 
     A: Array
     early: Array
@@ -54,11 +54,11 @@ class Slope(NamedTuple):
 
 @dataclass(frozen=True)
 class StateSpaceModel(Parametrised):
-    """See above; e is white with a full covariance (p, p).
+    """A state-space model as above; e is white with a full covariance (p, p).
 
     Attributes:
         matrices: in continuous time, and behind a hold, where there is a `sample_time`; otherwise of samples.
-        entries: the free ones: letter, row and column; ("delay", 0, 0) for the dead time.
+        entries: the free entries: letter, row and column; ("delay", 0, 0) for the dead time.
     """
 
     matrices: Matrices
@@ -70,22 +70,22 @@ class StateSpaceModel(Parametrised):
 
     @property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
         return len(self.matrices.C)
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return self.matrices.B.shape[1]
 
     @property
     def order(self) -> int:
-        """Number of states n."""
+        """Return the number of states n."""
         return len(self.matrices.A)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The free entries."""
+        """Return the free entries."""
         found = []
         for letter, i, j in self.entries:
             value = self.matrices.delay if letter == DELAY else self._table[letter][i, j]
@@ -95,7 +95,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """See `Model`: (p, r)."""
+        """Return the entries of G that may act without delay, (p, r), see `Model`."""
         found = self.matrices.D != 0.0
         for letter, i, j in self.entries:
             if letter == "D":
@@ -109,7 +109,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """Return all but entries of K (k,)."""
+        """Return a mask (k,) of all entries except the entries of K."""
         return np.array([letter != "K" for letter, _, _ in self.entries], dtype=bool)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> StateSpaceModel:
@@ -128,27 +128,27 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def _split(self) -> tuple[int, float]:
-        """Whole samples of the dead time, and what is left of it."""
+        """Return the whole samples of the dead time, and the remaining fraction."""
         return (0, 0.0) if self.sample_time is None else whole_samples(self.matrices.delay, self.sample_time)
 
     @property
     def lag(self) -> int:
-        """d, the whole samples of the dead time."""
+        """Return d, the whole samples of the dead time."""
         return self._split[0]
 
     @property
     def direct_lag(self) -> int:
-        """The samples by which what acts at once is late."""
+        """Return the samples by which the direct gain is late."""
         return self.lag + (self._split[1] > 0.0)
 
     @cached_property
     def held(self) -> tuple[Array, Array, Array]:
-        """A of the samples, and how u(t - d) and u(t - d - 1) enter the states."""
+        """Return A of the samples, and the matrices by which u(t - d) and u(t - d - 1) enter the states."""
         whole, early, _ = self._exponentials(None)
         return whole[0], early, whole[1] - early
 
     def _exponentials(self, moved: Array | None) -> tuple[tuple[Array, Array], Array, Array]:
-        """Over a sample (A, B); B over what is left of it after the fraction; and A over that.
+        """Return A and B over a sample, B over its rest after the fraction, and A over that rest.
 
         Args:
             moved: (n, n + r), a direction of [A B]: the derivatives in that direction instead.
@@ -170,7 +170,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def slopes(self) -> tuple[Slope, ...]:
-        """With respect to each parameter."""
+        """Return the derivatives with respect to each parameter."""
         return tuple(self._slope(*entry) for entry in self.entries)
 
     def _slope(self, letter: str, i: int, j: int) -> Slope:
@@ -191,12 +191,12 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles in z of G."""
+        """Return the poles in z of G."""
         return np.asarray(np.linalg.eigvals(self.held[0]), dtype=complex)
 
     @cached_property
     def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the predictor."""
+        """Return the poles in z of the predictor."""
         m = self.matrices
         return np.asarray(np.linalg.eigvals(self.held[0] - m.K @ m.C), dtype=complex)
 
@@ -207,12 +207,12 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
+        """Return the poles of G and of all gradients, as points of the frequency plane."""
         near = logarithmic_distance(np.concatenate([self.poles, self.predictor_poles]))
         return np.where(np.abs(near) < _INTEGRATES, 0.0, near)
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         A, early, late = self.held
         m = self.matrices
         pencil = np.block([[A, (early + late)[:, [input]]], [m.C[[output]], m.D[[output]][:, [input]]]])
@@ -223,7 +223,7 @@ class StateSpaceModel(Parametrised):
 
     @property
     def memory(self) -> float:
-        """The dead time, in samples."""
+        """Return the dead time, in samples."""
         return float(self.direct_lag)
 
     @property
@@ -245,11 +245,11 @@ class StateSpaceModel(Parametrised):
         return np.ones(len(self.entries), dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """There is none."""
+        """Raise an error: no entry is a fraction that is affine in its parameters."""
         raise ValueError("an entry of a state-space model is no fraction that is affine in its parameters")
 
     def _points(self, w: ArrayLike) -> ComplexArray:
-        """z (m,), beside one where the model integrates."""
+        """Return z (m,), beside one where the model integrates."""
         given = np.atleast_1d(np.asarray(w))
         if not np.iscomplexobj(given) and np.any(self.singularities == 0.0):
             given = np.where(np.abs(given) < _BESIDE, _BESIDE, given)
@@ -259,7 +259,7 @@ class StateSpaceModel(Parametrised):
         return np.linalg.inv(z[:, None, None] * np.eye(self.order) - A).astype(complex)
 
     def _entering(self, z: ComplexArray, early: Array, late: Array) -> ComplexArray:
-        """Return how u enters the states (m, n, r)."""
+        """Return the matrix by which u enters the states, (m, n, r)."""
         delayed = z[:, None, None] ** -float(self.lag)
         return np.asarray(delayed * (early + late / z[:, None, None]), dtype=complex)
 
@@ -267,23 +267,23 @@ class StateSpaceModel(Parametrised):
         return np.asarray(z[:, None, None] ** -float(self.direct_lag) * D, dtype=complex)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
+        """Return the frequency response G as (n, p, r)."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
         return m.C @ self._resolvent(z, A) @ self._entering(z, early, late) + self._direct(z, m.D)
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """H^-1 (n, p, p) and H^-1 G (n, p, r), as the predictor has them."""
+        """Return H^-1 (n, p, p) and H^-1 G (n, p, r), as the predictor has them."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
         read = m.C @ self._resolvent(z, A - m.K @ m.C)
         D = self._direct(z, m.D)
         return np.eye(self.outputs) - read @ m.K, read @ (self._entering(z, early, late) - m.K @ D) + D
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
+        """Return the gradient dG/dtheta as (n, k, p, r)."""
         return self._of_inputs(w, np.zeros_like(self.matrices.K))
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dG/dtheta (n, k, p, r)."""
+        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
         return self._of_inputs(w, self.matrices.K)
 
     def _of_inputs(self, w: ArrayLike, K: Array) -> ComplexArray:
@@ -293,14 +293,14 @@ class StateSpaceModel(Parametrised):
         return self._gradient(z, x, u, None, K)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dH/dtheta (n, k, p, p)."""
+        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
         z = self._points(w)
         e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (z.size, self.outputs, self.outputs))
         x = self._resolvent(z, self.held[0]) @ self.matrices.K.astype(complex)
         return self._gradient(z, x, None, e, self.matrices.K)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """(n, k, p, m), see `Model`."""
+        """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
         driven = (self._entering(z, early, late) - m.K @ self._direct(z, m.D)) @ u + m.K @ y
         return self._gradient(z, self._resolvent(z, A - m.K @ m.C) @ driven, u, e, m.K)
@@ -308,7 +308,7 @@ class StateSpaceModel(Parametrised):
     def _gradient(
         self, z: ComplexArray, x: ComplexArray, u: NDArray | None, e: NDArray | None, K: Array
     ) -> ComplexArray:
-        """dy^ (n, k, p, m) from the states x (n, order, m), inputs and prediction errors of the predictor."""
+        """Return dy^ (n, k, p, m) from states x (n, order, m), inputs and errors of the predictor."""
         read = self.matrices.C @ self._resolvent(z, self.held[0] - K @ self.matrices.C)
         gradient = np.zeros((z.size, len(self.entries), self.outputs, x.shape[2]), dtype=complex)
         for index, d in enumerate(self.slopes):
@@ -353,6 +353,6 @@ class StateSpaceModel(Parametrised):
         return full
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""
         noise = StateSpace(self.held[0], self.matrices.K, self.matrices.C, np.eye(self.outputs))
         return self.realisation.from_rest(u), noise.from_rest(e)

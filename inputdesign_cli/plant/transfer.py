@@ -1,6 +1,6 @@
 """Transfer functions: scalars in q^-1 and in s, and matrices in q^-1 with the scalar as their 1 x 1 case.
 
-Denominators are kept in factors: a controller's slow pole next to z = 1 loses digits when it is multiplied
+Denominators are kept in factors. A controller's slow pole next to z = 1 loses digits when it is multiplied
 out, and the sensitivity function at low frequency depends on just those digits.
 """
 
@@ -28,25 +28,25 @@ class ScalarTransfer(Protocol):
     """A weight or a filter, whatever its variable."""
 
     def at(self, w: ArrayLike) -> ComplexArray:
-        """Its value at frequencies `w`, same shape."""
+        """Return the frequency response at frequencies `w`, in the same shape."""
 
     @property
     def pole_points(self) -> ComplexArray:
-        """Poles as points of the frequency plane, frequency + j damping."""
+        """Return the poles as points of the frequency plane, frequency + j damping."""
 
     @property
     def zero_points(self) -> ComplexArray:
-        """Zeros as such points."""
+        """Return the zeros as points of the frequency plane."""
 
     @property
     def singularities(self) -> ComplexArray:
-        """Both."""
+        """Return the poles and zeros together."""
         return np.concatenate([self.zero_points, self.pole_points])
 
 
 @dataclass(frozen=True)
 class Rational(ScalarTransfer):
-    """numerator / (product of the denominator factors), all in q^-1, ascending."""
+    """A transfer function numerator / (product of the denominator factors), all in q^-1, ascending."""
 
     numerator: Array
     denominator: tuple[Array, ...] = (np.ones(1),)
@@ -60,56 +60,56 @@ class Rational(ScalarTransfer):
         return cls(np.asarray(numerator, dtype=float), tuple(np.asarray(f, dtype=float) for f in factors))
 
     def at(self, w: ArrayLike) -> ComplexArray:
-        """Frequency response at normalised frequencies `w`."""
+        """Return the frequency response at normalised frequencies `w`."""
         q = unit_circle(w)
         return evaluate(self.numerator, q) / _product_at(self.denominator, q)
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles in z, factor by factor."""
+        """Return the poles in z, factor by factor."""
         return all_roots(self.denominator)
 
     @cached_property
     def zeros(self) -> ComplexArray:
-        """Zeros in z, those at the origin and at infinity left out."""
+        """Return the zeros in z, those at the origin and at infinity left out."""
         return roots_in_z(self.numerator)
 
     @property
     def pole_points(self) -> ComplexArray:
-        """Poles as points of the frequency plane."""
+        """Return the poles as points of the frequency plane."""
         return logarithmic_distance(self.poles)
 
     @property
     def zero_points(self) -> ComplexArray:
-        """Zeros as points of the frequency plane."""
+        """Return the zeros as points of the frequency plane."""
         return logarithmic_distance(self.zeros)
 
     @cached_property
     def denominator_polynomial(self) -> Array:
-        """The denominator factors multiplied out."""
+        """Return the product of the denominator factors."""
         return product_of(self.denominator)
 
 
 @dataclass(frozen=True)
 class ContinuousRational(ScalarTransfer):
-    """numerator / denominator in s, coefficients in descending powers."""
+    """A transfer function numerator / denominator in s, coefficients in descending powers."""
 
     numerator: Array
     denominator: Array
 
     def at(self, w: ArrayLike) -> ComplexArray:
-        """Its value at frequencies `w` in rad per time unit."""
+        """Return the frequency response at frequencies `w` in rad per time unit."""
         s = 1j * np.asarray(w, dtype=float)
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s), dtype=complex)
 
     @property
     def pole_points(self) -> ComplexArray:
-        """Poles as points of the frequency plane."""
+        """Return the poles as points of the frequency plane."""
         return _in_the_plane(self.denominator)
 
     @property
     def zero_points(self) -> ComplexArray:
-        """Zeros as points of the frequency plane."""
+        """Return the zeros as points of the frequency plane."""
         return _in_the_plane(self.numerator)
 
 
@@ -119,7 +119,7 @@ def _in_the_plane(polynomial: Array) -> ComplexArray:
 
 
 class StateSpace(NamedTuple):
-    """x(t + 1) = A x + B v, z = C x + D v with n states, m inputs v and q outputs z."""
+    """A system x(t + 1) = A x + B v, z = C x + D v of n states, m inputs, q outputs."""
 
     A: Array
     B: Array
@@ -127,7 +127,7 @@ class StateSpace(NamedTuple):
     D: Array
 
     def from_rest(self, v: Array) -> Array:
-        """(.., N, q): what samples v (.., N, m) cause."""
+        """Return the outputs (.., N, q) that samples v (.., N, m) cause."""
         A, B, C, D = (M.T for M in self)
         x = np.zeros((*v.shape[:-2], len(A)))
         driven, found = v @ B, v @ D
@@ -138,7 +138,7 @@ class StateSpace(NamedTuple):
 
     @classmethod
     def of(cls, blocks: Iterable[tuple[Array, Array, Array]], direct: Array) -> StateSpace:
-        """Blocks (A, B, C) that share all inputs and of which the outputs add up; D (q, m) is `direct`."""
+        """Join blocks (A, B, C) that share all inputs and whose outputs add up; D (q, m) is `direct`."""
         outputs, inputs = direct.shape
         none = (np.zeros((0, 0)), np.zeros((0, inputs)), np.zeros((outputs, 0)))
         A, B, C = zip(none, *blocks, strict=True)
@@ -147,10 +147,10 @@ class StateSpace(NamedTuple):
 
 @dataclass(frozen=True)
 class TransferMatrix:
-    """T = Q^-1 P in q^-1: `numerator` P (rows, columns, l), `factors` of each entry of the diagonal Q.
+    """A matrix T = Q^-1 P in q^-1: `numerator` P (rows, columns, l), `factors` of each entry of diagonal Q.
 
-    A denominator that several entries of a row share is kept once, so that its poles are not counted twice:
-    with integral action on every output each input has one integrator.
+    A denominator that several entries of a row share is kept once, so that its poles are not counted twice.
+    With integral action on every output each input has one integrator.
     """
 
     numerator: Array
@@ -186,31 +186,31 @@ class TransferMatrix:
 
     @classmethod
     def diagonal(cls, entry: Rational, size: int) -> TransferMatrix:
-        """t(q) I of `size` rows."""
+        """Return t(q) I of `size` rows."""
         return cls(np.eye(size)[:, :, None] * entry.numerator, (entry.denominator,) * size)
 
     @cached_property
     def denominator(self) -> tuple[Array, ...]:
-        """The diagonal of Q, multiplied out."""
+        """Return the diagonal of Q, multiplied out."""
         return tuple(product_of(row) for row in self.factors)
 
     def at(self, w: ArrayLike) -> ComplexArray:
-        """T (n, rows, columns) at normalised frequencies `w` (n,)."""
+        """Return the frequency response T (n, rows, columns) at normalised frequencies `w` (n,)."""
         P, below = self.fraction_at(w)
         return P / below[:, :, None]
 
     def fraction_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """P (n, rows, columns) and the diagonal of Q (n, rows) at normalised frequencies `w` (n,)."""
+        """Return P (n, rows, columns) and the diagonal of Q (n, rows) at normalised frequencies `w` (n,)."""
         q = unit_circle(w)
         return at(self.numerator, q), np.stack([_product_at(row, q) for row in self.factors], axis=-1)
 
     def scaled(self, factor: Rational) -> TransferMatrix:
-        """This matrix times a scalar transfer function."""
+        """Return this matrix times a scalar transfer function."""
         rows = [[np.convolve(p, factor.numerator).tolist() for p in row] for row in self.numerator]
         return TransferMatrix(stack(rows), tuple((*row, *factor.denominator) for row in self.factors))
 
     def common_fraction(self) -> tuple[Array, Array]:
-        """P' (rows, columns, l) and d (m,) with T = P' / d; factors that rows share are in d once."""
+        """Return P' (rows, columns, l) and d (m,) with T = P' / d; factors that rows share are in d once."""
         own = [Counter(map(tuple, row)) for row in self.factors]
         shared: Counter[tuple[float, ...]] = reduce(or_, own)
         rows = [
@@ -221,17 +221,17 @@ class TransferMatrix:
 
     @property
     def poles(self) -> ComplexArray:
-        """Poles in z."""
+        """Return the poles in z."""
         return all_roots(factor for row in self.factors for factor in row)
 
     @property
     def memory(self) -> float:
-        """The longest polynomial, in samples."""
+        """Return the length of the longest polynomial, in samples."""
         return float(max([self.numerator.shape[-1], *(d.size for d in self.denominator)]))
 
     @cached_property
     def delay(self) -> int:
-        """The number of samples by which every entry is delayed."""
+        """Return the number of samples by which every entry is delayed."""
         return delay_of(self.numerator)
 
     @property
@@ -254,7 +254,7 @@ class TransferMatrix:
 
 
 def product_of(polynomials: Iterable[Coefficients]) -> Array:
-    """The product of polynomials, 1 if there are none."""
+    """Return the product of polynomials, 1 if there are none."""
     return reduce(np.convolve, (np.asarray(p, dtype=float) for p in polynomials), np.ones(1))
 
 

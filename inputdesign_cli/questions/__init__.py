@@ -50,7 +50,7 @@ def solve(spec: Spec) -> Results:
 
 
 def analyse(spec: Spec) -> Results:
-    """Return what a given excitation buys, without designing anything. It raises as `solve` does."""
+    """Return the accuracy that a given excitation gives, without any design. It raises as `solve` does."""
     from inputdesign_cli.questions.task import build_analysis
 
     return _in_time(spec, lambda: build_analysis(spec).solve())
@@ -78,7 +78,7 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
 
 
 def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Results:
-    """Return what `idesign VERB` computes; it raises as the verb does."""
+    """Return the results of `idesign VERB`; it raises as the verb does."""
     if verb == "simulate":
         return simulate(spec, executor=executor)
     return solve(spec) if verb == "solve" else analyse(spec)
@@ -143,7 +143,7 @@ def assess(
     operating_point: Mapping[str, float] | None = None,
     preparation: Preparation | None = None,
 ) -> Assessment:
-    """Identify the model from real experiments, compare what the data buy with what is asked, and top up.
+    """Identify the model from real experiments, compare its accuracy with the one asked, and top up.
 
     It takes data as `identify` does, and raises `SpecError` where nothing is asked that data could meet.
     """
@@ -163,7 +163,7 @@ def assess(
 
 
 def next_round(spec: Spec, past: Past) -> Decision:
-    """Return what comes next in a campaign after what has been done: the next part, or the end.
+    """Return the next step of a campaign after its records so far: the next part, or the end.
 
     Raises:
         SpecError: the spec has no campaign, or one that this version cannot do.

@@ -1,4 +1,4 @@
-"""Make signals that need no spec as records with units, and measure what they excite."""
+"""Make signals that need no spec as records with units, and measure the frequencies that they excite."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _USUAL = 1000
 
 @dataclass(frozen=True)
 class ReadyMade:
-    """The signal that is asked for."""
+    """Describes the signal that is asked for."""
 
     kind: str
     bits: int | None = None  # of the register of a prbs; None: enough for the samples without repetition
@@ -43,12 +43,12 @@ class ReadyMade:
 
     @property
     def inputs(self) -> int:
-        """Number of inputs."""
+        """Return the number of inputs."""
         return len(self.levels)
 
 
 def make_signal(asked: ReadyMade) -> Results:
-    """Return the record as signal.csv, its figures, and what it excites.
+    """Return the record as signal.csv, its figures, and the band and order of its excitation.
 
     Raises:
         SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.

@@ -13,14 +13,14 @@ from inputdesign_cli.specification import Spec
 
 
 class Task(Protocol):
-    """A question that was built and checked.
+    """Holds a question that was built and checked.
 
     Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`). The verbs
     add its place in a file (`Spec.place`).
     """
 
     def solve(self) -> Results:
-        """Return a design with its proof, or the accuracy that a given excitation buys."""
+        """Return a design with its proof, or the accuracy that a given excitation gives."""
 
     def simulate(self, executor: Executor | None = None) -> Results:
         """Return the answer of `solve`, with the experiment tried many times on the true system.

@@ -51,7 +51,7 @@ def arrays_of_mat(source: Source, raw: bytes) -> dict[str, Any]:
 
 
 def _check_elements(data: bytes, order: str, most: int, depth: int = 0) -> int:
-    """Return how many of `most` bytes are left; at a damaged file SciPy's reader may end the program."""
+    """Check the sizes in a .mat file, at which SciPy's reader may crash; return the bytes left of `most`."""
     at = 0
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, at)
@@ -140,7 +140,7 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, NDArray]]:
 
 
 def _wrong(array: NDArray) -> str:
-    """What an array holds that is no column of numbers; nothing where it is one."""
+    """Return the name of the content of an array that is no column of numbers; empty where it is one."""
     kind = array.dtype.kind
     if array.size == 0:
         return "nothing"

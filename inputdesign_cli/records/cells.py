@@ -42,7 +42,7 @@ _DAYS = (
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 _ISO = "ISO8601"
 # Forms of one order of day, month and year, or of times of day: seconds and their parts may be left out.
-_FORMS = {
+_FORMS: dict[str, tuple[str, ...]] = {
     _ISO: (_ISO,),
     "": _CLOCKS,
     **{day: (*(f"{day} {clock}" for clock in _CLOCKS), day) for day in _DAYS},
@@ -160,11 +160,10 @@ def moments_column(cells: Sequence[str], form: str | None = None) -> Column | No
         return None
     texts = np.array([_COMMA_SECONDS.sub(r"\1.\2", cells[i]) for i in there], dtype=object)
     known = _FORMS if form is None and _MOMENT.fullmatch(texts[0]) else {}
-    orders = (
-        {form: (form,)}
-        if form
-        else {order: forms for order, forms in known.items() if not np.isnat(_read(texts[:1], forms)[0])}
-    )
+    orders: dict[str, tuple[str, ...]] = {form: (form,)} if form else {}
+    for order, forms in known.items():
+        if not np.isnat(_read(texts[:1], forms)[0]):
+            orders[order] = forms
     every = {order: _read(texts, forms) for order, forms in orders.items()}
     whole = {one: found for one, found in every.items() if not np.isnat(found).any()}
     if whole:

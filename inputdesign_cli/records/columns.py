@@ -59,7 +59,7 @@ _WORDS: tuple[dict[str, str], ...] = (
 
 
 def named_columns(sheet: Sheet, start: str) -> list[int]:
-    """Return where columns of this name are, else of this beginning (u1 is not u10), else of this number."""
+    """Return the columns with this name, else with this beginning (u1 is not u10), else with this number."""
     header = sheet.header
     exact = [i for i, name in enumerate(header) if name == start]
     begun = exact or [
@@ -73,7 +73,7 @@ def named_columns(sheet: Sheet, start: str) -> list[int]:
 
 
 def time_columns(sheet: Sheet) -> list[str]:
-    """Return the names, in small letters, of columns of times; the number of one without a name.
+    """Return the names in small letters of the columns of times, or the number of a nameless one.
 
     If no name is one of times, columns that are called as clocks are and rise, or hold dates or times of day.
     At last columns whose dates cannot be read: to do without them would be to guess.
@@ -230,7 +230,7 @@ def _of(letter: str, count: int) -> list[str]:
 
 
 def _time(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
-    """Return `time` -> its column; nothing without one, or if the user says `time=none`."""
+    """Return `time` with its column; empty if there is none or the user says `time=none`."""
     if "time" in columns:
         return {} if without_times(sheet, columns) else {"time": columns["time"]}
     claimed = {column.strip().lower() for column in columns.values()}
@@ -275,7 +275,7 @@ def _whole(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
 
 
 def _count(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
-    """Return how many inputs or outputs are named; they are numbered from one on."""
+    """Return how many inputs or outputs are named; their numbers must run from one."""
     named = [name for name in columns if name.startswith(letter)]
     if named and set(named) == set(_of(letter, len(named))):
         return len(named)
@@ -331,13 +331,13 @@ def _role(name: str) -> str:
 
 
 def called(sheet: Sheet, at: int) -> str:
-    """Return how an option calls a column: by a name that names no other one, else by its number."""
+    """Return a column's name for options: its own if it names no other column, else its number."""
     name = sheet.names[at].strip() if at < len(sheet.names) else ""
     plain = bool(name) and not _SEPARATORS & set(name) and named_columns(sheet, name.lower()) == [at]
     return name if plain else str(at + 1)
 
 
 def rising(sheet: Sheet) -> list[int]:
-    """Return where columns are whose numbers rise from row to row, as times do."""
+    """Return the columns whose numbers rise from row to row, as times do."""
     numbers = [column.numbers[~np.isnan(column.numbers)] for column in sheet.columns]
     return [i for i, x in enumerate(numbers) if x.size > 1 and np.all(np.diff(x) > 0.0)]

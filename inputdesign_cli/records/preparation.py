@@ -14,7 +14,7 @@ Run = tuple[str, int, int]
 
 @dataclass(frozen=True)
 class Preparation:
-    """How a record is to be read and prepared.
+    """Describes how a record is to be read and prepared.
 
     Attributes:
         columns: channel (`u1`, `y1`, `time`) -> name or number of its column.
@@ -43,5 +43,5 @@ class Preparation:
 
     @property
     def levels(self) -> Mapping[str, float]:
-        """Return the levels of the signals by channel: the operating point, if that is what is taken away."""
+        """Return the levels taken away, by channel: the operating point, unless trends are removed."""
         return self.operating_point if self.detrend == "none" else {}

@@ -108,7 +108,7 @@ def _arrays_of_npz(source: Source, raw: bytes) -> dict[str, Any]:
 
 
 def _workbook(source: Source, raw: bytes, named: str) -> Sheet:
-    """The table in a sheet of a workbook, the first unless one is named; lines are its rows."""
+    """Read the table in a sheet of a workbook, the first unless one is named; lines are its rows."""
     how = {"header": None, "sheet_name": None, "dtype": object}
     frames = _loaded(source, "a workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), **how))
     if named and named not in frames:
@@ -126,7 +126,7 @@ def _workbook(source: Source, raw: bytes, named: str) -> Sheet:
 
 
 def _frame(pandas: Any, source: Source, raw: bytes) -> Any:
-    """The frame in a parquet file, with its index in columns before the others."""
+    """Read the frame in a parquet file, with its index in columns before the others."""
     parquet = import_module("pyarrow.parquet").ParquetFile(io.BytesIO(raw))
     if 8 * parquet.metadata.num_rows * len(parquet.schema_arrow.names) > MOST_UNPACKED:
         raise source.unreadable("unpacks to more than 1 GiB", "keep the rows that are needed")
@@ -153,7 +153,7 @@ def _loaded(source: Source, kind: str, load: Callable[[Any], Any]) -> Any:
 
 
 def _of_columns(source: Source, names: Sequence[str], columns: Sequence[NDArray]) -> Sheet:
-    """The sheet of columns that a file has as such; their numbers have decimal points."""
+    """Build the sheet of a file that stores columns as such; their numbers have decimal points."""
     rows = zip(*map(_written, columns), strict=True)
     body = [(line, list(row)) for line, row in enumerate(rows, start=1)]
     stated = replace(source, given=replace(source.given, decimal="."))

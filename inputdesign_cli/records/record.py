@@ -42,7 +42,7 @@ class Record(Samples):
         header: the names of the columns of the first file, in small letters.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
         repeated: files that have samples in common.
-        lined: whether a line was taken away from an output: its slope is then estimated with the model, since
+        lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
             the inputs cause a part of it.
         remarks: what a question did to the record later.
     """
@@ -59,12 +59,12 @@ class Record(Samples):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The messages of the findings, and the remarks."""
+        """Return the messages of the findings, and the remarks."""
         return (*(one.message for one in self.findings), *self.remarks)
 
     @property
     def parts(self) -> list[tuple[Array, Array]]:
-        """Inputs and outputs of each segment."""
+        """Return inputs and outputs of each segment."""
         at = np.cumsum(self.lengths)[:-1]
         return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
 
@@ -75,7 +75,7 @@ class Record(Samples):
         return tuple((name, int(count)) for (name, _), count in zip(self.files, counts, strict=True))
 
     def at(self, samples: NDArray[np.int64], lengths: tuple[int, ...]) -> Record:
-        """Return some of the samples, in segments of these lengths."""
+        """Return the record at some of the samples, in segments of these lengths."""
         return replace(
             self,
             u=self.u[samples],
@@ -164,7 +164,7 @@ def _read(path: Path, units: Units, preparation: Preparation) -> Record:
 
 
 def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
-    """Records of several files, one after the other."""
+    """Join the records of several files, one after the other."""
     counts = Counter(path.name for path in paths)
     labels = [path.name if counts[path.name] == 1 else str(path) for path in paths]
     recorded = [one.recorded for one in records if one.recorded is not None]
@@ -203,7 +203,7 @@ def _record(
     roles: Mapping[str, str],
     found: Iterable[Finding],
 ) -> Record:
-    """The record in the signals of one file, whose references follow the inputs."""
+    """Build the record from the signals of one file, whose references follow the inputs."""
     r = sum(role.startswith("u") for role in roles)
     segments, done = segments_of(signals, step, unit, preparation)
     times, u, y = (np.concatenate(part) for part in zip(*segments, strict=True))
@@ -238,7 +238,7 @@ def _record(
 
 
 def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float | None:
-    """The sample time by the option, the times or the file; None if nothing says it.
+    """Return the sample time by the option, the times or the file; None if nothing states it.
 
     Raises:
         DataError: `data-not-uniform`, times advance by something else than the user states.
@@ -274,7 +274,7 @@ def _assumed(signals: Signals, preparation: Preparation) -> Finding:
 
 
 def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signals:
-    """The signals with times in the unit of the spec.
+    """Return the signals with times in the unit of the spec.
 
     Raises:
         DataError: `data-wrong-unit`; `data-not-uniform`, the sample time differs.

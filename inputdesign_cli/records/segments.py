@@ -31,7 +31,7 @@ _GAP, _LONG_GAP = 1.5, 3.0
 
 
 class Segment(NamedTuple):
-    """A stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p)."""
+    """Holds a stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p)."""
 
     time: Array
     u: Array
@@ -79,7 +79,7 @@ def segments_of(
 def _cut(
     time: Array, signals: Signals, step: float, whole: NDArray[np.bool_], *, resample: bool
 ) -> tuple[list[Segment], list[Finding]]:
-    """The stretches between gaps, of ten samples or more if there are any, and where the record is cut."""
+    """Cut a record at its gaps into stretches, of ten samples or more if there are any, with findings."""
     lines, found = signals.sheet.lines, list[Finding]()
     apart = np.zeros(len(lines), dtype=bool)
     passed = [line for line in signals.sheet.passed if lines[0] < line < lines[-1] and not signals.name]
@@ -110,14 +110,14 @@ def _cut(
 
 
 def _resampled(part: Segment, step: float) -> Segment:
-    """The segment at even times: outputs linearly between samples, inputs, which are held, at the nearest."""
+    """Resample a segment at even times: outputs by linear interpolation, inputs at the nearest sample."""
     even, nearest = _even_instants(part, step)
     y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
     return Segment(even, part.u[nearest], y)
 
 
 def _moves_between(part: Segment, step: float) -> int:
-    """After how many of the even times inputs differ at samples that are left out."""
+    """Count the even times after which inputs differ at samples that are left out."""
     nearest = _even_instants(part, step)[1]
     last = np.searchsorted(nearest, np.arange(nearest[-1] + 1), side="right") - 1
     moved = np.any(part.u[: nearest[-1] + 1] != part.u[nearest[last]], axis=1)
@@ -125,7 +125,7 @@ def _moves_between(part: Segment, step: float) -> int:
 
 
 def _even_instants(part: Segment, step: float) -> tuple[Array, NDArray[np.int64]]:
-    """Times that are `step` apart (n,), and the sample (n,) nearest to each."""
+    """Return times (n,) that are `step` apart, and the sample (n,) nearest to each."""
     count = int(np.floor((part.time[-1] - part.time[0]) / step + 0.5)) + 1
     even = part.time[0] + step * np.arange(count)
     return even, np.searchsorted(0.5 * (part.time[1:] + part.time[:-1]), even)
@@ -134,7 +134,7 @@ def _even_instants(part: Segment, step: float) -> tuple[Array, NDArray[np.int64]
 def _detrended(
     part: Segment, names: tuple[str, ...], preparation: Preparation
 ) -> tuple[Segment, list[Finding]]:
-    """A segment without its trends or its operating point, and what was taken away."""
+    """Return a segment without its trends or its operating point, and what was taken away."""
     found, left = list[Finding](), []
     for name, x in zip(names, (*part.u.T, *part.y.T), strict=True):
         if preparation.detrend == "none":

@@ -21,7 +21,7 @@ _PLAIN = (
 
 @dataclass(frozen=True)
 class Source:
-    """A data file, the key of the spec that names it, and how the user says that it is written."""
+    """Names a data file, the key of the spec that refers to it, and the format that the user states."""
 
     path: Path
     key: str = ""
@@ -35,7 +35,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Column:
-    """Numbers (n,), NaN where a cell is empty.
+    """Holds the numbers (n,) of a column, NaN where a cell is empty.
 
     Attributes:
         fault: the first row that holds something else, and its text; `wrong` and `hint` are for the message.
@@ -64,7 +64,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Sheet:
-    """What a file holds.
+    """Holds the content of a data file.
 
     Attributes:
         names: of the columns; empty where the file has none.

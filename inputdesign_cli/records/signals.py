@@ -34,7 +34,7 @@ _OWN_GAP, _NEARLY, _MOSTLY = 3.0, 1.1, 0.95
 
 @dataclass(frozen=True)
 class Signals:
-    """What stands in the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
+    """Holds the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
 
     Attributes:
         time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
@@ -56,7 +56,7 @@ class Signals:
     findings: tuple[Finding, ...] = ()
 
     def at(self, rows: NDArray[np.int64]) -> Signals:
-        """Return some of the rows."""
+        """Return the signals in some of the rows."""
         texts = [self.sheet.texts[i] for i in rows.tolist()] if self.sheet.texts else ()
         sheet = replace(self.sheet, lines=self.sheet.lines[rows], texts=texts)
         u, y, time = self.u[rows], self.y[rows], self.time[rows]
@@ -106,7 +106,7 @@ def signals_of(sheet: Sheet, roles: Mapping[str, str], preparation: Preparation)
 def _times(
     sheet: Sheet, time: Array | None, name: str, preparation: Preparation
 ) -> tuple[Array, str | None, bool, list[Finding]]:
-    """Times (n,), their unit, whether they are dates, and what was done to read them."""
+    """Return times (n,), their unit, whether they are dates, and what was done to read them."""
     if time is None:
         unit = _unit(sheet, "", preparation.time_unit, dated=False)
         return np.arange(len(sheet.lines), dtype=float), unit, False, []
@@ -132,7 +132,7 @@ def _times(
 
 
 def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | None:
-    """The unit of the times in column `name`, by the option, the column or the file; None if unknown."""
+    """Return the unit of the times in column `name`, by option, column or file; None if unknown."""
     own, units = time_unit_in(sheet, name, dated=dated), ", ".join(TIME_UNITS)
     if own is None and sheet.time_unit and said is None:
         message = f"{sheet.path.name} states its times in {sheet.time_unit!r}, none of {units}"
@@ -146,7 +146,7 @@ def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | No
 
 
 def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -> NDArray[np.int64]:
-    """The rows that --skip and --range keep."""
+    """Return the rows that --skip and --range keep."""
     scaled = time if timed else time * (preparation.sample_time or sheet.sample_time or 1.0)
     kept = np.arange(len(time)) >= preparation.skip
     if preparation.span is not None:
@@ -162,7 +162,7 @@ def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -
 
 
 def _left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
-    """Which rows (n,) of a sheet are among the runs that name its file, or none."""
+    """Return the mask (n,) of the rows of a sheet in runs that name its file, or no file."""
     found = np.zeros(len(sheet.lines), dtype=bool)
     for _, first, last in (run for run in runs if run[0] in ("", sheet.path.name, str(sheet.path))):
         inside = (sheet.lines >= first) & (sheet.lines <= last)
@@ -196,7 +196,7 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
 
 
 def typical_step(time: Array) -> float:
-    """Return the mean step of time, gaps apart, rounded where rounding alone may be the difference."""
+    """Return the mean step of time without gaps, rounded where the difference may be rounding."""
     steps = np.diff(time[~np.isnan(time)])
     middle = float(np.median(steps)) if steps.size else 0.0
     near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
@@ -274,9 +274,9 @@ def joined_rows(signals: Signals, *, resample: bool) -> Signals:
 
 
 def _until_next(time: Array, x: Array, instants: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Means of x (n,), held until written again, from each instant to the next, and whether it moves there.
+    """Return means of x (n,), held until written again, between instants, and whether x changes there.
 
-    NaN before it was written first; the last one as it is.
+    The mean is NaN before x was written first; the last value is returned as it is.
     """
     at = np.flatnonzero(~np.isnan(x) & ~np.isnan(time))
     began, values = time[at], x[at]
@@ -291,7 +291,7 @@ def _until_next(time: Array, x: Array, instants: Array) -> tuple[Array, NDArray[
 
 
 def _between(time: Array, y: Array, instants: Array) -> Array:
-    """y (n,) at some instants, on the line between its neighbours; NaN outside and in gaps."""
+    """Interpolate y (n,) linearly at some instants; NaN outside and in gaps."""
     found = np.interp(instants, time, y, left=np.nan, right=np.nan)
     steps = np.diff(time)
     if not steps.size:

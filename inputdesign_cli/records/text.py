@@ -75,7 +75,7 @@ def decoded(source: Source, raw: bytes) -> str:
 
 
 def table_in(source: Source, text: str) -> Sheet:
-    """Return the table in a text.
+    """Read the table in a text.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
@@ -166,7 +166,7 @@ def _separator_of(text: str) -> str | None:
 
 
 def _rows_of(source: Source, text: str, separator: str | None) -> tuple[Rows, list[int], str]:
-    """Return rows with their lines, lines that are blank or commented rows, and the last comment above."""
+    """Return rows with their lines, the lines passed over (blank or commented) and the last comment above."""
     rows, passed, comment = Rows(), list[int](), ""
     for line, row in _split(source, text, separator):
         if len(row) > _MOST_FIELDS:
@@ -224,7 +224,7 @@ def _headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int,
 
 
 def _table_begins(rows: Rows) -> tuple[int, bool]:
-    """Return the row where the table begins, its names if it has any, and whether a row of units follows."""
+    """Return the row where the table begins, with names if it has any, and whether a row of units follows."""
 
     def of_values(row: Sequence[str]) -> bool:
         filled = [cell for cell in row if cell.strip()]

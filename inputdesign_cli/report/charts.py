@@ -29,7 +29,7 @@ _OF_RUNS = ("errors", "cloud", "disturbance")
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
+    """Holds a picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
 
     uri: str
     caption: str
@@ -66,13 +66,13 @@ def captioned(curves: Curves) -> str:
 
 
 def _highest(error: Array | None, admitted: Array | None) -> float:
-    """Return the largest ratio (n,) of what there is; zero if something is missing."""
+    """Return the largest of the ratios (n,) that are known; zero if something is missing."""
     return 0.0 if error is None or admitted is None else float(np.nanmax(error / admitted))
 
 
 def chart(paint: Callable[[Figure], object], caption: str) -> Chart:
     """Return the chart that `paint` draws on an empty page; in an image its ids meet no others of a page."""
     panels: list[dict[str, object]] = []
-    content = rendered(paint, "svg", narrow=True, seen=lambda page: panels.extend(readings(page)))
+    content = rendered(paint, "svg", width="phone", seen=lambda page: panels.extend(readings(page)))
     uri = "data:image/svg+xml;base64," + base64.b64encode(content).decode()
     return Chart(uri, caption, json.dumps(panels, separators=(",", ":")) if panels else "")

@@ -21,7 +21,7 @@ _NORMAL = 1.96  # standard deviations to either side of 95 %
 
 @dataclass(frozen=True)
 class Rows:
-    """A table: the first column holds names, the others numbers."""
+    """Holds a table: the first column has names, the others numbers."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -79,7 +79,10 @@ def _share(value: float | None, limits: Limits | None) -> str:
 
 
 def _within(one: TriedInput, *, several: bool) -> str:
-    """Return the share within r_adm of the design, if the true plant has one of its own or not."""
+    """Return the share within r_adm of the design as text.
+
+    It is empty unless `several` says rightly whether the true plant has an r_adm of its own.
+    """
     own = (one.within_r_adm_true is None) != several
     return _share(one.within_r_adm, one.within_r_adm_limits) if own else ""
 

@@ -14,7 +14,7 @@ _GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses 
 
 
 class Fact(NamedTuple):
-    """A line of a table: its name, the value, and a note that may be empty."""
+    """Holds a line of a table: its name, the value, and a note that may be empty."""
 
     name: str
     value: str
@@ -22,7 +22,7 @@ class Fact(NamedTuple):
 
 
 def _said(part: str, outcome: Outcome, **more: object) -> list[str]:
-    """Return what a part of the template says of a result."""
+    """Return the sentences of a part of the template about a result."""
     kind = None if outcome.objective is None else outcome.objective.kind
     known = vars(outcome) | {
         "kind": kind,
@@ -39,7 +39,7 @@ def _facts(part: str, outcome: Outcome, time_unit: str = "") -> list[Fact]:
 
 
 def facts(outcome: Outcome, time_unit: str) -> list[Fact]:
-    """Return what an experiment costs and what accuracy it gives, as far as the result has the numbers."""
+    """Return the cost of an experiment and the accuracy that it gives, as far as they are in the result."""
     return _facts("facts", outcome, time_unit)
 
 
@@ -59,23 +59,23 @@ def asked(outcome: Outcome) -> list[Fact]:
 
 
 def proofs(outcome: Outcome) -> list[str]:
-    """Return what is proved of all other experiments."""
+    """Return the sentences on what is proved of all other experiments."""
     return _said("proofs", outcome)
 
 
 def verdict(outcome: Outcome) -> list[str]:
-    """Return what an assessment comes to, and what is left to do."""
+    """Return the verdict of an assessment, and what remains to be done."""
     return _said("verdict", outcome)
 
 
 def answer(verb: str, outcome: Outcome) -> str:
-    """Return what came out, in sentences; the verb is the command that answered."""
+    """Return the answer in sentences; the verb is the command that gave it."""
     stands, verdicts = campaign_facts(outcome), verdict(outcome)
     return " ".join(_said("answer", outcome, verb=verb, stands=stands, verdicts=verdicts))
 
 
 def assumptions(outcome: Outcome, question: object) -> list[str]:
-    """Return what the numbers rest on, beyond the arithmetic."""
+    """Return the assumptions on which the numbers rest, beyond the arithmetic."""
     return _said("assumptions", outcome, question=question)
 
 

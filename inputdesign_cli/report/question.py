@@ -35,7 +35,7 @@ class Question:
 
 
 def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:
-    """The question of the spec of a run.
+    """Return the question of the spec of a run.
 
     Args:
         text: the spec as resolved (YAML).
@@ -88,7 +88,7 @@ def _sentences(spec: Spec, verb: str, family: str) -> list[str]:
 
 
 def _units(spec: Spec) -> str:
-    """Return in which units the numbers are."""
+    """Return the units of the numbers in words."""
     named = [f"{name} in {one.unit}" for name, one in (spec.channels or {}).items() if one.unit]
     signals = ", ".join(named) or "signals in the units of the spec"
     clock = f"time in {spec.time_unit}, frequencies in rad/{spec.time_unit}"
@@ -104,7 +104,7 @@ def _structure(spec: Spec) -> str:
 
 
 def _objective(spec: Spec) -> str:
-    """The `objective.kind` of the result."""
+    """Return the `objective.kind` of the result."""
     if spec.goal != "best_accuracy":
         return spec.goal
     errors = ("closed_loop_error", "mean_squared_error")

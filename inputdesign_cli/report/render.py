@@ -45,7 +45,7 @@ def bibtex_text(directory: Path) -> str:
 
 
 def _is_sweep(directory: Path) -> bool:
-    """Return whether there is a sweep; else there is a run.
+    """Return whether a directory holds a sweep; else it holds a run.
 
     Raises:
         DataError: `run-missing`, there is neither.
@@ -60,7 +60,7 @@ def _is_sweep(directory: Path) -> bool:
 
 
 def is_page(file: Path) -> bool:
-    """Whether a file is a page that was made here."""
+    """Return whether a file is a page that was made here."""
     try:
         return _GENERATOR in read_regular(file)[:1000]
     except OSError:

@@ -96,7 +96,7 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
 
 
 def _figures(charts: Mapping[str, Chart], proved: Sequence[str]) -> dict[str, object]:
-    """Return the charts, and the names that stand in each part of the page."""
+    """Return the charts, and the names of the charts in each part of the page."""
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}

@@ -17,13 +17,13 @@ _FIELD = re.compile(r"^  (\w+) = \{(.*)\},$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Source:
-    """A publication: its entry in BibTeX, and its fields by name."""
+    """Holds a publication: its entry in BibTeX, and its fields by name."""
 
     bibtex: str
     fields: Mapping[str, str]
 
     def __str__(self) -> str:
-        """Authors, title, where it appeared, and the year."""
+        """Return the citation: authors, title, where it appeared, and the year."""
         *others, last = self.fields["author"].split(" and ")
         authors = f"{', '.join(others)} and {last}" if others else last
         names = ("journal", "volume", "edition", "publisher", "eprint", "year", "pages")

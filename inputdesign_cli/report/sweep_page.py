@@ -75,7 +75,7 @@ def sweep_sources(root: Path) -> list[Source]:
 
 
 def _check_points(table: SweepTable, root: Path) -> None:
-    """Runs that were moved away are not missed, but one that is there is to be what the table was made of."""
+    """Check that runs that are still there belong to the table; runs that were moved away are skipped."""
     for run in filter(None, table.columns["run"]):
         try:
             if (root / run).is_dir():
@@ -86,7 +86,7 @@ def _check_points(table: SweepTable, root: Path) -> None:
 
 
 def _columns(table: SweepTable) -> list[tuple[str, str]]:
-    """The columns that are shown, by name and title; white excitation is measured as the value is."""
+    """Return the columns that are shown, by name and title; white excitation is measured as the value is."""
     kind = objective(table.kind)
     value = [("objective.value", kind.name if table.kind else "value")]
     white = [(f"baseline.white.{kind.white}", f"{kind.name} of white")] if table.kind else []
@@ -95,7 +95,7 @@ def _columns(table: SweepTable) -> list[tuple[str, str]]:
 
 
 def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, Outcome]:
-    """Return the question and the result of the first point that has one: they speak for the others."""
+    """Return the question and the result of the first point that has one, as examples of all points."""
     run = next((run for run in table.columns["run"] if run), None)
     if run is None:
         return None, Outcome()

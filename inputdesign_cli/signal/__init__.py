@@ -1,1 +1,1 @@
-"""Signals: from a spectrum to samples, and the best of several by what those samples achieve."""
+"""Signals: from a spectrum to samples, and the best of several by the accuracy that they achieve."""

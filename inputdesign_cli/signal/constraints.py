@@ -1,4 +1,4 @@
-"""Records within limits on their values, their moves and what they cause: exactly, not nearly."""
+"""Records within limits on their values, their moves and their responses: exactly, not nearly."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class SignalConstraint:
-    """Signals (n, q) that are linear in the record, as outputs are, and the largest modulus (q,) of each.
+    """A limit on signals (n, q) that are linear in the record, as outputs are: the largest modulus (q,).
 
     `adjoint` is the transpose of `apply`: it answers in the shape of the record.
     """
@@ -36,10 +36,10 @@ class SignalConstraint:
 
 
 def slow_moves(values: Array, rate: float) -> Array:
-    """The record nearest to `values` (n,) in the largest deviation that moves by at most `rate` a step.
+    """Return the record nearest to `values` (n,), in the largest deviation, with moves up to `rate`.
 
-    Half way between the least such record above and the greatest below, which both are found by
-    one pass forwards and one backwards. It starts from rest: the first value is a move from zero.
+    It lies half way between the least such record above and the greatest below, which are found by one pass
+    forwards and one backwards. It starts from rest: the first value is a move from zero.
     """
     above, below = values.copy(), values.copy()
     for t in range(1, values.size):
@@ -53,7 +53,7 @@ def slow_moves(values: Array, rate: float) -> Array:
 
 
 def ramped(values: Array, rate: float) -> Array:
-    """The record that follows `values` (n,) from rest as fast as moves of at most `rate` allow.
+    """Return the record that follows `values` (n,) from rest as fast as moves of at most `rate` allow.
 
     Two levels become two levels with ramps of full speed between them.
     """
@@ -65,15 +65,15 @@ def ramped(values: Array, rate: float) -> Array:
 
 
 def largest_move(values: Array) -> float:
-    """The largest change from one value to the next, the first from rest."""
+    """Return the largest change from one value to the next, the first from rest."""
     return float(np.abs(np.diff(values, prepend=0.0)).max())
 
 
 def compressed(values: Array, peak: float) -> Array:
-    """The values (n,) of the same periodogram, and with their peak lowered towards `peak`.
+    """Return values (n,) of the same periodogram, with their peak lowered towards `peak`.
 
-    Clip and restore, [van-der-ouderaa-1988]: the moduli of the discrete Fourier transform are kept, its
-    phases give way.
+    The method is clip and restore, [van-der-ouderaa-1988]: the moduli of the discrete Fourier transform are
+    kept, its phases give way.
     """
     best, least = values, float(np.abs(values).max())
     modulus = np.abs(np.fft.rfft(values))
@@ -93,10 +93,10 @@ def compressed(values: Array, peak: float) -> Array:
 
 
 def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Array:
-    """The record near `values` (n, r) that keeps to all constraints.
+    """Return the record near `values` (n, r) that keeps to all constraints.
 
-    Least squares, each input in its own root mean square, with the excess penalised ever more (a
-    quasi-Newton method), scaled down at the end so that the bounds hold exactly.
+    The distance is in least squares, each input in its own root mean square. The excess is penalised ever
+    more (a quasi-Newton method). The record is scaled down at the end so that the bounds hold exactly.
     """
     record = values
     if peak_ratio(record, constraints) > 1.0:
@@ -118,14 +118,14 @@ def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Arra
 
 
 def peak_ratio(values: Array, constraints: tuple[SignalConstraint, ...]) -> float:
-    """The largest modulus of any constrained signal relative to its bound."""
+    """Return the largest modulus of any constrained signal relative to its bound."""
     return max((float((np.abs(c.apply(values)) / c.bound).max()) for c in constraints), default=0.0)
 
 
 def _penalised(
     relative: Array, wanted: Array, scale: Array, constraints: tuple[SignalConstraint, ...], penalty: float
 ) -> tuple[float, Array]:
-    """Half the squared distance, relative to `scale`, with the penalties, and its slope."""
+    """Return half the squared distance, relative to `scale`, with the penalties, and its slope."""
     record = relative.reshape(wanted.shape) * scale
     away = (record - wanted) / scale
     value, slope = 0.5 * float(np.sum(away**2)), away

@@ -1,4 +1,4 @@
-"""What a record is judged by: its own information, and what its powers cost."""
+"""Judge a record by its own information and by the cost of its powers."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _NOTHING, _PLENTY = 1e-9, 1e30
 
 
 def least_level(ratio: Callable[[float], float], start: float) -> float:
-    """The level at which a `ratio` that falls continuously with the level is one, from above.
+    """Return the level at which a `ratio` that falls continuously with the level is one, from above.
 
-    Information is affine in the square of the level, so 1 / ratio^2 is a concave function of that square
-    for every bound on a variance, and near a line: its root is looked for.
+    Information is affine in the square of the level. For every bound on a variance 1 / ratio^2 is a concave
+    function of that square, and near a line; its root is computed.
 
     Raises:
         LinAlgError: the ratio is not defined at any level, or at most one at none: some parameter is not
@@ -65,10 +65,10 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
 
 
 def first_level(figure: Callable[[float], float], start: float) -> tuple[float, bool]:
-    """The least of rising levels at which a `figure` is at most one, to a thousandth, and True.
+    """Return the least of rising levels at which a `figure` is at most one, to a thousandth, and True.
 
-    Where limits bite, raising the level first helps, and at last changes nothing any more: when several
-    levels in a row gain nothing worth having, the level of the least figure, and False.
+    Where limits are active, raising the level first helps, and at last changes nothing any more. When several
+    levels in a row gain too little, return the level of the least figure, and False.
     """
     low, high = start / _GROWTH, start
     best, least, idle = start, np.inf, 0
@@ -89,7 +89,7 @@ def first_level(figure: Callable[[float], float], start: float) -> tuple[float, 
 
 
 def last_level(accepted: Callable[[float], bool], start: float) -> float:
-    """The greatest level below `start` that is accepted, to a thousandth, where lower ones are as well."""
+    """Return the greatest accepted level below `start`, to a thousandth; lower ones are accepted too."""
     low, high = start / _GROWTH, start
     while not accepted(low) and low > start / _MOST_GROWTH:
         low, high = low / _GROWTH, low
@@ -103,7 +103,7 @@ def last_level(accepted: Callable[[float], bool], start: float) -> float:
 
 
 def level_of_power(power: Callable[[float], float], wanted: float, start: float) -> float:
-    """The level at which the record has the `wanted` power, or the highest that still adds to it."""
+    """Return the level at which the record has the `wanted` power, or the highest that still adds to it."""
 
     def figure(level: float) -> float:
         reached = power(level)
@@ -114,7 +114,7 @@ def level_of_power(power: Callable[[float], float], wanted: float, start: float)
 
 @dataclass(frozen=True)
 class Target:
-    """What is asked of a record.
+    """Holds the requirement on a record.
 
     Args:
         worst_ratio: maps an information matrix to the largest r_u / r_adm (or another figure, to be small).
@@ -122,8 +122,8 @@ class Target:
             record has the power of the design.
         cost: weights of the powers (of all channels together, or one weight a channel), to rank records
             that meet the target.
-        designed: what the design costs in the same weights; its power when not given.
-        least_ratio: what `worst_ratio` is at least, in a shorter time; to leave out records early.
+        designed: the cost of the design in the same weights; its power when not given.
+        least_ratio: a lower bound of `worst_ratio`, in a shorter time; to leave out records early.
     """
 
     worst_ratio: Callable[[Array], float]
@@ -143,7 +143,7 @@ class Evaluator:
     _latest: list[tuple[Array, float]] = field(default_factory=list, compare=False, repr=False)
 
     def ratio(self, samples: Array) -> float:
-        """The worst ratio; infinite when the record does not excite every parameter."""
+        """Return the worst ratio; infinite when the record does not excite every parameter."""
         # The same record is asked for twice: when its level is found, and when it is ranked.
         if not self._latest or self._latest[0][0] is not samples:
             self._latest[:] = [(samples, self._ratio(samples))]
@@ -156,11 +156,11 @@ class Evaluator:
             return np.inf
 
     def figure(self, samples: Array) -> float:
-        """At most one for a record that does what is asked; infinite beyond the limits on the powers."""
+        """Return at most one for a record that meets the target; infinite beyond the limits on the powers."""
         return self.ratio(samples) / MET if self.share(samples) >= 1.0 / MET else np.inf
 
     def share(self, samples: Array) -> float:
-        """The largest factor on its powers that the limits leave to the record, at every plant."""
+        """Return the largest factor on the record's powers within the limits, at every plant."""
         powers = {kind: self.plant.mean_squares_of_each(kind, samples) for kind, _, _ in self.limits}
         spent = [
             (most, float(max(powers[kind].sum(axis=1) if channel is None else powers[kind][:, channel])))
@@ -169,7 +169,7 @@ class Evaluator:
         return min((most / power for most, power in spent if power > 0.0), default=np.inf)
 
     def cost(self, samples: Array) -> float:
-        """The weighted sum of the powers."""
+        """Return the weighted sum of the powers."""
         return float(
             sum(
                 np.sum(np.asarray(weight) * self.plant.mean_squares(kind, samples))
@@ -178,7 +178,7 @@ class Evaluator:
         )
 
     def costs_more(self, samples: Array, cost: float) -> bool:
-        """Whether multiples of the samples miss what is asked as long as they cost no more than that."""
+        """Return whether multiples of the samples miss the target as long as they cost no more than that."""
         least = self.target.least_ratio
         own = self.cost(samples)
         if least is None or cost <= 0.0 or own <= 0.0:
@@ -191,7 +191,7 @@ class Evaluator:
             return False
 
     def needed_level(self, samples: Array) -> float | None:
-        """The level that the accuracy needs, were there no limits; None when no level is enough."""
+        """Return the level that the accuracy needs, were there no limits; None when no level is enough."""
         known = self.plant.known
         gained = self.plant.information(samples) - known
         try:

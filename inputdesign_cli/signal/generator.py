@@ -24,8 +24,8 @@ class SignalGenerator:
     """Makes records of `samples` samples, each from random numbers of its own; other processes can have it.
 
     Args:
-        band: where white excitation has its power, in rad per sample.
-        limited: what optimised phases keep low, at frequencies in rad per value; the inputs when None.
+        band: the band of white excitation, in rad per sample.
+        limited: signals that optimised phases keep low, at frequencies in rad per value; None: the inputs.
     """
 
     spectrum: DesignedSpectrum
@@ -36,17 +36,17 @@ class SignalGenerator:
 
     @cached_property
     def factor(self) -> SpectralFactor | None:
-        """For filtered noise of one input whose spectrum is that of a moving average."""
+        """Return the spectral factor for filtered noise of one input that a moving average can make."""
         if self.settings.method != "filtered_noise" or self.spectrum.autocovariances is None:
             return None
         return spectral_factor(self.spectrum.autocovariances)
 
     @property
     def method(self) -> str:
-        """What is made.
+        """Return the name of the kind that is made.
 
-        A multisine where noise was asked for, but the spectrum consists of sinusoids, or no spectral factor
-        can be had to 1e-8 (a spectrum with deep zeros).
+        It is a multisine where noise was asked for, but the spectrum consists of sinusoids. So it is where no
+        spectral factor can be had to 1e-8 (a spectrum with deep zeros).
         """
         if self.settings.method != "filtered_noise":
             return self.settings.method
@@ -55,12 +55,12 @@ class SignalGenerator:
 
     @property
     def kind(self) -> SignalKind:
-        """The kind of this name."""
+        """Return the kind of this name."""
         return kind_of(self.method)
 
     @property
     def period(self) -> int:
-        """Values in one period of the record, all of its blocks."""
+        """Return the values in one period of the record, all of its blocks."""
         return self.settings.period(self.samples)
 
     @cached_property
@@ -91,14 +91,14 @@ class SignalGenerator:
 
     @property
     def _draft(self) -> Draft:
-        """What one period is drawn from; the band is in rad per value, as the lines are."""
+        """Return the settings from which one period is drawn; band and lines are in rad per value."""
         lo, hi = (min(edge * self.settings.hold, np.pi) for edge in self.band)
         return Draft(self.lines, self.period, self.settings, (lo, hi), self.limited)
 
     def _hold_gain(self, block: int) -> Array:
-        """Return what holding each value k times does to the powers of the harmonics, (block // 2 + 1,).
+        """Return the gain of holding each value k times on the powers of the harmonics, (block // 2 + 1,).
 
-        |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; what lies above is lost.
+        |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; the powers above are lost.
         """
         w = 2.0 * np.pi * np.arange(block // 2 + 1) / (block * self.settings.hold)
         return np.abs(np.exp(-1j * np.outer(w, np.arange(self.settings.hold))).mean(axis=1)) ** 2

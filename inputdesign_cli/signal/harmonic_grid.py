@@ -1,6 +1,6 @@
-"""At which harmonics of a period a frequency response is measured, and which stay silent.
+"""Choose the harmonics of a period at which a frequency response is measured, and the silent ones.
 
-An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones: odd random grids
+An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones. Odd random grids
 ([pintelon-schoukens-2012], Section 4.3) leave out one of each group of odd harmonics at random.
 """
 
@@ -17,7 +17,7 @@ Harmonics = NDArray[np.int_]
 
 
 class TooFewHarmonicsError(ValueError):
-    """The period has no more than `there` harmonics where more were asked for."""
+    """Raised where a period has no more than `there` harmonics where more were asked for."""
 
     def __init__(self, there: int) -> None:
         super().__init__(there)
@@ -26,7 +26,7 @@ class TooFewHarmonicsError(ValueError):
 
 @dataclass(frozen=True)
 class HarmonicGrid:
-    """Harmonics (L,) of a period that are excited, and those (odd and even) that are watched instead."""
+    """Holds excited harmonics (L,) of a period, and the unexcited ones, odd and even, that are watched."""
 
     period: int
     excited: Harmonics
@@ -39,12 +39,12 @@ class HarmonicGrid:
         return self.at(self.excited)
 
     def at(self, harmonics: Harmonics) -> Array:
-        """Frequencies of harmonics in rad/sample."""
+        """Return the frequencies of harmonics in rad/sample."""
         return np.asarray(2.0 * np.pi * harmonics / self.period)
 
     @classmethod
     def of(cls, period: int, excited: Harmonics, *, watched: bool) -> HarmonicGrid:
-        """These lines; `watched`: between them all harmonics that are not excited, odd and even."""
+        """Return the grid of these lines; `watched`: between them all harmonics that are not excited."""
         between = np.arange(excited[0], excited[-1] + 1) if watched else np.zeros(0, dtype=int)
         silent = np.setdiff1d(between, excited)
         return cls(period, excited, silent[silent % 2 == 1], silent[silent % 2 == 0])
@@ -87,6 +87,6 @@ def harmonics_between(period: int, band: tuple[float, float], lines: int | None,
 
 
 def _highest(period: int, odd: bool) -> int:
-    """The last harmonic below pi."""
+    """Return the last harmonic below pi."""
     highest = (period - 1) // 2
     return highest - 1 if odd and highest % 2 == 0 else highest

@@ -1,4 +1,4 @@
-"""The protocol of a kind of signal, and what its records are drawn from."""
+"""The protocol of a kind of signal, and the settings from which its records are drawn."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ LimitedResponses = Callable[[Array], Sequence[LimitedResponse]]
 
 @dataclass(frozen=True)
 class Draft:
-    """What a period of a signal is drawn from.
+    """Holds the settings from which a period of a signal is drawn.
 
     Args:
         lines: the sinusoids of one of its blocks, with the wanted powers, in rad per value.
         samples: values of the period, all blocks together.
-        band: where the excitation has its power, in rad per value.
-        limited: what optimised phases keep low, at frequencies in rad per value; None for the inputs.
+        band: the band of the excitation, in rad per value.
+        limited: signals that optimised phases keep low, at frequencies in rad per value; None: the inputs.
     """
 
     lines: Lines
@@ -54,11 +54,11 @@ class SignalKind:
 
     @property
     def of_levels(self) -> bool:
-        """Whether it is made from few levels."""
+        """Return whether the signal has few levels."""
         return self.few_levels or self.slewed
 
     def blocks(self, settings: SignalSettings, inputs: int) -> int:
-        """Return how many blocks, each with all lines, a period has."""
+        """Return the number of blocks, each with all lines, in a period."""
         return 1
 
     def draw(self, draft: Draft, rng: np.random.Generator) -> Array:

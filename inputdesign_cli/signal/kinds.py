@@ -19,7 +19,7 @@ def register(name: str, kind: SignalKind) -> None:
 
 
 def kind_of(name: str) -> SignalKind:
-    """Return the kind of this name. It raises `SpecError` if the package that adds it does not hold it."""
+    """Return the kind of this name; raise `SpecError` if the package that adds it does not hold it."""
     if name not in _KINDS:
         point = {**points(GROUP), **own(GROUP)}[name]
         try:

@@ -1,17 +1,16 @@
 """Signals of two or three levels with a wanted spectrum.
 
 A two-level signal cannot have any spectrum that one likes. These start from a multisine of the wanted line
-powers whose phases make its fourth power small, so that its modulus hardly varies and little is lost by
-taking signs. Then they alternate between the two things wanted: the nearest signal of these levels, and the
-nearest one with these line powers. Discrete-interval binary signals of specified line powers are due to
-[van-den-bos-krol-1979]. What is lost against the designed spectrum
-is measured on the record's own information.
+powers. Its phases make its fourth power small, so that its modulus hardly varies and little is lost by taking
+signs. Then they alternate between two projections: the nearest signal of these levels, and the nearest one
+with these line powers. Discrete-interval binary signals of specified line powers are due to
+[van-den-bos-krol-1979]. The loss against the designed spectrum is measured on the record's own information.
 
 The record has one period a block, as many blocks as inputs. The transforms of the blocks at a line are the
-columns of a matrix Z (r x r); the record has the power matrix P there when Z Z^* is proportional to P. The
+columns of a matrix Z (r x r). The record has the power matrix P there when Z Z^* is proportional to P. The
 matrix of that kind nearest to Z is P^(1/2) times the unitary factor of P^(1/2) Z (the orthogonal Procrustes
-problem, [golub-van-loan], Section 6.4.1). With one input that keeps the
-phase of the line and restores its modulus.
+problem, [golub-van-loan], Section 6.4.1). With one input that keeps the phase of the line and restores its
+modulus.
 """
 
 from __future__ import annotations
@@ -54,9 +53,9 @@ class FewLevels(SignalKind):
 def few_levels(
     lines: Lines, samples: int, rng: np.random.Generator, nearest: Callable[[Array], Array]
 ) -> Array:
-    """(samples, r): `lines.inputs` blocks of a period each, every input of few levels of its own.
+    """Return `lines.inputs` blocks of a period, every input of few levels of its own, (samples, r).
 
-    The inputs have the powers of the lines. What remains beyond the last period continues it.
+    The inputs have the powers of the lines. The samples beyond the last period continue it.
     """
     assert lines.period is not None
     period, r = lines.period, lines.inputs
@@ -87,7 +86,7 @@ def few_levels(
 def _alternate(
     start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
 ) -> Array:
-    """The best signal of few levels that is met on the way between the two things wanted."""
+    """Return the best signal of few levels that is met on the way between the two requirements."""
     levels = nearest(start)
     best, least = levels, np.inf
     for _ in range(_ROUNDS):
@@ -102,7 +101,7 @@ def _alternate(
 
 
 def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> ComplexArray:
-    """(L, r, r): the matrices of the wanted powers nearest to the transforms of the blocks (columns)."""
+    """Return the matrices (L, r, r) of the wanted powers nearest to the blocks' transforms (columns)."""
     line = np.full(len(roots), np.sqrt(0.5))
     line[0] = 1.0
     if period % 2 == 0:
@@ -113,7 +112,7 @@ def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> Comp
 
 
 def _unitary(matrices: ComplexArray) -> ComplexArray:
-    """Return the unitary factors of their polar decompositions, (L, r, r)."""
+    """Return the unitary factors of the polar decompositions of matrices, (L, r, r)."""
     if matrices.shape[-1] == 1:
         return np.exp(1j * np.angle(matrices))
     left, _, right = np.linalg.svd(matrices)
@@ -121,12 +120,12 @@ def _unitary(matrices: ComplexArray) -> ComplexArray:
 
 
 def signs(record: Array) -> Array:
-    """The nearest multiple of a signal of -1 and 1."""
+    """Return the nearest multiple of a signal of -1 and 1."""
     return np.where(record >= 0.0, 1.0, -1.0)
 
 
 def signs_and_zeros(record: Array) -> Array:
-    """The nearest multiple of a signal of -1, 0, 1: the m largest values are kept, m the best of all."""
+    """Return the nearest multiple of a signal of -1, 0, 1: the m largest values are kept, m the best."""
     size = np.abs(record)
     order = np.sort(size)[::-1]
     kept = np.argmax(np.cumsum(order) / np.sqrt(np.arange(1, size.size + 1)))
@@ -134,7 +133,7 @@ def signs_and_zeros(record: Array) -> Array:
 
 
 def _each(values: Array, nearest: Callable[[Array], Array], rms: Array) -> Array:
-    """Input by input the nearest levels, of the wanted root mean square."""
+    """Return the nearest levels input by input, of the wanted root mean square."""
     columns = []
     for column, size in zip(values.T, rms, strict=True):
         levels = nearest(column) if size > 0.0 else np.zeros_like(column)

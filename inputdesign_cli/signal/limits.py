@@ -1,4 +1,4 @@
-"""Limits on single samples and on powers, channel by channel, and what enforces them on records."""
+"""Limits on single samples and on powers, channel by channel, and the means to enforce them on records."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _SILENT = 1e-300  # what signals that are zero use of their bounds, so that any 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What a record (n, r) may not exceed, by channel: `amplitude` and `rate` (r,), `output` (p,).
+    """Holds the bounds on a record (n, r), by channel: `amplitude` and `rate` (r,), `output` (p,).
 
-    They bound |u|, its moves and |y|, where u and y are what the record causes from rest (in open loop u is
+    They bound |u|, its moves and |y|, where the record causes u and y from rest (in open loop u is
     the record). `powers` are the largest mean squares: kind, channel (None is the sum over the channels),
     bound. `quantisers` are the converters of the inputs, none when empty.
     """
@@ -44,7 +44,7 @@ class Bounds:
 
     @property
     def hard(self) -> bool:
-        """Whether single samples are limited, or only some values of them can be made."""
+        """Return whether single samples are limited, or only some values of them can be made."""
         limited = any(bound is not None for bound in (self.amplitude, self.rate, self.output))
         return limited or bool(self.quantisers)
 
@@ -69,7 +69,7 @@ class Limiter:
     Args:
         amplitude, rate: (r,) bounds on values and on moves, infinite where there is none.
         quantisers: the converters of the inputs, none when empty.
-        constraints: on what the values cause, which clipping them does not keep.
+        constraints: limits on responses to the values, which clipping them does not keep.
     """
 
     settings: SignalSettings
@@ -94,7 +94,7 @@ class Limiter:
 
     @property
     def plain(self) -> bool:
-        """Whether the record is just a multiple of its values."""
+        """Return whether the record is just a multiple of its values."""
         limited = self.constraints or self.quantisers or np.isfinite([*self.amplitude, *self.rate]).any()
         return not limited
 
@@ -105,7 +105,7 @@ class Limiter:
         return np.minimum(self.amplitude, converters)
 
     def factor(self, values: Array) -> float:
-        """The largest factor on the values (m, r) that the limits on them admit; infinite without any."""
+        """Return the largest factor on the values (m, r) within the limits on them; infinite without any."""
         moves = np.array([largest_move(column) for column in values.T])
         pairs = ((np.abs(values).max(axis=0), self._most), (moves, self._fastest))
         return min(
@@ -139,14 +139,14 @@ class Limiter:
         return np.repeat(values, self.settings.hold, axis=0)
 
     def _converted(self, values: Array) -> Array:
-        """The nearest values of the converters."""
+        """Return the nearest values of the converters."""
         if not self.quantisers:
             return values
         columns = zip(self.quantisers, values.T, strict=True)
         return np.stack([one.step * one.steps(column) for one, column in columns], axis=1)
 
     def _levelled(self, goal: Array) -> Array:
-        """Few levels stay so: the limits bound their height, that of all inputs by one factor.
+        """Return few levels as such: the limits bound their height, for all inputs by one factor.
 
         With a converter the height is of whole steps, to the nearest or, at a limit, down.
         """
@@ -179,7 +179,7 @@ def limited_responses(
 ) -> list[LimitedResponse]:
     """Return responses of each limited signal to sinusoids of the values, in steady state, and its bound.
 
-    `frequencies` (L,) are in rad per value. Of values that are held only the record itself is answered for.
+    `frequencies` (L,) are in rad per value. Of held values only the record itself has responses.
     """
     at, moving = frequencies / (step * hold), (1.0 - np.exp(-1j * frequencies))[:, None, None]
     found: list[LimitedResponse] = []
@@ -195,9 +195,9 @@ def limited_responses(
 
 
 def _constraints(plant: FiniteRecord, hold: int, bounds: Bounds) -> tuple[SignalConstraint, ...]:
-    """Limits that clipping the record cannot meet: at every plant on outputs, in closed loop on u.
+    """Return the limits that clipping the record cannot meet: on outputs, and in closed loop on u.
 
-    Beside a limit on outputs those on u are stated as well, which meeting it might spoil.
+    Beside a limit on outputs the limits on u are stated as well, which meeting it might spoil.
     """
     open_loop = plant.experiment.loop is None
     if bounds.output is None and open_loop:
@@ -214,12 +214,12 @@ def _constraints(plant: FiniteRecord, hold: int, bounds: Bounds) -> tuple[Signal
 
 
 def peak_share(plant: FiniteRecord, bounds: Bounds, samples: Array) -> float:
-    """The largest share of a limit on single samples that what a record (n, r) causes uses."""
+    """Return the largest share of a limit on single samples that the response to a record (n, r) uses."""
     return peak_ratio(samples, _constraints(plant, 1, bounds))
 
 
 def _signals(plant: FiniteRecord, of: PowerKind, hold: int, bound: Array) -> SignalConstraint:
-    """The map from the values, each held, to what they cause."""
+    """Return the map from the values, each held, to the signals that they cause."""
 
     def adjoint(weights: Array) -> Array:
         each = plant.adjoint(of, weights)

@@ -33,7 +33,7 @@ class Lines:
 
     @property
     def inputs(self) -> int:
-        """How many signals share the lines."""
+        """Return the number of signals that share the lines."""
         return int(self.powers.shape[1])
 
     @property
@@ -62,7 +62,7 @@ class Lines:
         return np.asarray(half @ vectors.conj().swapaxes(1, 2))
 
     def dense(self, period: int) -> ComplexArray:
-        """(period // 2 + 1, r, r): the powers, each at the harmonic of the period that is next to it."""
+        """Return the powers, each at the nearest harmonic of the period, (period // 2 + 1, r, r)."""
         powers = np.zeros((period // 2 + 1, self.inputs, self.inputs), dtype=complex)
         nearest = np.rint(self.frequencies * period / (2.0 * np.pi)).astype(int)
         np.add.at(powers, np.minimum(nearest, period // 2), self.powers)
@@ -70,20 +70,20 @@ class Lines:
 
     @classmethod
     def of_period(cls, powers: ComplexArray, period: int) -> Lines:
-        """The harmonics of a period that carry power, from the matrices (period // 2 + 1, r, r) of all."""
+        """Return the harmonics of a period that carry power, from all matrices (period // 2 + 1, r, r)."""
         kept = np.trace(powers, axis1=1, axis2=2).real > 0
         return cls(2.0 * np.pi * np.flatnonzero(kept) / period, powers[kept], period)
 
 
 def orthogonal_columns(order: int) -> NDArray:
-    """(order, order), entries of modulus one, orthogonal columns: Hadamard where there is one, or Fourier."""
+    """Return orthogonal columns (order, order) of modulus one: Hadamard where there is one, or Fourier."""
     if order & (order - 1) == 0:
         return scipy.linalg.hadamard(order).astype(float)
     return np.exp(2j * np.pi * np.outer(np.arange(order), np.arange(order)) / order)
 
 
 def block_vectors(lines: Lines, block: int) -> ComplexArray:
-    """(L, r): root(P) q_b, the line vectors of a period of an orthogonal record but for the common phase."""
+    """Return root(P) q_b, the line vectors of a period of an orthogonal record without the phase, (L, r)."""
     return np.asarray(lines.roots @ orthogonal_columns(lines.inputs)[:, block].astype(complex))
 
 
@@ -110,7 +110,7 @@ def merged(lines: Lines, samples: int) -> Lines:
 
 
 def grid_lines(density: NDArray, period: int, step: float) -> Lines:
-    """The lines of a period that stand for a spectrum.
+    """Return the lines of a period that stand for a spectrum.
 
     They sample the circle evenly, so that the powers add up to that of the spectrum whenever its order is
     below the period.
@@ -132,11 +132,11 @@ class DesignedSpectrum:
     """A density over frequency or sinusoids, for records of values `step` apart; other processes can have it.
 
     Args:
-        inputs: r.
+        inputs: the number r of inputs.
         power: the mean square, of all inputs together.
         step: time between samples in the unit of time of the frequencies (1 for rad/sample).
         density: maps frequencies (n,) to Phi, (n,) for one input, else (n, r, r); None for sinusoids.
-        sinusoids: of a spectrum without a density, frequencies in its own unit.
+        sinusoids: the sinusoids of a spectrum without a density, frequencies in its own unit.
         free: whether their frequencies were found, not given.
         autocovariances: (m + 1,) c_0 .. c_m of one input that a moving average can make.
     """
@@ -153,7 +153,7 @@ class DesignedSpectrum:
     def of(
         cls, basis: Basis | TabulatedSpectrum, x: Array, *, inputs: int = 1, step: float = 1.0
     ) -> DesignedSpectrum:
-        """The spectrum with coefficients `x` on `basis`."""
+        """Return the spectrum with coefficients `x` on `basis`."""
         every = partial(constant_density, np.eye(inputs))
         power = float(x @ basis.integrals(every, np.zeros(0, dtype=complex)))
         if not basis.has_density:
@@ -178,5 +178,5 @@ class DesignedSpectrum:
 
 
 def constant_density(density: Array, w: Array) -> NDArray[np.float64]:
-    """A density (r, r) at frequencies (n,): (n,) for one input, else (n, r, r)."""
+    """Return a density (r, r) at frequencies (n,): (n,) for one input, else (n, r, r)."""
     return np.full(w.shape, density[0, 0]) if density.size == 1 else np.ones(w.shape)[:, None, None] * density

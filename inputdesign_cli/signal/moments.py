@@ -16,13 +16,13 @@ Start = Literal["steady", "zero"]
 
 
 def rank(R: Array) -> int:
-    """How many independent directions R (n, n) has, to rounding."""
+    """Return the rank of R (n, n), to rounding."""
     values = np.linalg.eigvalsh(R)
     return max(1, int(np.sum(values > _RANK * values[-1])))
 
 
 def free_regressors(R: Array, samples: int, period: int) -> NDArray[np.float64]:
-    """Return phi of the given period with Phi^T Phi = R to rounding, (samples, n).
+    """Return regressors Phi (samples, n) of the given period with Phi^T Phi = R to rounding.
 
     Phi = C Lambda^{1/2} Q^T with R = Q Lambda Q^T and orthonormal columns C, cosines of the period (the
     first of them constant).
@@ -43,7 +43,7 @@ def free_regressors(R: Array, samples: int, period: int) -> NDArray[np.float64]:
 
 
 def periodic_input(shares: Array, power: float, samples: int, period: int, rng: np.random.Generator) -> Array:
-    """(samples,): a sum of cosines of random phases of the given mean square, of a period that divides it.
+    """Return cosines of random phases and the given mean square, of a period that divides it, (samples,).
 
     Args:
         shares: (period // 2 + 1,) shares of the power on the lines 2 pi l / period.
@@ -53,7 +53,7 @@ def periodic_input(shares: Array, power: float, samples: int, period: int, rng: 
 
 
 def delayed_regressors(u: Array, taps: int, start: Start) -> NDArray[np.float64]:
-    """(samples, taps): rows u(t), u(t - 1), .. with the periodic past, or from rest."""
+    """Return rows u(t), u(t - 1), .. with the periodic past, or from rest, (samples, taps)."""
     columns = [np.roll(u, k) for k in range(taps)]
     if start == "zero":
         for k, column in enumerate(columns):

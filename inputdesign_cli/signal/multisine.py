@@ -53,7 +53,7 @@ class Multisine(SignalKind):
 
 
 def blocks_of(vectors: LineVectors, inputs: int) -> int:
-    """How many periods with vectors of their own a record has."""
+    """Return the number of periods in a record that have vectors of their own."""
     return inputs if vectors == "orthogonal" else 1
 
 
@@ -127,7 +127,7 @@ def _sinusoids(lines: Lines, vectors: ComplexArray, samples: int) -> Array:
 
 
 def _pieces(samples: int, lines: int) -> Iterator[NDArray[np.int64]]:
-    """The numbers of the samples, as many at once as memory likes, and as the time limit can wait for."""
+    """Yield the numbers of the samples, as many at once as memory and the time limit allow."""
     for times in np.array_split(np.arange(samples), max(samples * lines // _AT_ONCE, 1)):
         seconds_left()
         yield times

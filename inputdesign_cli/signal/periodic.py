@@ -15,7 +15,7 @@ def harmonics(samples: int) -> Array:
 
 
 def periodogram(signal: Array) -> Lines:
-    """All lines of a record (samples, r), each of rank one."""
+    """Return all lines of a record (samples, r), each of rank one."""
     samples = len(signal)
     columns = np.fft.rfft(signal, axis=0) / samples
     powers = 2.0 * columns[:, :, None] * np.conj(columns[:, None, :])
@@ -24,16 +24,16 @@ def periodogram(signal: Array) -> Lines:
 
 
 def dense_roots(lines: Lines, samples: int) -> ComplexArray:
-    """(samples // 2 + 1, r, r): Hermitian roots of the powers on all harmonics, zero without a line."""
+    """Return Hermitian roots (samples // 2 + 1, r, r) of the powers at all harmonics, zero without a line."""
     return Lines(harmonics(samples), lines.dense(samples), samples).roots
 
 
 def even_multisine(lines: Lines, samples: int, rng: np.random.Generator, *, periods: int) -> Array:
     """Return blocks of samples / periods, each line of a block of rank one, with random phases, (samples, r).
 
-    With as many periods as inputs the vectors of the blocks are orthogonal, and the blocks together have
-    the spectrum exactly. In contrast to `multisine_record` every column of the roots has phases of its own:
-    no block takes more than its share of the power, which keeps the peak low where inputs are alike.
+    With as many periods as inputs the vectors of the blocks are orthogonal, and the blocks together have the
+    spectrum exactly. In contrast to `multisine_record` every column of the roots has phases of its own. No
+    block takes more than its share of the power, which keeps the peak low where inputs are alike.
     """
     length, r = samples // periods, lines.inputs
     roots = dense_roots(lines, length)
@@ -49,7 +49,7 @@ def even_multisine(lines: Lines, samples: int, rng: np.random.Generator, *, peri
 
 
 def noise_drive(inputs: int, samples: int, runs: int, rng: np.random.Generator) -> ComplexArray:
-    """(runs, samples // 2 + 1, inputs): white Gaussian noise of period `samples` over its harmonics."""
+    """Draw white Gaussian noise of period `samples` over its harmonics, (runs, samples // 2 + 1, inputs)."""
     # Channels come first in memory, so that each is one contiguous block.
     drive = rng.standard_normal((inputs, runs, 2 * (samples // 2 + 1))).view(np.complex128)
     # E|u_hat / samples|^2 is half the power at inner lines, and all of it at the ends, which are real.
@@ -72,5 +72,5 @@ def shaped_noise(roots: ComplexArray, drive: ComplexArray, samples: int) -> Arra
 
 
 def _ends(samples: int) -> list[int]:
-    """The harmonics at 0 and pi, where spectra are real and lines count once."""
+    """Return the harmonics at 0 and pi, where spectra are real and lines count once."""
     return [0] if samples % 2 else [0, -1]

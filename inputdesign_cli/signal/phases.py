@@ -1,4 +1,4 @@
-"""Common phases of the lines of a multisine that keep all inputs, and what they cause, low at once."""
+"""Common phases of the lines of a multisine that keep all inputs and their responses low at once."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def optimise_phases(
     [guillaume-1991]: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak.
 
     Args:
-        gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by what each may
-            reach; the record itself when there are none.
+        gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by their bounds; the
+            record itself when there are none.
         powers: the p, powers of two; with 4 alone the modulus comes out as even as can be.
-        steps: of the quasi-Newton method, for each p.
+        steps: the steps of the quasi-Newton method, for each p.
     """
     signals = np.array(gains) if len(gains) else None
     phases, best = start, np.inf
@@ -65,13 +65,13 @@ def joint_peak(lines: Sinusoids, phases: Array, gains: ComplexArray | None = Non
 
 
 def crest_factor(record: Array) -> float:
-    """Largest modulus over root mean square; one for a record that is zero."""
+    """Return the crest factor, largest modulus over root mean square; one for a record that is zero."""
     peak = float(np.abs(record).max())
     return peak / float(np.sqrt(np.mean(record**2))) if peak > 0.0 else 1.0
 
 
 def _log_norm(phases: Array, lines: Sinusoids, gains: ComplexArray | None, p: int) -> tuple[float, Array]:
-    """log of the p-norm (a mean) of all the signals, and its gradient with respect to the phases."""
+    """Return the log of the p-norm (a mean) of all the signals, and its gradient in the phases."""
     seconds_left()
     records = lines.record(phases, gains)
     peak = np.abs(records).max()
@@ -112,8 +112,8 @@ def low_peak_phases(
     """Return the common phases of the lines for which the joint peak over signals and periods is low, (L,).
 
     Args:
-        samples: of the whole record, in as many periods as there are inputs.
-        limited: what is kept low; each input relative to its root mean square when nothing is limited.
+        samples: the samples of the whole record, in as many periods as there are inputs.
+        limited: the signals to keep low; each input relative to its root mean square when nothing is limited.
     """
     rms = np.sqrt(lines.mean_squares)
     unit = np.eye(lines.inputs)
@@ -130,7 +130,7 @@ def low_peak_phases(
 
 
 def _common(lines: Lines, samples: int, powers: Array) -> Sinusoids:
-    """One period of sinusoids of these powers at the frequencies of the lines."""
+    """Return one period of sinusoids of these powers at the frequencies of the lines."""
     period, w = samples // lines.inputs, lines.frequencies
     repeats = period if lines.period == period else _repeats(w)
     if repeats is None or repeats > period:
@@ -139,7 +139,7 @@ def _common(lines: Lines, samples: int, powers: Array) -> Sinusoids:
 
 
 def _repeats(frequencies: Array) -> int | None:
-    """Return the samples after which sinusoids repeat that are evenly spaced harmonics, otherwise None."""
+    """Return the samples after which evenly spaced harmonics repeat, otherwise None."""
     steps = np.diff(np.unique(frequencies), prepend=0.0)
     repeats = 2.0 * np.pi / np.min(steps[steps > 0.0], initial=np.inf)
     if not 1.0 <= repeats < np.inf:

@@ -24,7 +24,7 @@ class Prbs(SignalKind):
 
 
 def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:
-    """(samples,) of +1 and -1: a sequence of 2^bits - 1 values from a random start, repeated."""
+    """Return a sequence of 2^bits - 1 values +1 and -1 from a random start, repeated, (samples,)."""
     if not 2 <= bits <= _LONGEST_REGISTER:
         raise ValueError(f"no register of {bits} bits")
     state = rng.integers(0, 2, bits)
@@ -38,7 +38,7 @@ def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:
 
 
 def register_length(samples: int) -> int:
-    """The shortest register whose sequence does not repeat within `samples`."""
+    """Return the shortest register whose sequence does not repeat within `samples`."""
     return min(max(2, int(np.ceil(np.log2(samples + 1)))), _LONGEST_REGISTER)
 
 

@@ -23,7 +23,7 @@ _LONGEST = 1024
 
 @dataclass(frozen=True)
 class RationalFilter:
-    """x(t+1) = A x + B e, u = C x + D e with white e of covariance I."""
+    """A filter x(t+1) = A x + B e, u = C x + D e with white e of covariance I."""
 
     A: Array
     B: Array
@@ -32,12 +32,12 @@ class RationalFilter:
 
     @property
     def order(self) -> int:
-        """The number of states."""
+        """Return the number of states."""
         return self.A.shape[0]
 
     @property
     def radius(self) -> float:
-        """The largest modulus of a pole."""
+        """Return the largest modulus of a pole."""
         return float(np.abs(np.linalg.eigvals(self.A)).max(initial=0.0))
 
     def at(self, w: Array) -> ComplexArray:
@@ -59,7 +59,7 @@ class RationalFilter:
         return np.diag(self.C @ covariance @ self.C.T + self.D @ self.D.T)
 
     def scaled(self, factor: float) -> RationalFilter:
-        """The filter with its output times `factor`."""
+        """Return the filter with its output times `factor`."""
         return RationalFilter(self.A, self.B, factor * self.C, factor * self.D)
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
@@ -74,12 +74,12 @@ class RationalFilter:
 
 
 def rational_filter(taps: Array, order: int) -> RationalFilter:
-    """The filter with `taps` (L, n, n), cut down to `order` states for each input.
+    """Return the filter with `taps` (L, n, n), cut down to `order` states for each input.
 
     With the Hankel matrix H = U S V^T, cut to its largest singular values, U S^(1/2) stacks C, C A, C A^2, ..
-    and S^(1/2) V^T is [B, A B, A^2 B, ..]: C and B are their first blocks, and A is what takes the first
-    stack to itself moved up by one block. H is never formed: its products with vectors are convolutions with
-    the taps, made by FFT, and these are all that the singular value decomposition asks for.
+    and S^(1/2) V^T is [B, A B, A^2 B, ..]. C and B are their first blocks, and A takes the first stack to
+    itself moved up by one block. H is never formed. Its products with vectors are convolutions with the taps,
+    made by FFT; the singular value decomposition needs no more.
     """
     taps = taps[: 2 * _LONGEST]
     n = taps.shape[1]

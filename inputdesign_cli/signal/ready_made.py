@@ -1,4 +1,4 @@
-"""Signals that need no design: equal lines of any kind, and what records excite."""
+"""Signals that need no design: equal lines of any kind, and the excitation by records."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def equal_lines(
     *,
     odd: bool = False,
 ) -> Array:
-    """(samples, inputs) up to 1: one period of equal lines in a band in rad/sample, of the kind asked for.
+    """Return one period of equal lines in a band in rad/sample, of a kind, up to 1, (samples, inputs).
 
     Raises:
         TooFewHarmonicsError: the band has fewer harmonics than lines.
@@ -46,12 +46,12 @@ def equal_lines(
 
 @dataclass(frozen=True)
 class Excites:
-    """What a channel excites, its mean left out, if it goes on as it is.
+    """Holds the excitation by a channel, its mean left out, if it goes on as it is.
 
     Attributes:
         order: of persistent excitation, the lines of its spectrum on the whole circle ([ljung-1999],
             Section 13.2).
-        band: in rad/sample, with 5 % of the power below and 5 % above.
+        band: the band in rad/sample, with 5 % of the power below and 5 % above.
     """
 
     mean: float
@@ -62,12 +62,12 @@ class Excites:
 
     @property
     def crest_factor(self) -> float:
-        """The peak over the root of the power; one where nothing moves."""
+        """Return the peak over the root of the power; one where nothing moves."""
         return self.peak / float(np.sqrt(self.power)) if self.power else 1.0
 
 
 def excites(u: Array) -> list[Excites]:
-    """What the channels of a record (N, r) excite, all of its samples looked at."""
+    """Return the excitation by each channel of a record (N, r), from all of its samples."""
     found = []
     for channel in u.T:
         mean = float(channel.mean())
@@ -92,7 +92,7 @@ def excites(u: Array) -> list[Excites]:
 
 
 def scaled(u: Array, levels: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
-    """A record (N, r) from -1 to 1 taken to a least and a largest value of each channel."""
+    """Return a record (N, r) from -1 to 1 scaled to a least and a largest value of each channel."""
     low, high = np.array(levels).T
     values = 0.5 * (low + high) + 0.5 * (high - low) * u
     # Rounding in the last digits would be written, as 56.00000000000001.

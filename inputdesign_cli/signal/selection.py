@@ -41,10 +41,10 @@ def better_switching(
     tries: int,
     enough: float | None = None,
 ) -> Array:
-    """The best of the signals of two levels (n, r) that are met from `values` on; out of time, that so far.
+    """Return the best two-level signal (n, r) met from `values` on; out of time, the best so far.
 
     Args:
-        figure: of a signal of two levels, to be small.
+        figure: maps a signal of two levels to a number, to be small.
         enough: ends the search; so does a pace that would not lead there. None: as small as it gets.
     """
     best, least = values, float(figure(values))
@@ -66,7 +66,7 @@ def better_switching(
 
 
 def _changed(values: Array, rng: np.random.Generator) -> Array:
-    """The signal with one switch of one input shifted, added or removed."""
+    """Return the signal with one switch of one input shifted, added or removed."""
     changed = values.copy()
     column = changed[:, rng.integers(changed.shape[1])]
     switches = 1 + np.flatnonzero(np.diff(np.sign(column)))
@@ -84,10 +84,10 @@ def _changed(values: Array, rng: np.random.Generator) -> Array:
 
 @dataclass(frozen=True)
 class Record:
-    """The samples (n, r) of the excitation, what made them, and the worst r_u / r_adm that they buy.
+    """Holds the samples (n, r) of the excitation, their origin, and the worst r_u / r_adm that they reach.
 
-    `extra_power` is what their powers cost beyond the design, relative to it; `met` whether they do what
-    was asked of them; `factor_residual` that of the spectral factor, where one made them.
+    `extra_power` is the cost of their powers beyond the design, relative to it; `met` whether they meet
+    the target; `factor_residual` the residual of the spectral factor, where one made them.
     """
 
     samples: Array
@@ -99,7 +99,7 @@ class Record:
 
     @property
     def power(self) -> float:
-        """The mean square, of all inputs together."""
+        """Return the mean square, of all inputs together."""
         return _power(self.samples)
 
 
@@ -112,10 +112,10 @@ def best_record(
     first: bool = False,
     limiting: FiniteRecord | None = None,
 ) -> Record:
-    """The best of several records of a designed spectrum, each from its own stream of the seed.
+    """Return the best of several records of a designed spectrum, each from its own stream of the seed.
 
     Args:
-        plant: for records as long as the generator's.
+        plant: the plant for records as long as the generator's.
         first: whether the first that meets the target is enough.
         limiting: the plants at which limits on single samples hold (default: all in `plant`).
 
@@ -167,11 +167,11 @@ class _Candidates:
         return (False, record.extra_power) if meets and record.met else (meets, record.worst_ratio)
 
     def suffices(self, record: Record) -> bool:
-        """Whether it is not worth looking on: little is left to gain, or limits stand in the way."""
+        """Return whether the search may end: little is left to gain, or limits stand in the way."""
         return not self.evaluator.target.meets or not self.limiter.plain or record.extra_power <= _LITTLE
 
     def record(self, rng: np.random.Generator, best: Record | None = None) -> Record:
-        """One candidate at its level, or the best so far where it is seen early to be no better."""
+        """Return one candidate at its level, or the best so far where it is seen early to be no better."""
         seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
         drawn = _power(values)
@@ -197,24 +197,24 @@ class _Candidates:
 
     @property
     def free_level(self) -> bool:
-        """Whether the level of a record is the one that it needs."""
+        """Return whether the level of a record is the one that it needs."""
         return self.evaluator.target.meets and self.limiter.settings.level is None
 
     @property
     def _free(self) -> bool:
-        """Whether a record is its values at the level that it needs, and nothing else."""
+        """Return whether a record is its values at the level that it needs, and nothing else."""
         return self.free_level and self.limiter.plain
 
     @property
     def _strongest(self) -> float:
-        """The highest level; where there is none, that of the design."""
+        """Return the highest level; where there is none, the level of the design."""
         return _FAR if np.isfinite(self.limiter.reach).all() else 1.0
 
     def _switched(self, values: Array, level: float, rng: np.random.Generator) -> Array:
-        """The values (m, r) of two levels, switched at better times; what repeats stays so.
+        """Return the values (m, r) of two levels, switched at better times; repeated values stay so.
 
         Args:
-            level: at which they are tried, where none is stated.
+            level: the level at which they are tried, where none is stated.
         """
         limiter, evaluator, settings = self.limiter, self.evaluator, self.limiter.settings
         if settings.level is not None:
@@ -230,7 +230,7 @@ class _Candidates:
         return np.tile(better, (settings.periods, 1))
 
     def _levelled(self, values: Array, rng: np.random.Generator, *, switched: bool) -> tuple[Array, bool]:
-        """The record at its level, and whether it does what is asked.
+        """Return the record at its level, and whether it meets the target.
 
         Args:
             switched: whether two levels that miss it, as high as they may be, are switched at other times
@@ -266,7 +266,7 @@ class _Candidates:
     def _best_within(self, values: Array) -> Array:
         """Return the most informative record between the highest that fits and one of the designed power.
 
-        What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
+        A record clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
         strongest = self._of_designed_power(values)
         if self.generator.kind.of_levels:
@@ -277,12 +277,12 @@ class _Candidates:
         return min(within, key=self.evaluator.ratio)
 
     def _fitting(self, values: Array) -> float:
-        """The largest level at which the values need no change."""
+        """Return the largest level at which the values need no change."""
         limiter = self.limiter
         return min(limiter.factor(values), 1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
 
     def _of_designed_power(self, values: Array) -> Array:
-        """The record of the power of the design, or of the most below that the limits allow."""
+        """Return the record of the power of the design, or of the most below that the limits allow."""
         record, power = self.limiter.record, self.generator.spectrum.power
         level = level_of_power(lambda a: _power(record(values, a)), power, 1.0)
         samples = record(values, level)
@@ -292,7 +292,7 @@ class _Candidates:
         return self._affordable(values, level)
 
     def _lowered(self, values: Array, level: float) -> Array:
-        """Lower the peak of the values towards what the limits admit, if that keeps their kind."""
+        """Lower the peak of the values towards the limits, if that keeps their kind."""
         settings, reach = self.limiter.settings, float(self.limiter.reach[0])
         fixed = self.generator.kind.of_levels or settings.phases == "optimised" or settings.ramp
         # Phases of several inputs that give way one by one would spoil the cross-spectra.
@@ -301,7 +301,7 @@ class _Candidates:
         return compressed(values[:, 0], reach / level)[:, None]
 
     def _affordable(self, values: Array, level: float) -> Array:
-        """The record at this level, or as much of it as the limits on the powers allow."""
+        """Return the record at this level, or as much of it as the limits on the powers allow."""
         record, share_of = self.limiter.record, self.evaluator.share
         samples = record(values, level)
         share = share_of(samples)
@@ -313,11 +313,11 @@ class _Candidates:
 
 
 def _of_peaks(values: Array, peaks: Array) -> Array:
-    """The values (m, r), each input scaled to its peak (r,); one that is silent stays so."""
+    """Return the values (m, r), each input scaled to its peak (r,); one that is silent stays so."""
     largest = np.abs(values).max(axis=0)
     return values * (peaks / np.where(largest > 0.0, largest, 1.0))
 
 
 def _power(samples: Array) -> float:
-    """The mean square, summed over the channels."""
+    """Return the mean square, summed over the channels."""
     return float(np.sum(np.mean(samples**2, axis=0)))

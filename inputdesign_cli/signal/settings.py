@@ -1,4 +1,4 @@
-"""How a spectrum is to be turned into a record: plain settings, and what they ask of its length."""
+"""The settings that turn a spectrum into a record, and their demands on its length."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Quantiser:
 
     @property
     def step(self) -> float:
-        """The least significant bit, in the unit of u."""
+        """Return the least significant bit, in the unit of u."""
         return 2.0 * self.span / 2.0**self.bits
 
     @property
     def operating_point(self) -> float:
-        """The value of the converter nearest to the offset."""
+        """Return the value of the converter nearest to the offset."""
         return self.step * self._centre
 
     @property
@@ -41,12 +41,12 @@ class Quantiser:
         return float(np.clip(np.floor(self.offset / self.step + 0.5), -half, half - 1))
 
     def reach(self) -> float:
-        """The largest deviation that the converter reaches to both sides."""
+        """Return the largest deviation that the converter reaches to both sides."""
         half = 2.0 ** (self.bits - 1)
         return self.step * min(half - 1 - self._centre, self._centre + half)
 
     def steps(self, deviation: Array) -> Array:
-        """The nearest deviations that the converter has, in steps."""
+        """Return the nearest deviations that the converter has, in steps."""
         half = 2.0 ** (self.bits - 1)
         nearest = np.floor(deviation / self.step + 0.5)
         return np.clip(nearest, -half - self._centre, half - 1 - self._centre)
@@ -54,7 +54,7 @@ class Quantiser:
 
 @dataclass(frozen=True)
 class SignalSettings:
-    """What is generated.
+    """Holds the settings of the signal to generate.
 
     Args:
         method: the name of a kind, see `kinds.py`.
@@ -62,14 +62,14 @@ class SignalSettings:
             spectrum exact over as many periods as inputs; so do `schroeder` and `optimised`. `random`:
             uniform and independent in each input, exact on average only. `even`: optimised from Schroeder's.
         lines: harmonics of a period that are used.
-        periods: equal ones in the record.
+        periods: the number of equal periods in the record.
         hold: each value stands for this many samples.
         tolerance, seconds: a search for the best record ends this near to the bound over all records, or
             after this time.
         ramp: samples over which the record fades in and out.
         bits: register of a pseudo-random sequence.
         number: levels of steps.
-        level: (r,) the peaks that the inputs are to have, whatever that buys.
+        level: (r,) the required peaks of the inputs, whatever accuracy follows.
         candidates, most_candidates: up to the second number are tried while the best of the first costs more
             than a twentieth beyond the design.
     """
@@ -91,16 +91,16 @@ class SignalSettings:
 
     @property
     def block(self) -> int:
-        """The length of a record is a multiple of this."""
+        """Return the number of samples that divides the length of a record."""
         return self.periods * self.hold
 
     @property
     def vectors(self) -> LineVectors:
-        """Return how lines of a multisine are distributed over the inputs, see `multisine_record`."""
+        """Return the distribution of lines of a multisine over the inputs, see `multisine_record`."""
         return "random" if self.phases == "random" else "orthogonal"
 
     def period(self, samples: int) -> int:
-        """Values a period."""
+        """Return the number of values in a period."""
         return samples // self.block
 
     def taper(self, values: int) -> Array:

@@ -30,7 +30,7 @@ class Sinusoids:
 
     @classmethod
     def on_grid(cls, line_power: Array, samples: int) -> Sinusoids:
-        """The lines of a period that carry power, from the powers (samples // 2 + 1,) of all of them."""
+        """Return the lines of a period that carry power, from all powers (samples // 2 + 1,)."""
         kept = np.flatnonzero(line_power > 0).astype(np.int_)
         return cls(2 * np.pi * kept / samples, line_power[kept], samples, kept)
 
@@ -70,7 +70,7 @@ class Sinusoids:
         return np.where(self.real, np.where(np.cos(phases) >= 0, 0.0, np.pi), phases)
 
     def record(self, phases: Array, gains: ComplexArray | None = None) -> Array:
-        """Return the sum (.., samples), or what filters of `gains` (.., L) at the lines make of it."""
+        """Return the sum (.., samples), or its filtered values for `gains` (.., L) at the lines."""
         vectors = self._vectors(phases, gains)
         if self.harmonics is None:
             return (vectors @ self._table.T).real
@@ -93,7 +93,7 @@ class Sinusoids:
 
 
 def select(line_power: NDArray, lines: Selection) -> NDArray:
-    """The powers (P // 2 + 1, ..) of a period gathered into some of its lines; the total is kept.
+    """Gather the powers (P // 2 + 1, ..) of a period into some of its lines; the total is kept.
 
     The power of each line goes to the nearest chosen one, halves to both if two are equally near.
 

@@ -21,7 +21,7 @@ _MATRIX_SETTLED = 1e-12
 
 @dataclass(frozen=True)
 class SpectralFactor:
-    """The taps a (m + 1,), and `residual`, the largest error of their autocovariances relative to c_0."""
+    """Holds taps a (m + 1,), and `residual`, the largest error of their autocovariances relative to c_0."""
 
     taps: Array
     residual: float
@@ -33,12 +33,12 @@ class SpectralFactor:
 
 
 def spectral_factor(autocovariances: Array) -> SpectralFactor:
-    """The minimum-phase factor of c_0 .. c_m.
+    """Return the minimum-phase factor of c_0 .. c_m.
 
-    Each step solves a o delta + delta o a = c + a o a (correlations o), Newton's method for
-    a o a = c. From a minimum-phase start all iterates stay so; at zeros on the unit circle it
-    slows down to halving the error of a, while the residual, which is quadratic in it, still
-    vanishes. The best iterate is returned with its residual for the caller to judge.
+    Each step solves a o delta + delta o a = c + a o a (correlations o), Newton's method for a o a = c. From a
+    minimum-phase start all iterates stay so. At zeros on the unit circle it slows down to halving the error
+    of a, while the residual, which is quadratic in it, still vanishes. The best iterate is returned with its
+    residual for the caller to judge.
     """
     c = np.asarray(autocovariances, dtype=float)
     m = c.size - 1
@@ -67,7 +67,7 @@ def spectral_factor(autocovariances: Array) -> SpectralFactor:
 
 
 def autocorrelation(taps: Array) -> Array:
-    """sum_i a_i a_{i+r} for r = 0 .. m."""
+    """Return the autocorrelation sum_i a_i a_{i+r} for r = 0 .. m."""
     return np.correlate(taps, taps, mode="full")[taps.size - 1 :]
 
 
@@ -77,10 +77,10 @@ def _residual(taps: Array, c: Array) -> float:
 
 @dataclass(frozen=True)
 class MatrixFactor:
-    """Taps (L, n, n) of a causal factor, Phi = psi psi^*. Shares are of the largest value of the spectrum.
+    """Holds taps (L, n, n) of a causal factor, Phi = psi psi^*. Shares are of the spectrum's largest value.
 
     `residual` is the largest error of psi psi^* on a grid twice as fine as that of the factorisation;
-    `floor` what had to be added at the frequencies where the spectrum vanishes.
+    `floor` the amount added at the frequencies where the spectrum vanishes.
     """
 
     taps: Array
@@ -106,7 +106,7 @@ def matrix_factor(
     """Factor the spectrum `density(w)` (K, n, n), w in [0, pi]: [wilson-1972], in the form with FFTs.
 
     Args:
-        points: of the grid of the whole circle.
+        points: the points of the grid of the whole circle.
         floor: eigenvalues below this share of the largest one are raised to it.
     """
     half = np.pi * np.arange(points // 2 + 1) / (points // 2)

@@ -110,7 +110,7 @@ def parse_spec(
 
     Args:
         file: The name in diagnostics.
-        folder: What the paths in the spec are relative to (default: the current folder).
+        folder: The folder that paths in the spec are relative to (default: the current folder).
     """
     folder = folder or FilePath()
     return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
@@ -201,7 +201,7 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
 
 
 def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool:
-    """Whether an error follows from parts that were removed before.
+    """Return whether an error follows from parts that were removed before.
 
     A removed part may have decided the kind of plant or spectrum. Later attempts therefore report no missing
     or unknown keys and names: the first attempt has reported them.
@@ -215,7 +215,7 @@ def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool
 
 
 def _empty(data: Plain, path: Path = ()) -> Iterator[PathDiagnostic]:
-    """Keys and entries without a value."""
+    """Yield a diagnostic for every key and entry without a value."""
     if data is None:
         comma = isinstance(path[-1], str) and path[-1].isdecimal()
         mend = "use a decimal point: a comma begins the next key"
@@ -254,7 +254,7 @@ def _with_defaults(spec: Spec) -> Spec:
 
 
 def _reported(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
-    """The first ones by the order of the file, then of the overrides; the last one counts the others."""
+    """Return the first diagnostics, in the order of file and overrides; the last one counts the others."""
     order = {file: i for i, (file, _) in enumerate(places.sources)}
 
     def place(diagnostic: Diagnostic) -> tuple[int, int, int]:

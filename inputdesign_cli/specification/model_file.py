@@ -57,7 +57,7 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
 
 
 def is_prior(parameters: Mapping[str, float], covariance: Sequence[Sequence[float]]) -> bool:
-    """Whether a later spec will accept an estimate: its covariance is positive definite beyond rounding."""
+    """Return whether a later spec will accept an estimate: its covariance is clearly positive definite."""
     try:
         Estimated.model_validate({"parameters": parameters, "covariance": covariance})
     except ValidationError:

@@ -28,14 +28,14 @@ def from_control(
     noise: Mapping[str, Plain] | None = None,
     **blocks: Plain,
 ) -> Spec:
-    """The spec with this system as its plant.
+    """Return the spec with this system as its plant.
 
     Args:
         system: in discrete time with its dt, or in continuous time.
         sample_time: of a system in continuous time that is sampled behind a hold; without, it stays in s.
         delay: dead time of a system in continuous time, a number or rows of columns.
-        parameters: of a state-space system, the entries that are estimated: {"k": ("B", 1, 0)}; without, its
-            transfer functions are the plant, and all their coefficients are estimated.
+        parameters: the estimated entries of a state-space system: {"k": ("B", 1, 0)}. Without, its transfer
+            functions are the plant, and all their coefficients are estimated.
         known: names of parameters that are not estimated.
         noise: the block; white noise of variance 1 where nothing is given.
         blocks: other blocks of the spec: experiment, accuracy, spectrum ..
@@ -43,7 +43,7 @@ def from_control(
     Raises:
         SpecError: `not-supported` for another kind of object; `not-sampled` for one in discrete time that
             does not say its dt; `bad-argument` for an argument that does not go with the system;
-            `improper-transfer`, `inaccurate-conversion`; what is wrong with the spec.
+            `improper-transfer`, `inaccurate-conversion`; or an error of the spec.
     """
     import control
 
@@ -87,7 +87,7 @@ def _listed(value: object) -> bool:
 def _states(
     system: control.StateSpace, parameters: Mapping[str, Place], *, discrete: bool
 ) -> dict[str, Plain]:
-    """The plant of matrices with names in place of the entries that are estimated."""
+    """Return the plant of matrices with names in place of the entries that are estimated."""
     arrays = {"A": system.A, "B": system.B, "C": system.C, "D": system.D}
     matrices: dict[str, Plain] = {letter: array.tolist() for letter, array in arrays.items()}
     values: dict[str, Plain] = {}
@@ -113,7 +113,7 @@ def _bad_parameter(message: str) -> SpecError:
 
 
 def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete: bool) -> dict[str, Plain]:
-    """The plant of numerators and denominators, in rows of columns; in discrete time in q^-1."""
+    """Return the plant of numerators and denominators, in rows of columns; in discrete time in q^-1."""
     entries: list[list[Entry]]
     if hasattr(system, "A"):
         entries = transfer_functions(system.A, system.B, system.C, system.D, discrete=discrete)
@@ -130,7 +130,7 @@ def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete
 
 
 def _in_delays(top: list[float], bottom: list[float]) -> Entry:
-    """In q^-1, ascending, and monic; poles at 0 are delays and no coefficients to be estimated.
+    """Return the entry in q^-1, ascending and monic; poles at 0 are delays and not estimated.
 
     Raises `SpecError`: `improper-transfer`.
     """

@@ -102,6 +102,6 @@ def _file_keys(node: Plain) -> Iterator[str]:
 
 
 def _may_name_a_file(value: dict[str, Plain]) -> bool:
-    """Whether some alternative of a value, in nested unions too, is the name of a file."""
+    """Return whether some alternative of a value, in nested unions too, is the name of a file."""
     unions = (option for union in ("anyOf", "oneOf", "allOf") for option in value.get(union, ()))
     return value.get("format") == FILE_FORMAT or any(map(_may_name_a_file, unions))

@@ -99,7 +99,7 @@ def read_template(
 
 
 def same_content(one: str, other: str) -> bool:
-    """Whether two texts of a spec agree, apart from comments, layout and order of keys.
+    """Return whether two texts of a spec agree, apart from comments, layout and order of keys.
 
     Raises `SpecError`: One of them is not YAML.
     """

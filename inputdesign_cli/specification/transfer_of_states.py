@@ -44,7 +44,7 @@ def transfer_functions(
 
 
 def _entry(states: States, *, discrete: bool) -> Entry:
-    """The transfer function of one input and output with the fewest poles that has its response."""
+    """Return the transfer function of one input and output with the fewest poles that has its response."""
     with np.errstate(all="ignore"):
         gain, excess = _leading(states)
         if gain == 0.0:
@@ -64,7 +64,7 @@ def _entry(states: States, *, discrete: bool) -> Entry:
 
 
 def _leading(states: States) -> tuple[float, int]:
-    """The first of d, c b, c A b, .. that is not rounding, and its place: how many poles exceed the zeros."""
+    """Return the first of d, c b, c A b, .. that is not rounding, and its index: poles less zeros."""
     A, column, c, d = states
     terms, value, size = np.abs(column), d.item(), abs(d.item())
     for excess in range(len(A) + 1):
@@ -76,7 +76,7 @@ def _leading(states: States) -> tuple[float, int]:
 
 
 def _zeros(states: States, number: int) -> np.ndarray:
-    """The zeros: the smallest generalised eigenvalues of [A, b; c, d], scaled to entries of one size."""
+    """Return the zeros: the smallest generalised eigenvalues of [A, b; c, d], scaled to similar entries."""
     import scipy.linalg
 
     A, b, c, d = states
@@ -108,7 +108,7 @@ def _without_near_pairs(
 
 
 def _agree(entry: Entry, states: States, *, discrete: bool) -> bool:
-    """Whether polynomials and states have the same response on a grid around their corner frequencies."""
+    """Return whether polynomials and states have the same response around their corner frequencies."""
     A, b, c, d = states
     top, bottom = entry
     roots = np.concatenate([np.roots(top), np.roots(bottom), np.linalg.eigvals(A) if len(A) else []])

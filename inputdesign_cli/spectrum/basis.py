@@ -21,8 +21,8 @@ Factor = Callable[[Array], NDArray]
 class Functional:
     """A linear functional of the spectrum, (1 / 2 pi) integral of density(w) Phi(w) dw.
 
-    `vector` (n,) are its values on the n basis functions; `density` maps frequencies to (number,).
-    A `concentrated` functional also picks up Phi at single frequencies, which its density leaves out.
+    `vector` (n,) are its values on the n basis functions; `density` maps frequencies to (number,). A
+    `concentrated` functional also picks up Phi at single frequencies, which its density does not contain.
     """
 
     vector: Array
@@ -42,7 +42,7 @@ class Functional:
     __rmul__ = __mul__
 
     def at(self, x: Array) -> float:
-        """Its value on the spectrum with coefficients `x` (n,)."""
+        """Return its value on the spectrum with coefficients `x` (n,)."""
         return float(self.vector @ x)
 
 
@@ -85,10 +85,10 @@ class Face:
 
 @dataclass(frozen=True)
 class Pricing:
-    """What a dual point is worth: `scale` is the largest s with price - s value >= 0 on the whole cone.
+    """The price of a dual point: `scale` is the largest s with price - s value >= 0 on the whole cone.
 
-    `directions` are the members of the cone (in the basis' own record) at which that is tightest:
-    the ones to add to a face when the dual point came from a face alone.
+    `directions` are the members of the cone (in the basis' own record) where the inequality is tightest. They
+    are added to a face when the dual point came from a face alone.
     """
 
     scale: float
@@ -107,46 +107,46 @@ class Basis(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Return the number of unknowns."""
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
 
     @property
     def has_density(self) -> bool:
-        """Whether the family has a density over frequency (else it consists of sinusoids)."""
+        """Return whether the family has a density over frequency (else it consists of sinusoids)."""
 
     @property
     def free(self) -> bool:
-        """Whether it grows to every spectrum whatever."""
+        """Return whether the family can grow to every spectrum."""
 
     @property
     def degree(self) -> int:
-        """How fast a density may oscillate over the band, as the degree of a polynomial."""
+        """Return how fast a density may oscillate over the band, as the degree of a polynomial."""
 
     @property
     def knots(self) -> Array:
-        """Frequencies at which the density may have a kink."""
+        """Return frequencies at which the density may have a kink."""
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
-        """Phi at frequencies `w` (n,)."""
+        """Return Phi at frequencies `w` (n,)."""
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
-        """Frequencies (L,), ascending, and power matrices (L, r, r) of the sinusoids that carry power."""
+        """Return frequencies (L,), ascending, and power matrices (L, r, r) of sinusoids with power."""
 
     def spread(self, powers: Array) -> Array:
-        """(size,): excitation with these powers (r,) of the channels, uncorrelated, flat over the family."""
+        """Return flat uncorrelated excitation (size,) with these powers (r,) of the channels."""
 
     @property
     def even(self) -> Array:
         """Return `spread` of total power one, (size,), even over the channels."""
 
     def in_units(self, units: Array) -> Basis:
-        """The family for channels of these units (r,); only where that changes where a design begins."""
+        """Return the family for channels of these units (r,), if they change where a design begins."""
 
     def moving_average(self, x: Array) -> Array | None:
-        """c_0 .. c_m of one input, where a moving average has this spectrum; else None."""
+        """Return c_0 .. c_m of one input, where a moving average has this spectrum; else None."""
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """Return v^* Phi v at one frequency, v the `direction` (r,), as a functional, (size,)."""
@@ -154,28 +154,28 @@ class Basis(Protocol):
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function.
+        """Return (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function, (size, ...).
 
         Where the density has a `factor`, families of several inputs need not form it.
         """
 
     def beyond(self, number: int) -> Basis:
-        """The basis functions after the first ones, for families that grow."""
+        """Return the basis functions after the first ones, for families that grow."""
 
     def coarser(self) -> Sequence[Basis]:
-        """Smaller families to design first, from coarse to fine; x of each is the head of x of the next."""
+        """Return smaller families to design first, coarse to fine; x of each is the head of x of the next."""
 
     def first_face(self, price: Functional) -> Face:
-        """A face rich enough to identify every parameter, scaled so that each column has a like price."""
+        """Return a face rich enough to identify every parameter, with columns of like price."""
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """How far the dual point may be scaled, and where it is tightest."""
+        """Return the largest scale of the dual point, and where it is tightest."""
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[Basis, Face]:
-        """A face that holds the current solution `y` and the `directions` (the basis may grow with it)."""
+        """Return a face that holds the solution `y` and the `directions` (the basis may grow with it)."""
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
-        """The type of the family and what it takes to restate the spectrum, as plain data and arrays.
+        """Return the type of the family and the data that restate the spectrum, as plain data and arrays.
 
         Args:
             unit: frequencies are divided by it to be in the user's unit.
@@ -183,21 +183,21 @@ class Basis(Protocol):
 
 
 class DensityFamily:
-    """What families with a density over frequency have in common."""
+    """Holds the common part of families with a density over frequency."""
 
     has_density = True
     free = False
 
     @property
     def knots(self) -> Array:
-        """The density has no kinks."""
+        """Return no knots, since the density has no kinks."""
         return np.zeros(0)
 
     if TYPE_CHECKING:
 
         @property
         def inputs(self) -> int:
-            """Number of inputs r."""
+            """Return the number of inputs r."""
 
         def spread(self, powers: Array) -> Array:
             """See `Basis`."""

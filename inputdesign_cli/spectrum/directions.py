@@ -49,7 +49,7 @@ def _summed_scalars(table: NDArray, values: NDArray, weights: Array) -> NDArray:
 
 
 def _summed_products(table: NDArray, F: NDArray, weights: Array) -> NDArray:
-    """The sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
+    """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
 
     Of an output only the parameters and inputs that matter to it take part.
     """
@@ -68,7 +68,7 @@ def _summed_products(table: NDArray, F: NDArray, weights: Array) -> NDArray:
 
 
 def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
-    """The stationary ratios of v^* value v to v^* price v at each frequency, and where they are reached.
+    """Return the stationary ratios of v^* value v to v^* price v at each frequency, with their directions.
 
     Args:
         price, value: densities, (n,) or Hermitian (n, r, r), `price` positive.
@@ -96,17 +96,17 @@ def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
 
 
 def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
-    """The largest of these ratios at each frequency, (n,), and its direction (n, r)."""
+    """Return the largest of the stationary ratios at each frequency, (n,), and its direction (n, r)."""
     ratios, directions = every_direction(price, value)
     return ratios[:, -1], directions[:, -1]
 
 
 def directed_scale(price: Functional, value: Functional, grid: Array) -> tuple[float, Array]:
-    """The largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
+    """Return the largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
 
-    Valid for every spectrum whatever on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of
-    some direction across the channels. What a price picks up at single frequencies only adds to it and is
-    left out; a value that does proves nothing (s = 0).
+    It is valid for every spectrum on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of some
+    direction across the channels. A price that is concentrated at single frequencies only adds to it and is
+    ignored; such a value proves nothing (s = 0).
 
     Returns:
         s, and the frequencies of the local maxima of the largest generalised eigenvalue.
@@ -149,7 +149,7 @@ def _beside_free(
 
 
 def inverse_of(heights: Array) -> float:
-    """One over the largest of some ratios, infinite where none is positive."""
+    """Return one over the largest of some ratios, infinite where none is positive."""
     top = float(heights.max(initial=0.0))
     return np.inf if top <= 0 else 1.0 / top
 
@@ -166,6 +166,6 @@ def first_directions(units: Array) -> ComplexArray:
 
 
 def leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:
-    """The `number` largest generalised eigenvalues, ascending, and their vectors as columns."""
+    """Return the `number` largest generalised eigenvalues, ascending, and their vectors as columns."""
     first = max(len(worth) - number, 0)
     return scipy.linalg.eigh(worth, metric, subset_by_index=[first, len(worth) - 1])

@@ -25,14 +25,14 @@ _OF_ONE_INPUT = FaceSizes(whole=12, first=12, kept=14)
 class FirBasis(GramBasis):
     """The unknowns are the upper triangle of c_0 by columns, then c_1 .. c_m (r, r) row by row.
 
-    `inputs` r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with
-    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 ([fejer-riesz-1916]; for several inputs
-    [dritschel-rovnyak-2010]); c_t is the sum of the blocks (s + t, s) of Q.
+    `inputs` is r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with a real
+    Q >= 0 ([fejer-riesz-1916]; for several inputs [dritschel-rovnyak-2010]). Here V(w) = [I, e^{-jw} I, ..,
+    e^{-jwm} I]; c_t is the sum of the blocks (s + t, s) of Q.
     """
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Return the number of unknowns."""
         return svec_length(self.inputs) + self.order * self.inputs**2
 
     @property
@@ -56,7 +56,7 @@ class FirBasis(GramBasis):
         return FirBasis(self.inputs, order)
 
     def autocovariances(self, x: Array) -> NDArray[np.float64]:
-        """(m + 1, r, r): c_0 .. c_m."""
+        """Return the autocovariances c_0 .. c_m, (m + 1, r, r)."""
         r = self.inputs
         rows, columns, _ = svec_layout(r)
         first = np.zeros((1, r, r))
@@ -64,7 +64,7 @@ class FirBasis(GramBasis):
         return np.concatenate([first, x[rows.size :].reshape(-1, r, r)])
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
-        """Phi at normalised frequencies `w`: (n,) for one input, else Hermitian (n, r, r)."""
+        """Return Phi at normalised frequencies `w`: (n,) for one input, else Hermitian (n, r, r)."""
         c, turn = self.autocovariances(x), self._turn(np.asarray(w, dtype=float))
         if self.inputs == 1:
             return 2.0 * turn @ c[:, 0, 0] - c[0, 0, 0]
@@ -79,7 +79,7 @@ class FirBasis(GramBasis):
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown."""
+        """Return (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown, (size, ...)."""
         source, summed = integrand(density, factor, self.inputs)
 
         def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
@@ -94,7 +94,7 @@ class FirBasis(GramBasis):
         return self._functional((turn[:, None, None] * np.outer(direction, direction.conj())).real)
 
     def _functional(self, sums: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(size, ...) from the real parts (m + 1, r, r, ...) of the integrals of D(w) e^{-jwt}.
+        """Return (size, ...) from the real parts (m + 1, r, r, ...) of the integrals of D(w) e^{-jwt}.
 
         tr(D c_t e^{-jwt}) and its mirror image add up to twice the real part; D_ij meets c_ji.
         """
@@ -106,7 +106,7 @@ class FirBasis(GramBasis):
         return np.concatenate([head, tail.reshape(-1, *tail.shape[3:])])
 
     def gram(self, vector: Array) -> NDArray[np.float64]:
-        """Block Toeplitz: a functional is nonnegative on the cone exactly when this matrix is."""
+        """Return a block Toeplitz matrix, positive semidefinite exactly for nonnegative functionals."""
         g = 0.5 * self.autocovariances(vector)
         g[0] += np.diag(np.diag(g[0]))
         every = np.concatenate([g, g[:0:-1].swapaxes(1, 2)])  # by lag, negative ones from the end
@@ -114,10 +114,10 @@ class FirBasis(GramBasis):
         return every[s[:, None] - s].transpose(0, 2, 1, 3).reshape(self.gram_order, self.gram_order)
 
     def products(self, generators: NDArray) -> Array:
-        """(size, q (q + 1) / 2): x of (v_a v_b^* + v_b v_a^*) / 2 for each pair of generators (n, q).
+        """Return x of (v_a v_b^* + v_b v_a^*) / 2 for each pair of generators (n, q), (size, q (q + 1) / 2).
 
-        A generator v holds the taps v(0) .. v(m), (r,) each, of a filter, and c_t of a pair is the sum over s
-        of v_a(s + t) v_b(s)^T made symmetric in a and b: a correlation along the lags, done by FFT.
+        A generator v holds the taps v(0) .. v(m), (r,) each, of a filter. c_t of a pair is the sum over s of
+        v_a(s + t) v_b(s)^T made symmetric in a and b: a correlation along the lags, computed by FFT.
         """
         r, number = self.inputs, generators.shape[1]
         length = 2 * (self.order + 1)
@@ -138,6 +138,6 @@ class FirBasis(GramBasis):
         return out
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
-        """The autocovariances c_0 .. c_m, (r, r) each where there are several inputs."""
+        """Return the autocovariances c_0 .. c_m, (r, r) each where there are several inputs."""
         shown = x if self.inputs == 1 else self.autocovariances(x)
         return {"type": "fir", "order": self.order, "coefficients": shown}

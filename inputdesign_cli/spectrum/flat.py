@@ -17,7 +17,7 @@ from inputdesign_cli.spectrum.directions import integrand
 
 @dataclass(frozen=True)
 class FlatBasis(DensityFamily):
-    """The unknown is the total power; Phi = level I on `band`, zero outside."""
+    """The family of flat spectra: the unknown is the total power; Phi = level I on `band`, zero outside."""
 
     inputs: int
     band: tuple[float, float]
@@ -26,20 +26,20 @@ class FlatBasis(DensityFamily):
     degree = 0
 
     def spread(self, powers: Array) -> Array:
-        """Return their sum (1,); what a channel has alone is not of this family."""
+        """Return the sum of the powers (1,), since this family has one power for all channels."""
         return np.array([np.sum(powers)])
 
     def moving_average(self, x: Array) -> Array | None:
-        """White noise of one input over the whole circle; otherwise there is none."""
+        """Return white noise of one input over the whole circle; otherwise None."""
         return x if self.inputs == 1 and self.band == (0.0, np.pi) else None
 
     @cached_property
     def level(self) -> float:
-        """Each diagonal entry of Phi at power one."""
+        """Return each diagonal entry of Phi at power one."""
         return np.pi / ((self.band[1] - self.band[0]) * self.inputs)
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
-        """Phi at `w`: (n,) for one input, else (n, r, r)."""
+        """Return Phi at `w`: (n,) for one input, else (n, r, r)."""
         at = np.asarray(w, dtype=float)
         inside = (at >= self.band[0] * (1 - 1e-12)) & (at <= self.band[1] * (1 + 1e-12))
         level = x[0] * self.level * inside
@@ -66,24 +66,24 @@ class FlatBasis(DensityFamily):
         return []
 
     def first_face(self, price: Functional) -> Face:
-        """The whole half line, in units of its price."""
+        """Return the whole half line, in units of its price."""
         return Face(1.0 / price.vector[:, None], "nonnegative", 1, np.zeros(1))
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """The ratio of two numbers."""
+        """Return the ratio of two numbers."""
         worth = float(value.vector[0])
         return Pricing(float(price.vector[0]) / worth if worth > 0 else np.inf, np.zeros(0))
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[FlatBasis, Face]:
-        """Nothing to add."""
+        """Return the face as it is, since there is nothing to add."""
         return self, face
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
-        """The power; of one input also as the autocovariance c_0."""
+        """Return the power; of one input also as the autocovariance c_0."""
         entry = {"type": "white", "power": float(x[0])}
         return entry | ({"order": 0, "coefficients": x} if self.inputs == 1 else {})
 
 
 def flat_basis(experiment: Experiment) -> FlatBasis:
-    """White excitation for an experiment: what its coordinates are whitened with."""
+    """Return white excitation for an experiment, by which its coordinates are whitened."""
     return FlatBasis(experiment.inputs, experiment.band)

@@ -24,7 +24,7 @@ _SINGULAR_PRICE = 1e-12
 
 
 class FaceSizes(NamedTuple):
-    """Up to order `whole` a face is the whole cone; beyond it only the first generators are kept."""
+    """Holds the order `whole` up to which a face is the whole cone; larger ones keep the first generators."""
 
     whole: int = 28
     first: int = 16
@@ -46,7 +46,7 @@ class GramBasis(DensityFamily, ABC):
 
     @property
     def gram_order(self) -> int:
-        """n = r (m + 1)."""
+        """Return the order n = r (m + 1) of the Gram matrix."""
         return self.inputs * (self.order + 1)
 
     @property
@@ -56,17 +56,17 @@ class GramBasis(DensityFamily, ABC):
 
     @property
     def _copies(self) -> int:
-        """How many times n generators span the whole cone."""
+        """Return the number of generators of the whole cone, in multiples of n."""
         return 2 if self.hermitian else 1
 
     @property
     def sizes(self) -> FaceSizes:
-        """How large faces are."""
+        """Return the sizes of faces."""
         return FaceSizes()
 
     @abstractmethod
     def gram(self, vector: Array) -> NDArray:
-        """G (n, n) with tr(G Q) = vector . x for the x of any Gram matrix Q."""
+        """Return G (n, n) with tr(G Q) = vector . x for the x of any Gram matrix Q."""
 
     @abstractmethod
     def spread(self, powers: Array) -> Array:
@@ -74,28 +74,28 @@ class GramBasis(DensityFamily, ABC):
 
     @abstractmethod
     def products(self, generators: NDArray) -> Array:
-        """(size, q (q + 1) / 2): x of each pair of generators (n, q), as svec orders and scales pairs."""
+        """Return x of each pair of generators (n, q), in svec's order and scale: (size, q (q + 1) / 2)."""
 
     @abstractmethod
     def of_order(self, order: int) -> Self:
         """Return the family with a lower order; its x is the head of ours."""
 
     def coarser(self) -> list[Self]:
-        """Lower orders, each about half the next, whose optimum is a good start for this one."""
+        """Return lower orders, each about half the next, whose optimum is a good start for this one."""
         orders = [self.order]
         while self._copies * self.inputs * (orders[0] + 1) > 2 * self.sizes.whole:
             orders.insert(0, orders[0] // 2)
         return [self.of_order(order) for order in orders[:-1]]
 
     def first_face(self, price: Functional) -> Face:
-        """The whole cone when it is small, else the spectra of low order."""
+        """Return the whole cone when it is small, else the spectra of low order."""
         n = self.gram_order
         few = self.inputs * max(self.sizes.first // (self.inputs * self._copies), 1)
         first = np.eye(n)[:, : n if n * self._copies <= self.sizes.whole else min(few, n)]
         return self._face(np.concatenate([first, 1j * first], axis=1) if self.hermitian else first, price)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """The largest s with price - s value >= 0 on the whole cone: a generalised eigenvalue.
+        """Return the largest s with price - s value >= 0 on the whole cone: a generalised eigenvalue.
 
         Where the price itself nearly vanishes, rounding spoils that eigenvalue, and the largest ratio
         over frequency, which is valid too, stands in.
@@ -122,12 +122,12 @@ class GramBasis(DensityFamily, ABC):
         return self, self._face(np.concatenate([used, directions], axis=1), price)
 
     def factor(self, face: Face, y: Array) -> NDArray:
-        """H (n, q) with Q = H H^*."""
+        """Return H (n, q) with Q = H H^*."""
         eigenvalues, vectors = np.linalg.eigh(smat(y))
         return face.generators @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
 
     def _face(self, spanning: NDArray, price: Functional) -> Face:
-        """Generators orthonormal in the metric of the price, so that the cost is tr Y."""
+        """Return generators orthonormal in the metric of the price, so that the cost is tr Y."""
         gram = self.gram(price.vector)[: len(spanning), : len(spanning)]
         unit = _units(gram)
         basis = _independent(unit[:, None] * spanning)

@@ -60,7 +60,7 @@ class LinesBasis:
 
     @classmethod
     def anywhere(cls, lo: float, hi: float, inputs: int) -> LinesBasis:
-        """Free frequencies on [lo, hi], to begin with some spread linearly and logarithmically."""
+        """Return free frequencies on [lo, hi], at first some spread linearly and logarithmically."""
         low = max(lo, 1e-3 * hi)
         number = int(np.clip(_FIRST_ATOMS // (2 * inputs**2), _FEWEST_LINES, _FIRST_LINES))
         start = np.concatenate([np.linspace(low, hi, number), np.geomspace(low, hi, number)])
@@ -68,12 +68,12 @@ class LinesBasis:
 
     @classmethod
     def at(cls, frequencies: Array, inputs: int) -> LinesBasis:
-        """Lines at these frequencies, to begin with along each channel and pair of channels."""
+        """Return lines at these frequencies, at first along each channel and pair of channels."""
         even = np.zeros((frequencies.size, inputs), dtype=complex)
         return cls(frequencies, even, frequencies, np.ones(inputs)).in_units(np.ones(inputs))
 
     def in_units(self, units: Array) -> LinesBasis:
-        """The first lines once more, with directions that suit channels of these units (r,)."""
+        """Return the first lines again, with directions that suit channels of these units (r,)."""
         start = first_directions(units)
         w = self.allowed
         return replace(
@@ -82,21 +82,21 @@ class LinesBasis:
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Return the number of unknowns."""
         return self.frequencies.size
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return self.directions.shape[1]
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
-        """Zero: sinusoids have no density."""
+        """Return zero: sinusoids have no density."""
         shape = () if self.inputs == 1 else (self.inputs, self.inputs)
         return np.zeros((np.size(w), *shape))
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """Zero, as the density."""
+        """Return zero, as the density."""
         return np.zeros(self.size)
 
     @property
@@ -116,7 +116,7 @@ class LinesBasis:
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """Return v^* D(w) v, what an atom of power one picks up, (L, ...)."""
+        """Return v^* D(w) v, the functional of an atom of power one, (L, ...)."""
         if factor is not None and self.inputs > 1:
             return self._products(factor)
         values = density(self.frequencies)
@@ -137,21 +137,21 @@ class LinesBasis:
         return np.concatenate(found)
 
     def beyond(self, number: int) -> LinesBasis:
-        """The atoms after the first ones."""
+        """Return the atoms after the first ones."""
         return replace(self, frequencies=self.frequencies[number:], directions=self.directions[number:])
 
     def first_face(self, price: Functional) -> Face:
-        """All atoms, in units of their price."""
+        """Return all atoms, in units of their price."""
         return self._face(np.arange(self.size), price.vector)
 
     def _face(self, atoms: NDArray[np.intp], prices: Array) -> Face:
-        """These atoms, each in units of its price; the generators are their numbers."""
+        """Return these atoms, each in units of its price; the generators are their numbers."""
         columns = np.zeros((self.size, atoms.size))
         columns[atoms, np.arange(atoms.size)] = 1.0 / np.maximum(prices[atoms], _FREE * prices.max())
         return Face(columns, "nonnegative", atoms.size, atoms)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction).
+        """Return the ratio over all allowed frequencies and directions, and new atoms (frequency, direction).
 
         New atoms have all stationary directions of their frequency: the power matrix there may need them
         together, and the best one a round would take as many rounds.
@@ -164,9 +164,9 @@ class LinesBasis:
         return Pricing(inverse_of(ratios) if scale is None else scale, atoms)
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
-        """The atoms so far and the new ones; x of the old basis is the head of x of the new.
+        """Return the atoms so far and the new ones; x of the old basis is the head of x of the new.
 
-        Of very many atoms the ones of least power leave the face. They come back when they pay.
+        Of very many atoms the faintest are dropped from the face. They come back when they pay.
         """
         number = face.generators
         power = np.zeros(self.size)
@@ -192,7 +192,7 @@ class LinesBasis:
         return grown, grown._face(atoms, np.concatenate([price.vector, costs]))
 
     def _around(self, y: Array, atoms: NDArray) -> list[NDArray]:
-        """Halfway from the nearest atom in use to each of the new ones, and as far beyond.
+        """Return atoms halfway from the nearest atom in use to each of the new ones, and as far beyond.
 
         Each round moves the best frequencies and directions a little less than the round before; what lies
         on both sides of a new atom saves a quarter of the rounds.
@@ -218,7 +218,7 @@ class LinesBasis:
         return found
 
     def _known(self, frequency: float, direction: ComplexArray) -> int | None:
-        """The number of the atom that this one is, if there is one."""
+        """Return the number of this atom, if it is known."""
         near = np.flatnonzero(np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300))
         same = near[self._alike(self.directions[near], direction) > 1.0 - _SAME]
         return int(same[0]) if same.size else None
@@ -234,7 +234,7 @@ class LinesBasis:
         return None
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
-        """Frequencies (number,) with power, ascending, and their power matrices (number, r, r)."""
+        """Return frequencies (number,) with power, ascending, and their power matrices (number, r, r)."""
         w, inverse = np.unique(self.frequencies, return_inverse=True)
         power = np.zeros((w.size, self.inputs, self.inputs), dtype=complex)
         outer = np.einsum("na,nb->nab", self.directions, self.directions.conj())
@@ -243,7 +243,7 @@ class LinesBasis:
         return w[kept], power[kept]
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
-        """Frequencies and powers: numbers of one input, else Hermitian matrices."""
+        """Return frequencies and powers: numbers of one input, else Hermitian matrices."""
         w, powers = self.lines(x)
         shown = powers[:, 0, 0].real if self.inputs == 1 else powers
         return {"type": "free" if self.free else "multisine", "frequencies": w / unit, "powers": shown}

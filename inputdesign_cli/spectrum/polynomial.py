@@ -30,11 +30,11 @@ BasisName = Literal["legendre", "chebyshev", "monomial"]
 class PolynomialBasis(GramBasis):
     """The unknowns are S (n, n), n = r (m + 1), as svec (real) or hvec (`hermitian`, complex).
 
-    `inputs` r, `order` m <= 40, `band` in the unit of frequency of the experiment. All computing is done
-    in Legendre polynomials orthonormal on the band, (1/2 pi) integral of p_a p_b = 1 if a = b, so that
-    the power of u is tr(S) / 2. Chebyshev polynomials and monomials span the same spectra; bringing
-    their S to this form is the congruence with the Cholesky factor of their Gram matrix, without which
-    monomials (condition 1e9 at m = 13) give wrong answers. `coefficients` converts back.
+    `inputs` is r, `order` m <= 40, `band` in the unit of frequency of the experiment. All computing is done
+    in Legendre polynomials orthonormal on the band: (1/2 pi) integral of p_a p_b = 1 if a = b. So the power
+    of u is tr(S) / 2. Chebyshev polynomials and monomials span the same spectra. A congruence with the
+    Cholesky factor of their Gram matrix brings their S to this form. Without it monomials (condition 1e9 at m
+    = 13) give wrong answers. `coefficients` converts back.
     """
 
     band: tuple[float, float] = (0.0, np.pi)
@@ -43,12 +43,12 @@ class PolynomialBasis(GramBasis):
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Return the number of unknowns."""
         n = self.gram_order
         return n * n if self.hermitian else svec_length(n)
 
     def spread(self, powers: Array) -> Array:
-        """(size,): the spectrum with these powers (r,) of the channels, uncorrelated, flat over the band."""
+        """Return the flat uncorrelated spectrum (size,) with these powers (r,) of the channels."""
         flat = np.zeros((self.gram_order, self.gram_order))
         flat[: self.inputs, : self.inputs] = 2.0 * np.diag(powers)
         return hvec(flat.astype(complex)) if self.hermitian else svec(flat)
@@ -58,7 +58,7 @@ class PolynomialBasis(GramBasis):
         return replace(self, order=order)
 
     def functions(self, w: ArrayLike) -> Array:
-        """(n, m + 1): p_0 .. p_m, zero outside of the band."""
+        """Return the polynomials p_0 .. p_m (n, m + 1), zero outside of the band."""
         lo, hi = self.band
         at = np.asarray(w, dtype=float)
         scale = np.sqrt((2.0 * np.arange(self.order + 1) + 1.0) * np.pi / (hi - lo))
@@ -67,11 +67,11 @@ class PolynomialBasis(GramBasis):
         return np.where(((at >= lo - margin) & (at <= hi + margin))[:, None], table, 0.0)
 
     def matrix(self, x: Array) -> NDArray:
-        """S (n, n) in orthonormal Legendre polynomials."""
+        """Return S (n, n) in orthonormal Legendre polynomials."""
         return hmat(x) if self.hermitian else smat(x)
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
-        """Phi at `w`: (n,) for one input, else Hermitian (n, r, r)."""
+        """Return Phi at `w`: (n,) for one input, else Hermitian (n, r, r)."""
         m, r = self.order + 1, self.inputs
         p = self.functions(w)
         S = self.matrix(x).reshape(m, r, m, r)
@@ -81,7 +81,7 @@ class PolynomialBasis(GramBasis):
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(size, ...): (1 / 2 pi) integral over the band of tr(density(w) Phi(w)) for each unknown."""
+        """Return (1 / 2 pi) integral over the band of tr(density(w) Phi(w)) for each unknown, (size, ...)."""
         first, second = np.triu_indices(self.order + 1)
         place = np.zeros((self.order + 1, self.order + 1), dtype=np.intp)
         place[first, second] = place[second, first] = np.arange(first.size)
@@ -108,7 +108,7 @@ class PolynomialBasis(GramBasis):
         return hvec(outer) if self.hermitian else svec(outer.real)
 
     def gram(self, vector: Array) -> NDArray:
-        """The matrix that stands for a functional."""
+        """Return the matrix that stands for a functional."""
         return self.matrix(vector)
 
     def products(self, generators: NDArray) -> Array:
@@ -128,7 +128,7 @@ class PolynomialBasis(GramBasis):
         return rows, columns, scale, np.zeros(rows.size, dtype=bool)
 
     def coefficients(self, x: Array, basis: BasisName) -> NDArray:
-        """S (n, n) in the named basis of x = 2 (w - lo) / (hi - lo) - 1, degree by degree.
+        """Return S (n, n) in the named basis of x = 2 (w - lo) / (hi - lo) - 1, degree by degree.
 
         `legendre` is the orthonormal one. In monomials digits are lost as the order grows: their
         coefficients alternate and cancel (ten digits at m = 20).
@@ -148,7 +148,7 @@ class PolynomialBasis(GramBasis):
         return spread @ S @ spread.T
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
-        """S in the polynomials that results are stated in, and the band."""
+        """Return S in the polynomials that results are stated in, and the band."""
         return {
             "type": "polynomial",
             "basis": self.shown_in,

@@ -15,24 +15,24 @@ from inputdesign_cli.arrays import Array
 
 @lru_cache(maxsize=64)
 def svec_layout(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Row, column and scale of each entry of svec of an (order, order) matrix."""
+    """Return row, column and scale of each entry of svec of an (order, order) matrix."""
     columns, rows = np.tril_indices(order)
     return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 def svec_length(order: int) -> int:
-    """Number of entries of svec of an (order, order) matrix."""
+    """Return the number of entries of svec of an (order, order) matrix."""
     return order * (order + 1) // 2
 
 
 def svec(matrix: NDArray[np.float64]) -> Array:
-    """(..., k, k) symmetric -> (..., k (k + 1) / 2)."""
+    """Return symmetric matrices (..., k, k) as vectors (..., k (k + 1) / 2)."""
     rows, columns, scale = svec_layout(matrix.shape[-1])
     return matrix[..., rows, columns] * scale
 
 
 def smat(vector: Array) -> Array:
-    """The inverse of `svec` for a single vector."""
+    """Return the inverse of `svec` for a single vector."""
     order = int((np.sqrt(8 * vector.size + 1) - 1) / 2)
     rows, columns, scale = svec_layout(order)
     matrix = np.zeros((order, order))
@@ -43,7 +43,7 @@ def smat(vector: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def hvec_layout(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, NDArray[np.bool_]]:
-    """Row, column, scale and whether imaginary of each entry of hvec of an (order, order) matrix."""
+    """Return row, column, scale and whether imaginary of each entry of hvec of an (order, order) matrix."""
     columns, rows = np.tril_indices(order)
     copies = np.where(rows == columns, 1, 2)
     imaginary = np.zeros(int(copies.sum()), dtype=bool)
@@ -53,14 +53,14 @@ def hvec_layout(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, 
 
 
 def hvec(matrix: NDArray[np.complex128]) -> Array:
-    """Hermitian matrices (..., k, k) as real vectors (..., k^2), by columns; tr(A B) is the inner product."""
+    """Return Hermitian (..., k, k) as real vectors (..., k^2), by columns; tr(A B) is the inner product."""
     rows, columns, scale, imaginary = hvec_layout(matrix.shape[-1])
     entries = matrix[..., rows, columns] * scale
     return np.where(imaginary, entries.imag, entries.real)
 
 
 def hmat(vector: Array) -> NDArray[np.complex128]:
-    """The inverse of `hvec` for a single vector."""
+    """Return the inverse of `hvec` for a single vector."""
     order = round(np.sqrt(vector.size))
     rows, columns, scale, imaginary = hvec_layout(order)
     upper = np.zeros((order, order), dtype=complex)

@@ -15,7 +15,7 @@ from inputdesign_cli.spectrum.directions import integrand
 
 @dataclass(frozen=True)
 class TabulatedSpectrum(DensityFamily):
-    """x Phi(w), with Phi linear between the points of a table and zero outside it.
+    """The family x Phi(w), with Phi linear between the points of a table and zero outside it.
 
     White excitation on a band, of any powers of the channels, is a table of two points.
     """
@@ -27,18 +27,18 @@ class TabulatedSpectrum(DensityFamily):
 
     @classmethod
     def white(cls, powers: Array, band: tuple[float, float]) -> TabulatedSpectrum:
-        """Independent channels of these `powers` (r,), each flat over `band`."""
+        """Return independent channels of these `powers` (r,), each flat over `band`."""
         level = np.diag(powers * np.pi / (band[1] - band[0])).astype(complex)
         return cls(np.array(band), np.array([level, level]))
 
     @property
     def knots(self) -> Array:
-        """The frequencies of the table."""
+        """Return the frequencies of the table."""
         return self.frequency
 
     @property
     def inputs(self) -> int:
-        """Number of inputs r."""
+        """Return the number of inputs r."""
         return self.phi.shape[1]
 
     def raised(self, share: float) -> TabulatedSpectrum:
@@ -56,7 +56,7 @@ class TabulatedSpectrum(DensityFamily):
         return TabulatedSpectrum(self.frequency, self.phi + share * around)
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
-        """Phi at `w`: (n,) for one input, else (n, r, r)."""
+        """Return Phi at `w`: (n,) for one input, else (n, r, r)."""
         phi = x[0] * self._at(np.asarray(w, dtype=float))
         return phi[:, 0, 0].real if self.inputs == 1 else phi
 
@@ -74,7 +74,7 @@ class TabulatedSpectrum(DensityFamily):
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(1, ...): (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w."""
+        """Return (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w, (1, ...)."""
         r = self.inputs
         source, summed = integrand(density, factor, r)
 

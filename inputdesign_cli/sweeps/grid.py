@@ -23,7 +23,7 @@ _WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
 @dataclass(frozen=True)
 class Axis:
-    """A key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
+    """Holds a key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
 
     key: str
     texts: tuple[str, ...]
@@ -31,7 +31,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """The points as tuples of texts, one per axis; computed when asked for. The last axis runs fastest."""
+    """Generates the points as tuples of texts, one per axis, when asked for. The last axis runs fastest."""
 
     axes: tuple[Axis, ...]
     zipped: bool = False
@@ -55,11 +55,11 @@ class Grid:
         return (self[i] for i in range(len(self)))
 
     def overrides(self, point: tuple[str, ...]) -> list[str]:
-        """The point as `--set` takes it."""
+        """Return the point as `--set` takes it."""
         return [f"{axis.key}={text}" for axis, text in zip(self.axes, point, strict=True)]
 
     def block(self) -> dict[str, object]:
-        """The grid as the `sweep` block of a spec."""
+        """Return the grid as the `sweep` block of a spec."""
         values = {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
         return {"set": values, "zip": True} if self.zipped else {"set": values}
 
@@ -131,7 +131,7 @@ def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Gr
 
 
 def _split(text: str) -> tuple[str, ...]:
-    """The parts between the commas that stand outside brackets and quotes."""
+    """Return the parts between the commas that stand outside brackets and quotes."""
     parts, start, depth, quote = [], 0, 0, ""
     for i, character in enumerate(text):
         if quote:
@@ -149,14 +149,14 @@ def _split(text: str) -> tuple[str, ...]:
 
 
 def _text(value: object) -> str:
-    """A value of the `sweep` block as the text that `--set` takes."""
+    """Return a value of the `sweep` block as the text that `--set` takes."""
     if isinstance(value, str) and _WORD.fullmatch(value) and resolve(value) == value:
         return value
     return json.dumps(value, ensure_ascii=False)
 
 
 def _data(text: str) -> object:
-    """What `--set` makes of a text; a text that it cannot read stays one."""
+    """Return the value of a text for `--set`; a text that cannot be read stays one."""
     try:
         return read(text, "--set").data
     except SpecError:

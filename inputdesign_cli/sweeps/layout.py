@@ -1,7 +1,7 @@
-"""The directory of a sweep, and what may be relied on in it.
+"""The directory of a sweep, and its guarantees.
 
     sweep.yaml           the spec with its `sweep` block: `idesign sweep` on it repeats the sweep
-    sweep.json           what was swept, and how the points ended
+    sweep.json           the grid of the sweep, and the status of its points
     sweep.csv            one row a point
     points/<key>/        the run directory of a point that has a result
     failures/<key>.json  why a point has none
@@ -41,7 +41,7 @@ def checked_run(directory: Path, spec: str | None = None) -> dict[str, Any]:
     """Return the result of the run of a point, of this `spec` if it is known.
 
     Raises:
-        DataError: it is not whole, or is the run of another point.
+        DataError: the run is not whole, or belongs to another point.
     """
     result = read_run(directory)
     try:
@@ -55,7 +55,7 @@ def checked_run(directory: Path, spec: str | None = None) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the parts of a sweep stand in its directory."""
+    """Names the paths of the parts of a sweep in its directory."""
 
     root: Path
 
@@ -74,7 +74,7 @@ class Layout:
             spec: the resolved spec of the point, where it is known.
 
         Raises:
-            DataError: what is there does not hold.
+            DataError: the files of the point are damaged.
         """
         if (self.run(key) / RESULT).is_file():
             return checked_run(self.run(key), spec)
@@ -90,7 +90,7 @@ class Layout:
         return failure
 
     def discard(self, key: str) -> None:
-        """Remove what is there of a point, so that it is computed again."""
+        """Remove the files of a point, so that it is computed again."""
         run = self.run(key)
         with output_errors(run):
             (run / RESULT).unlink(missing_ok=True)
@@ -98,7 +98,7 @@ class Layout:
             self.failure(key).unlink(missing_ok=True)
 
     def write_failure(self, key: str, content: Mapping[str, object]) -> None:
-        """Note why a point has no result, in one step."""
+        """Write why a point has no result, in one step."""
         path = self.failure(key)
         with output_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +125,7 @@ class Layout:
             partial.rename(target)
 
     def clear(self) -> None:
-        """Remove what killed processes left half written. Only the holder of the lock may."""
+        """Remove half-written files of killed processes. Only the holder of the lock may."""
         for path in (*self.root.glob(".*.partial*"), *self.root.glob("failures/.*.partial*")):
             path.unlink(missing_ok=True)
         for run in self.root.glob("points/*"):
@@ -135,7 +135,7 @@ class Layout:
 
 @contextlib.contextmanager
 def opened(root: Path) -> Iterator[Layout]:
-    """The directory of a sweep, made if it is missing and held for this process alone.
+    """Open the directory of a sweep, made if it is missing and held for this process alone.
 
     Raises:
         OutputError: `sweep-locked` (another process sweeps into it), `output-not-a-sweep` (something else is
@@ -173,7 +173,7 @@ def opened(root: Path) -> Iterator[Layout]:
 
 @contextlib.contextmanager
 def at_work(root: Path) -> Iterator[None]:
-    """Held by a process that writes a point, so that no other sweep begins before it has ended."""
+    """Lock the directory while a process writes a point, so that no other sweep begins before its end."""
     lock = root / f"{WORKER}{uuid.uuid4().hex}"
     with locked(lock):
         try:

@@ -1,4 +1,4 @@
-"""What a sweep is to do: a draft, a grid, a verb, and the key by which each point is known for good."""
+"""The plan of a sweep: a draft, a grid, a verb, and the key by which each point is known for good."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _TRIED = 50
 
 @dataclass(frozen=True)
 class Plan:
-    """The points of a sweep, in order; `source` is the file of the spec, or standard input."""
+    """Holds the points of a sweep, in order; `source` is the file of the spec, or standard input."""
 
     draft: SpecTemplate
     grid: Grid
@@ -51,7 +51,7 @@ class Plan:
         return self._keys[index]
 
     def job(self, index: int, root: Path | None, *, figures: str) -> PointJob:
-        """A point for a worker; without a `root`, one that may not see our files."""
+        """Return the job of a point for a worker; without `root` it carries the files that the spec names."""
         overrides = tuple(self.grid.overrides(self.grid[index]))
         files = None
         if root is None:
@@ -71,7 +71,7 @@ class Plan:
         """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
 
         Raises:
-            SpecError: what is wrong with the first point, if no point that is tried can be read.
+            SpecError: the error of the first point, if no point that is tried can be read.
         """
         first: SpecError | None = None
         for index in dict.fromkeys(i * (len(self.grid) - 1) // _TRIED for i in range(_TRIED + 1)):
@@ -85,12 +85,12 @@ class Plan:
             raise first
 
     def data(self) -> dict[str, object]:
-        """The spec with the grid as its `sweep` block: it repeats the sweep without any settings."""
+        """Return the spec with the grid as its `sweep` block: it repeats the sweep without any settings."""
         return {**self._base, "sweep": self.grid.block()}
 
     @property
     def _base(self) -> dict[str, object]:
-        """The content of the spec but for what it says of a sweep."""
+        """Return the content of the spec without its parts about a sweep."""
         return {key: value for key, value in self.draft.data.items() if key != "sweep"}
 
     def summary(self, made_from: Sequence[str], statuses: Mapping[str, int]) -> dict[str, object]:
@@ -98,7 +98,7 @@ class Plan:
 
         Args:
             made_from: the spec file as it is seen from the directory.
-            statuses: how many points have which status.
+            statuses: the number of points of each status.
         """
         return {
             "format": 1,
@@ -154,12 +154,12 @@ def build_plan(
     confine: Path | None = None,
     text: str | None = None,
 ) -> Plan:
-    """Read the spec, and the settings as `parse_settings` does.
+    """Build the plan of a sweep from a spec and from settings as of `parse_settings`.
 
     Args:
         spec: the file, or with `text` where it would lie.
         confine: the folder outside of which the spec may name no files.
-        text: of the spec, where it is in no file.
+        text: the text of the spec, where it is in no file.
 
     Raises:
         SpecError: the spec, its `sweep` block or a setting cannot be used, or no point is a spec.

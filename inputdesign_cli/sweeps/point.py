@@ -1,4 +1,4 @@
-"""One point of a sweep: run the verb, and leave a run directory or the reason why there is none."""
+"""Compute one point of a sweep: run the verb, and write a run directory or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _alone = threading.Lock()
 
 @dataclass(frozen=True)
 class PointJob:
-    """What a worker needs to know of a point."""
+    """Holds all that a worker needs for a point."""
 
     index: int
     key: str
@@ -55,7 +55,7 @@ class PointJob:
 
 @dataclass(frozen=True)
 class PointEnd:
-    """How a point ended: its failure, if it failed, and its `files` where ours are out of reach."""
+    """Holds the end of a point: its failure, if it failed, and its `files` where ours are out of reach."""
 
     failure: Mapping[str, object] | None = None
     files: Mapping[str, bytes] | None = None

@@ -39,7 +39,7 @@ _FIRST, _REST, _SHARE = 2.0, 10.0, 30.0
 
 
 class Listing(NamedTuple):
-    """A point of a sweep that has not been run: its settings, its key, and how it stands."""
+    """Holds a point of a sweep that has not been run: its settings, its key, and its status."""
 
     settings: dict[str, str]
     key: str
@@ -68,11 +68,11 @@ class SweepRun:
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
         figures: draw the figures of every point too, not only of the sweep.
-        figure_format: of all figures: png, svg or pdf.
+        figure_format: the format of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
         watch: is called with this object after every point.
-        statuses: how many points have which status, once it has run; `files` that were written then.
-        passed: points that were done before or are now; `computed` and `failed` are those of this call.
+        statuses: the number of points of each status, once it has run; `files` that were written then.
+        passed: points that were done before or are now; `computed` and `failed` count in this call.
         damaged: why points of an earlier call were computed again.
     """
 
@@ -97,16 +97,16 @@ class SweepRun:
 
     @property
     def total(self) -> int:
-        """The number of points."""
+        """Return the number of points."""
         return len(self.plan.grid)
 
     @property
     def failures(self) -> int:
-        """How many points have no result though they were tried."""
+        """Return the number of points that were tried and have no result."""
         return sum(n for status, n in self.statuses.items() if status in FAILURES)
 
     def run(self) -> Self:
-        """Compute what is not done yet, write the table, and return the sweep.
+        """Compute the points without a result, write the table, and return the sweep.
 
         Raises:
             OutputError: the directory cannot be used.
@@ -136,7 +136,7 @@ class SweepRun:
             return self
 
     def _compute(self) -> None:
-        """Compute what is not done yet."""
+        """Compute the points without a result."""
         points = self.directory / "points"
         with output_errors(points):
             points.mkdir(exist_ok=True)
@@ -183,7 +183,7 @@ class SweepRun:
             self._report()
 
     def _known(self, index: int, key: str) -> Mapping[str, object] | None:
-        """Return what is there of a point; nothing if that is damaged, or if it is to be tried again."""
+        """Return the known result of a point; nothing if that is damaged, or if it is to be tried again."""
         try:
             content = self.layout.read(key, self.plan.resolved(index))
         except DataError as error:
@@ -193,7 +193,7 @@ class SweepRun:
         return None if content and "code" in content and self.rerun_failed else content
 
     def _take(self, finished: Finished[PointJob, PointEnd]) -> None:
-        """File what a worker has answered."""
+        """Store the answer of a worker."""
         job, end, error = finished.job, finished.answer, finished.error
         self.computed += 1
         if isinstance(error, OutputError):

@@ -35,7 +35,7 @@ _LEFT_OUT = frozenset(
 
 @dataclass(frozen=True)
 class Row:
-    """Holds what the table says of a point: `numbers` of its result by their paths, or why it has none."""
+    """Holds the row of a point in the table: `numbers` of its result by their paths, or why it has none."""
 
     status: str = PENDING
     numbers: Mapping[str, object] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Time against amplitude against accuracy: the sweep that shows what more of each means would buy."""
+"""Time against amplitude against accuracy: the sweep that shows the gain from more of each."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _QUANTITIES = ("signal.worst_ratio", "objective.value")
 
 
 def trade_settings(spec: Spec, words: Sequence[str]) -> list[str]:
-    """Return what `sweep` varies and holds for the best accuracy at several lengths and amplitudes.
+    """Return the settings of `sweep` for the best accuracy at several lengths and amplitudes.
 
     Args:
-        spec: of the experiment that a quarter to twice the length and half to twice the amplitude replace.
+        spec: the experiment, tried at a quarter to twice its length and half to twice its amplitude.
         words: "samples", "amplitude" or both.
 
     Raises:

@@ -49,7 +49,7 @@ Solve = Callable[[Spec], Result]
 
 @dataclass(frozen=True)
 class Draft:
-    """A spec as facts for its template, and the files next to it."""
+    """Holds a spec as facts for its template, and the files next to it."""
 
     facts: Mapping[str, object]  # what the template knows by name
     files: Mapping[str, bytes]
@@ -62,7 +62,7 @@ class Draft:
 
     @property
     def text(self) -> str:
-        """The spec."""
+        """Return the text of the spec."""
         known = {**self.facts, "spectrum": self.spectrum, "why": self.why}
         return filled("inputdesign_cli.wizard", "experiment.txt", known)
 
@@ -91,7 +91,7 @@ class Draft:
 
 
 def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAnswer | None = None) -> Draft:
-    """Return the spec of the answers.
+    """Return the spec that follows from the answers.
 
     Args:
         stem: of the name of the spec.
@@ -144,8 +144,8 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     """Return the draft with the simplest spectrum that is within 2 % of every other at the plant as stated.
 
     Where none is, it gets the simplest of the best. Filtered noise has power between the lines of a
-    multisine, so that its record does not repeat: a dead time that is a period longer would explain a record
-    that does nearly as well. A record that leaves other dead times open is taken only where all do.
+    multisine, so that its record does not repeat. A record that repeats would be explained nearly as well by
+    a dead time one period longer. A record that leaves other dead times open is taken only where all do.
 
     Raises:
         IdesignError: nothing can be designed; in words of the answers.
@@ -173,7 +173,7 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
 
 
 def _spectra(samples: int) -> list[tuple[str, str]]:
-    """Return the spectra to try in words of a spec and of a comment."""
+    """Return the spectra to try, each in the words of a spec and of a comment."""
     most = max(samples // 2, 1)
     lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
     return [
@@ -183,22 +183,22 @@ def _spectra(samples: int) -> list[tuple[str, str]]:
 
 
 class Conversation:
-    """Questions one by one: an answer that cannot be used is refused at once, and asked for again."""
+    """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again."""
 
     def __init__(self, known: Mapping[str, str], stem: str, folder: Path) -> None:
-        """Begin with what is known; stem and folder as of `compose`."""
+        """Begin with the answers that are known; stem and folder as of `compose`."""
         self._answers, self._stem, self._folder = dict(known), stem, folder
         self._plant: PlantAnswer | None = None
         self.draft: Draft | None = None  # of all answers, once they are there
 
     @property
     def question(self) -> Question | None:
-        """The next question, or None."""
+        """Return the next question; None if all are answered."""
         there = {*self._answers, *known_from(self._answers)}
         return next((one for one in QUESTIONS if one.key not in there), None)
 
     def answer(self, text: str) -> IdesignError | None:
-        """Answer the question, and return what is wrong: then the question that it is about comes again.
+        """Answer the question, and return the error of an answer, whose question then comes again.
 
         Raises:
             OutputError: a file next to the spec cannot be written.
@@ -220,7 +220,7 @@ class Conversation:
         return None
 
     def _understand(self) -> None:
-        """Try the answers; the plant, which may be a log to be explored, is understood once."""
+        """Try the answers; read the plant, which may be a log to be explored, once only."""
         if self._plant is None and self._answers["plant"].strip():
             self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
         draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)

@@ -41,13 +41,13 @@ _FILLING = "a an the of and with in at each all about is for by i want"
 
 
 class Phrase:
-    """An answer that is read piece by piece; `finish` refuses what nobody read.
+    """Reads an answer piece by piece; `finish` refuses what nobody read.
 
     A method returns None if the text has no piece of its kind.
     """
 
     def __init__(self, text: str, key: str) -> None:
-        """Begin with the whole answer to a question; its numbers are of sizes that can be meant."""
+        """Begin with the whole answer to a question; refuse numbers too large or too small to be meant."""
         self.text, self.key, self._left = text, key, text
         sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
         strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
@@ -61,7 +61,7 @@ class Phrase:
             raise bad_answer(key, why)
 
     def take(self, pattern: str) -> re.Match[str] | None:
-        """Read the first piece that matches."""
+        """Take the first piece that matches a pattern out of the text, and return its match."""
         found = re.search(pattern, self._left, re.I)
         if found is not None:
             self._left = f"{self._left[: found.start()]} | {self._left[found.end() :]}"
@@ -92,7 +92,7 @@ class Phrase:
         return _scaled(found[1], found[2], kind), None if found[3] is None else float(found[3]) / 100.0
 
     def band(self) -> tuple[float | None, float | None]:
-        """Read from where to where a band reaches, in rad/s; one unit holds for both ends."""
+        """Read the ends of a band of frequencies in rad/s; one unit holds for both."""
         frequency = NUMBER + _UNITS["frequency"]
         found = self.take(rf"\bfrom\b{_OF}{frequency}\s*(?:\bup to\b|\bto\b|-)\s*{frequency}")
         if found is None:
@@ -128,7 +128,7 @@ def _scaled(number: str, unit: str | None, kind: str) -> float:
 
 
 def needed(value: float | None, key: str, what: str) -> float:
-    """Return the value, which must be there and positive."""
+    """Return the value; refuse one that is missing or not positive."""
     if value is None:
         raise bad_answer(key, f"it does not say {what}")
     if not value > 0.0:

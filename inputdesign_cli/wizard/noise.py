@@ -28,7 +28,7 @@ _LONG = 100_000  # samples after which no pole of a log remembers anything
 
 @dataclass(frozen=True)
 class _Level:
-    """The variance of the innovation, the pole of the noise (0: white), and how they are known."""
+    """Holds the variance of the innovation, the pole of the noise (0: white), and how they are known."""
 
     variance: float
     pole: float
@@ -57,7 +57,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
 
 
 def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: bool, drifts: bool) -> list[str]:
-    """Return the lines of noise as a log has it, scaled to the size that is stated.
+    """Return the spec's lines of noise with the spectrum seen in a log, scaled to the stated size.
 
     A resolution is the least that noise can be, and the log may show more. Noise that drifts in the log and
     is said not to is white; noise that is said to drift beyond the log gets an integrator.
@@ -86,7 +86,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
 
 
 def _moves(noise: Noise) -> bool:
-    """Return whether noise drifts, or remembers so long that it cannot be told from drift in a record."""
+    """Return whether noise drifts, or is correlated so long that it looks like drift in a record."""
     longest = min(abs(float(np.sum(row))) for row in _per_output(noise.D, 1))
     return bool(np.any(noise.drift)) or longest < _STEADY
 
@@ -97,7 +97,7 @@ def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
 
 
 def _gains(noise: Noise, A: Sequence[Sequence[float]]) -> Array:
-    """Return the variance of the noise of every output (p,) over that of its white e, none of it drifting."""
+    """Return the variance of each output's noise (p,), relative to that of its white e; none may drift."""
     impulse = np.zeros(_LONG)
     impulse[0] = 1.0
     rows = zip(_per_output(noise.C, len(A)), _per_output(noise.D, len(A)), A, strict=True)
@@ -109,7 +109,7 @@ def _drift(drift: Any) -> list[str]:
 
 
 def _stated(text: str, folder: Path, step: float) -> _Level:
-    """Return what an answer says; a step is the seconds between samples."""
+    """Return the noise level that an answer states; `step` is the seconds between samples."""
     word, _, name = text.partition(" ")
     if word.lower() == "rest":
         return _at_rest(folder / name.strip(), step)
@@ -129,7 +129,7 @@ def _stated(text: str, folder: Path, step: float) -> _Level:
 
 
 def _resolution(said: Phrase) -> float | None:
-    """Return the step of a sensor, which follows from its bits and its range where these are said."""
+    """Return the step of a sensor's resolution, stated or computed from bits and range; None if neither."""
     begins = r"\bresolution\b\s*(?:of\s*)?"
     bits = said.take(rf"{begins}(\d+)\s*bits?\s*(?:up to|over|to|range)\s*{NUMBER}{UNIT}")
     if bits is not None:
@@ -144,8 +144,8 @@ def _resolution(said: Phrase) -> float | None:
 def _at_rest(path: Path, step: float) -> _Level:
     """Return the level of the noise in the column y of a file.
 
-    Noise with one pole is assumed where rows are farther apart than samples, or nearer: its correlation fades
-    by the same factor in the same time.
+    Noise with one pole is assumed where rows are not as far apart as samples. Its correlation then fades by
+    the same factor in the same time.
     """
     from inputdesign_cli.questions.building.tables import read_samples
 

@@ -37,7 +37,7 @@ _REJECTED = (
 
 @dataclass(frozen=True)
 class PlantAnswer:
-    """What is known of the plant."""
+    """Holds what is known of the plant."""
 
     lines: tuple[str, ...]  # of the spec, with comments
     slow: float  # its slowest time constant, in seconds
@@ -56,7 +56,7 @@ class PlantAnswer:
 
     @property
     def sample_time(self) -> float:
-        """Seconds between samples: a twentieth of the time constant, where nothing else is known."""
+        """Return the sample time in seconds: a twentieth of the time constant, if nothing else is known."""
         return _round_step(self.slow / 20.0) if self.sampling is None else self.sampling
 
 
@@ -133,7 +133,7 @@ _Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]  # NaN i
 
 
 class System(BaseModel):
-    """What a system of python-control in JSON may hold."""
+    """Holds a system of python-control as JSON describes it."""
 
     model_config = ConfigDict(extra="forbid")
     num: list[_Number]

@@ -20,7 +20,7 @@ from inputdesign_cli.specification.yaml.reader import read
 
 @dataclass(frozen=True)
 class Question:
-    """A question, the answers that it allows, and its default."""
+    """Holds a question, the answers that it allows, and its default."""
 
     key: str
     asks: str
@@ -98,7 +98,7 @@ def file_of(key: str, path: Path) -> Path:
 
 @dataclass(frozen=True)
 class Answers:
-    """Answers by question, and the places of answers that stand in a file (else of its beginning)."""
+    """Holds the answers by question, and the places of answers in a file (else of its beginning)."""
 
     texts: dict[str, str] = field(default_factory=dict)
     places: dict[str, Location] = field(default_factory=dict)

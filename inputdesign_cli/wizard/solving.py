@@ -68,7 +68,7 @@ def _said(part: str, facts: Mapping[str, object]) -> list[str]:
 
 
 def _without_margin(robust: Mapping[str, Any]) -> list[str]:
-    """Return at how many plants of which the controller has no margin even if they were known exactly."""
+    """Return in words how many plants leave the controller no margin, even if they were known exactly."""
     fresh, lost = robust.get("fresh") or {}, len(robust.get("floor", {}).get("lost", ()))
     said = [f"{lost} of the {robust.get('scenarios')} other plants that were tried"] if lost else []
     said += [f"{fresh['lost']} of {fresh['draws']} more"] if fresh.get("lost") else []
@@ -76,13 +76,13 @@ def _without_margin(robust: Mapping[str, Any]) -> list[str]:
 
 
 def _scatter(result: Result) -> float:
-    """Return how many times as large errors are at estimates from the data of the worst plant."""
+    """Return the largest factor by which errors grow at estimates from the data of the worst plant."""
     foreseen = result.get("robust", {}).get("estimates", {})
     return max(1.0, float(foreseen.get("largest", 1.0)))
 
 
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
-    """Return the samples of a record that was designed and meets what is asked, or None.
+    """Return the length in samples of a designed record that meets the requirements, or None.
 
     Args:
         ratio: of errors, at estimates too; one is enough.
@@ -118,7 +118,7 @@ def lasting(seconds: float) -> str:
 
 
 def to_log(spec: Spec, results: Results, file: str) -> list[str]:
-    """Return what to apply and to record, and how the record is judged."""
+    """Return instructions: what to apply and record, and the command that judges the record."""
     applied, caused = (
         [name for name in results.tables[table].columns if re.fullmatch(r"[ruy]\d+", name)]
         for table in ("signal", "predicted_output")

@@ -26,7 +26,7 @@ _WITHIN = {
 
 @dataclass(frozen=True)
 class Range:
-    """The amplitude about an operating point."""
+    """Holds the amplitude about an operating point."""
 
     amplitude: float
     offset: float
@@ -93,7 +93,7 @@ def quantisation(text: str) -> str | None:
 
 
 def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> list[str]:
-    """Return the lines of `accuracy`.
+    """Return the spec's lines of `accuracy` for a wish.
 
     Args:
         controlled: whether the experiment runs under a controller.

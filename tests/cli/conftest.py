@@ -25,7 +25,7 @@ def verbs(monkeypatch):
     calls = []
 
     class Stated:
-        asks_for_design = True
+        asks_for_design, figures = True, None
 
         def __init__(self, path):
             self.stem = path.stem

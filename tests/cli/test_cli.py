@@ -6,20 +6,13 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 
-import inputdesign_cli
 from inputdesign_cli import questions
-from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, InaccurateError, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.outcome.results import Results
 from tests.support.command_line import RESULT, diagnostic
 from tests.support.outcomes import typed
 from tests.support.processes import running
-
-ROOT = Path(inputdesign_cli.__file__).parents[1]
-GROUP = typer.main.get_command(app)
-COMMANDS = dict(GROUP.commands)
 
 
 @pytest.mark.parametrize("verb", ["solve", "analyse"])

@@ -7,11 +7,9 @@ from typing import get_args
 from xml.etree import ElementTree
 
 import pytest
-import typer
 
 import inputdesign_cli
 from inputdesign_cli import questions
-from inputdesign_cli.cli import app
 from inputdesign_cli.cli.reference import Kind
 from inputdesign_cli.error_codes import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
@@ -19,8 +17,6 @@ from inputdesign_cli.findings import explanations
 from tests.support.command_line import RESULT, diagnostic
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
-GROUP = typer.main.get_command(app)
-COMMANDS = dict(GROUP.commands)
 
 
 def test_validate_reports_all_files_at_once(run, verbs, monkeypatch):

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -164,6 +165,7 @@ def computing(monkeypatch):
     return begun
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_place_that_cannot_be_is_refused_before_anything_is_computed(
     run, computing, monkeypatch, tmp_path, command
@@ -330,3 +332,16 @@ def test_a_report_may_go_to_standard_output(analyse, tmp_path, monkeypatch, caps
     assert not ended.value.code
     assert capsys.readouterr().out.startswith("<!DOCTYPE html>")
     assert set(tmp_path.rglob("*")) == before
+
+
+def test_a_spec_has_the_form_of_its_figures(run, tmp_path):
+    """A column is 3.5 inches wide, of 72 points each; the option comes before the spec."""
+    spec = write(tmp_path / "a.yaml", "one")
+    spec.write_text(spec.read_text() + "figures: {width: column, format: pdf}\n")
+    assert run("analyse", "a.yaml")[0] == 0
+    drawn = {file.suffix: file for file in (tmp_path / "runs" / "a").iterdir() if file.stem == "spectrum"}
+    assert set(drawn) == {".csv", ".pdf"}
+    box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+)", drawn[".pdf"].read_bytes())
+    assert float(box[1]) == pytest.approx(252.0)
+    assert run("analyse", "a.yaml", "--figure-format", "svg")[0] == 0
+    assert (tmp_path / "runs" / "a" / "spectrum.svg").exists()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from inputdesign_cli.cli.completion import error_codes, spec_keys
+from inputdesign_cli.cli.options import error_codes, spec_keys
 from inputdesign_cli.cli.sweep import pace
 from inputdesign_cli.compute.executor import ONE_THREAD
 from tests.support.sweep_files import SPEC

@@ -2,19 +2,12 @@
 
 import sys
 import time
-from pathlib import Path
 
 import pytest
-import typer
 
-import inputdesign_cli
-from inputdesign_cli.cli import app, terminal as terminal_module
+from inputdesign_cli.cli import terminal as terminal_module
 from inputdesign_cli.cli.terminal import aligned, colourful, computing, status
 from inputdesign_cli.compute.watching import Counted, tell
-
-ROOT = Path(inputdesign_cli.__file__).parents[1]
-GROUP = typer.main.get_command(app)
-COMMANDS = dict(GROUP.commands)
 
 
 class Terminal:

@@ -2,7 +2,7 @@
 
 Further fields are welcome; a missing one, another type or another number is a broken promise. Where a number
 was mended since, `results.json` has the new one; so it has where another design, of equal cost within the
-proved gap, or another record of it came out.
+proved gap, or another record of it came out, and where `explore` lists fewer structures that it tried.
 """
 
 import json

@@ -23,10 +23,10 @@ from tests.support.outcomes import typed
 
 
 @cache
-def drawn(name, narrow=False):
+def drawn(name, width="page"):
     """The picture of curves and its figure; drawn once for all tests."""
     found = []
-    return rendered(painter(CURVES[name]), narrow=narrow, seen=found.append), found[0]
+    return rendered(painter(CURVES[name]), width=width, seen=found.append), found[0]
 
 
 @pytest.mark.first(12)
@@ -96,10 +96,10 @@ def test_text_has_one_size_and_symbols_of_ours_alone_are_typeset_and_no_legend_h
 
 
 @pytest.mark.first(12)
-@pytest.mark.parametrize("narrow", [False, True])
+@pytest.mark.parametrize("width", ["page", "column", "phone"])
 @pytest.mark.parametrize("name", CURVES)
-def test_no_text_leaves_the_page_or_lies_on_another(name, narrow):
-    _, figure = drawn(name, narrow)
+def test_no_text_leaves_the_page_or_lies_on_another(name, width):
+    _, figure = drawn(name, width)
     renderer = figure.canvas.get_renderer()
     texts = [(t.get_text(), t.get_window_extent(renderer)) for t in headings(figure)]
     (left, bottom), (right, top) = figure.bbox.padded(1.0).min, figure.bbox.padded(1.0).max

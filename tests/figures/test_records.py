@@ -59,6 +59,7 @@ def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(pa
     assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("outputs", [1, 2])
 @pytest.mark.parametrize("lengths", [(), (500,), (240, 260), (100, 150, 250)])
 def test_no_curve_goes_from_one_record_to_the_next(page, lengths, outputs):

@@ -175,7 +175,7 @@ def test_a_long_title_has_several_lines_within_the_page():
     )
     seen = []
     for _, make in sweep_figures(given):
-        rendered(make, "svg", narrow=True, seen=seen.append)
+        rendered(make, "svg", width="phone", seen=seen.append)
     (page,) = seen
     title = page.legends[0].get_title()
     assert "\n" in title.get_text()

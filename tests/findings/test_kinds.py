@@ -19,6 +19,7 @@ def test_a_kind_is_explained(kind):
     assert not kind.title.endswith(".")
     assert kind.text.endswith(".")
     assert kind.remedy.endswith(".")
+    assert "Args" not in kind.text
     assert long_sentences(f"{kind.text} {kind.remedy}") == []
     assert unclear_words(f"{kind.title}. {kind.text} {kind.remedy}") == []
 

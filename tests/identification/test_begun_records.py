@@ -10,7 +10,7 @@ from inputdesign_cli.identification import identify, information_begun_anywhere
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
 
-GAIN, LAG, N, BEFORE = 2.0, 10.0, 300, 200
+GAIN, LAG, N, BEFORE = 2.0, 10.0, 500, 200
 IN_S = "{{continuous: {{gain: 2, time_constant: 10, dead_time: {delay}}}, sample: zoh}}"
 IN_STATES = (
     "{{parameters: {{K: 2, T: 10, L: {delay}}}, sample: zoh, "
@@ -28,37 +28,37 @@ def model_of(words, delay, colour=""):
     return build_model(parse_spec(text, design=False))
 
 
-def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
+def cut_out(delay, seed, *, colour=0.0, before=BEFORE, samples=N):
     """u, y of a running experiment; the plant by its closed form behind a hold, the noise through 1/D.
 
     Args:
         before: samples that nobody recorded; 0: from rest.
     """
     rng = np.random.default_rng(seed)
-    u = np.repeat(rng.choice([-1.0, 1.0], (N + before) // 5), 5)
+    u = np.repeat(rng.choice([-1.0, 1.0], (samples + before) // 5), 5)
     whole, rest = divmod(delay, 1.0)
     pole, early = np.exp(-1.0 / LAG), 1.0 - np.exp(-(1.0 - rest) / LAG)
     B = np.concatenate([np.zeros(int(whole) + 1), GAIN * np.array([early, 1.0 - pole - early])])
-    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(N + before))
+    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(samples + before))
     y = scipy.signal.lfilter(B, [1.0, -pole], u) + noise
     return u[before:, None], y[before:, None]
 
 
 @pytest.mark.parametrize(
-    ("words", "delay", "records"),
+    ("words", "delay", "records", "samples"),
     [
-        (IN_S, 0.4, 1),
+        (IN_S, 0.4, 1, 300),
         *(
-            pytest.param(*one, 3, marks=pytest.mark.slow)
+            pytest.param(*one, 3, N, marks=pytest.mark.slow)
             for one in ((IN_S, 0.4), (IN_S, 12.3), (IN_STATES, 0.4), (IN_STATES, 12.3))
         ),
     ],
 )
-def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay, records):
+def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay, records, samples):
     """The first dead time of the record holds what nobody recorded."""
     model, failed, deviations, variances = model_of(words, delay), 0, [], []
     for seed in range(records):
-        found = identify(model, *cut_out(delay, seed), start=model.theta)
+        found = identify(model, *cut_out(delay, seed, samples=samples), start=model.theta)
         failed += bool(found.tests.failed)
         deviations.append((found.theta - model.theta) / np.sqrt(np.diag(found.covariance)))
         variances.append(found.noise[0, 0])
@@ -152,7 +152,7 @@ def segmented(length, seed, *, colour=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("colour", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("colour", [0.0, 0.4])
 @pytest.mark.parametrize("length", [20, 150])
 def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
     """Unknown starts take their share of residuals away, which alone correlates them."""
@@ -243,7 +243,7 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.
 
@@ -260,15 +260,9 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))
 
 
-@pytest.mark.parametrize(
-    ("words", "colour"),
-    [
-        (IN_FUNCTIONS, ""),
-        pytest.param(IN_FUNCTIONS, COLOUR, marks=pytest.mark.slow),
-        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((IN_S, COLOUR), (IN_STATES, COLOUR))),
-        *(pytest.param(one, "", marks=pytest.mark.slow) for one in (IN_STATES, IN_S)),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("colour", ["", COLOUR])
+@pytest.mark.parametrize("words", [IN_S, IN_STATES, IN_FUNCTIONS])
 def test_a_line_through_the_outputs_changes_no_estimate_that_knows_of_it(words, colour):
     """With a slope of 0.004 a sample it is the one without; what does not know of it is far off."""
     u, y = cut_out(0.4, 7, colour=0.4 if colour else 0.0)

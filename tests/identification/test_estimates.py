@@ -5,13 +5,9 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.stability import is_stable, reflected
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.spectrum import FirBasis
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 
 
@@ -54,13 +50,6 @@ def test_prediction_errors_at_the_truth_are_the_noise(name):
     np.testing.assert_allclose(errors, e, atol=1e-10)
 
 
-def theory(name, samples):
-    """M of unit white input, from the frequency domain."""
-    experiment = Experiment(SYSTEMS[name], samples)
-    maps = FirBasis(1, 0).integrals(experiment.information_density, experiment.singularities)
-    return experiment.baseline_information + maps[0]
-
-
 def test_arx_is_least_squares():
     u, y = data("arx", 300, np.random.default_rng(1))
     found = identify(SYSTEMS["arx"], u[0], y[0])
@@ -73,22 +62,6 @@ def test_arx_is_least_squares():
     variance = residual @ residual / (300 - 4)
     assert found.noise[0, 0] == pytest.approx(variance, rel=1e-9)
     np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(phi.T @ phi), rtol=1e-7)
-
-
-@pytest.mark.first(3)
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_known_parameters_are_recovered_without_a_start(name):
-    model = SYSTEMS[name]
-    u, y = data(name, 4000, np.random.default_rng(4))
-    found = identify(model, u[0], y[0])
-    assert found.search.converged
-    off, size = found.theta - model.theta, model.theta.size
-    # Mahalanobis distance: chi-squared with k degrees of freedom.
-    assert off @ np.linalg.solve(found.covariance, off) < size + 6 * np.sqrt(2 * size)
-    assert found.noise[0, 0] == pytest.approx(0.5, rel=0.1)
-    assert found.tests.whiteness.probability > 1e-3
-    assert found.tests.independence.probability > 1e-3
-    np.testing.assert_allclose(found.information, theory(name, 4000), atol=0.15 * theory(name, 4000).max())
 
 
 @pytest.mark.parametrize("name", ["armax", "oe", "bj"])
@@ -106,21 +79,6 @@ def test_a_batch_finds_what_a_plain_optimiser_finds(name):
             gtol=1e-12,
         )
         np.testing.assert_allclose(found.theta[run], plain.x, atol=1e-6)
-
-
-def test_runs_of_a_batch_do_not_see_each_other():
-    model = SYSTEMS["bj"]
-    u, y = data("bj", 200, np.random.default_rng(6), runs=40)
-    together = fit_batch(model, u, y, start=model.theta)
-    alone = fit_batch(model, u[7:8], y[7:8], start=model.theta)
-    np.testing.assert_allclose(together.theta[7], alone.theta[0], atol=1e-7)
-
-
-def test_a_model_that_is_too_small_fails_the_residual_tests():
-    u, y = data("bj", 2000, np.random.default_rng(7))
-    small = identify(one_channel([0, 1], F=[1, 0]), u[0], y[0])
-    assert small.tests.whiteness.probability < 1e-6
-    assert small.tests.independence.probability < 1e-6
 
 
 @pytest.mark.slow
@@ -167,39 +125,3 @@ def test_mirrored_polynomials_are_stable():
     expected = [np.abs(np.roots(p)).max() < 1 for p in monic]
     np.testing.assert_array_equal(is_stable(monic), expected)
     assert np.all(is_stable(np.array([reflected(p) for p in monic])))
-
-
-@pytest.mark.parametrize(
-    ("change", "code"),
-    [
-        (lambda u, y: (u[:8], y[:8]), "too-few-samples"),
-        (lambda u, y: (np.full_like(u, 2.0), y), "constant-input"),
-        (lambda u, y: (u, np.full_like(y, 2.0)), "constant-output"),
-        (lambda u, y: (np.concatenate([[[0.0]], -0.3 * y[:-1]]), y), "not-exciting"),
-    ],
-)
-def test_bad_data_is_refused(change, code):
-    # Feedback without excitation, u(t) = -0.3 y(t - 1), makes b1 u(t - 1) a part of a2 y(t - 2).
-    u, y = data("oe", 300, np.random.default_rng(10))
-    with pytest.raises(SpecError) as caught:
-        identify(one_channel([0, 1], A=[1, 0, 0]), *change(u[0], y[0]))
-    assert caught.value.diagnostics[0].code == code
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["arx", "armax", "oe", "bj"])
-def test_estimates_reach_the_cramer_rao_bound(name):
-    model = SYSTEMS[name]
-    u, y = data(name, 5000, np.random.default_rng(11), runs=500)
-    found = fit_batch(model, u, y, start=model.theta)
-    assert np.all(found.converged)
-    information = theory(name, 5000)
-    off = found.theta - model.theta
-    # The mean square in units of the bound, over all directions: its own error is sqrt(2 / (500 k)).
-    whitened = off @ np.linalg.cholesky(information)
-    assert np.sqrt(np.mean(whitened**2)) == pytest.approx(1.0, abs=0.05)
-    eigenvalues = whitened_eigenvalues(found.theta, information)
-    low, high = wishart_range(model.theta.size, 500, np.random.default_rng(12))
-    assert low < eigenvalues.min() <= eigenvalues.max() < high
-    # Each run's own covariance is that of theory, too.
-    np.testing.assert_allclose(found.information.mean(axis=0), information, atol=0.01 * information.max())

@@ -65,7 +65,7 @@ def ours(model, parts, *, free):
     records = Records(estimator(model, 1.0), tuple((u[:, None], y[:, None]) for u, y in parts))
     records = records.begun_freely(0) if free else records
     point = evaluate(records, model.theta)
-    return point.near.freedom * np.log(point.cost), records, point
+    return point.freedom * np.log(point.cost), records, point
 
 
 @pytest.mark.parametrize("lengths", [(N,), (30, N, 24)])

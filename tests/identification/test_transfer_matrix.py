@@ -248,17 +248,6 @@ def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
 
 
 @pytest.mark.slow
-@HOLDS
-def test_few_runs_from_the_nominal_start_reach_the_bound(hold):
-    u = excitation(400, 2, np.random.default_rng(17))
-    correlated = np.array([[1.0, 0.9], [0.9, 1.0]])
-    by_parameter, overall, _ = efficiency(u, 40, hold=hold, level=0.1, covariance=correlated)
-    # The mean square of 40 x 12 normal variables has a relative error of 0.065.
-    assert overall == pytest.approx(1.0, abs=0.13)
-    assert 0.8 < np.median(by_parameter) < 1.2
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("criterion", "level", "covariance"),
     [("D", 0.1, None), ("D", 0.5, 0.9), ("E", 0.1, None), ("E", 0.1, 0.9)],

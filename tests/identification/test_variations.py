@@ -8,8 +8,7 @@ import scipy.stats
 from inputdesign_cli.identification import Moves, identify, that_matter
 from inputdesign_cli.levels import level
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.plants import arx
-from tests.support.records import shifted, simulated
+from tests.support.records import shifted
 
 
 def varying(found):
@@ -169,19 +168,6 @@ def test_how_such_a_plant_moves_g_is_told_of_both_ways():
     # A line in u, of the same slope both ways, was taken off.
     assert np.std((rises - falls) / expected) < 1e-6 * np.abs(np.mean((rises - falls) / expected))
     assert np.std((rises + falls) / lag[0]) < 1e-4 * max(np.abs(np.mean((rises + falls) / lag[0])), 1e-12)
-
-
-@pytest.mark.slow
-def test_probabilities_of_right_models_are_uniform():
-    rng = np.random.default_rng(4)
-    u, y = data("bj", 300, rng, runs=12)
-    found = [identify(SYSTEMS["bj"], u[i], y[i], start=SYSTEMS["bj"].theta, rest=True) for i in range(12)]
-    for name in varying(found[0]):
-        assert scipy.stats.kstest([varying(f)[name].test.probability for f in found], "uniform").pvalue > 1e-3
-    u, y = simulated(arx(), 300, rng, 8)
-    found = [identify(arx(), u[i], y[i], start=arx().theta, rest=True) for i in range(8)]
-    below = [one.test.probability < 0.05 for f in found for one in varying(f).values()]
-    assert scipy.stats.binomtest(sum(below), len(below), 0.05).pvalue > 1e-3
 
 
 def test_what_matters_shares_a_level_among_its_like():

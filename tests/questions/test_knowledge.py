@@ -64,7 +64,7 @@ def test_the_likeliest_of_all_is_not_taken_where_the_plant_cannot_be_that(tmp_pa
 
 def test_knowledge_that_the_data_refute_rules_nothing_out(tmp_path):
     wrong = ["plant.parameters.L=100", "uncertainty={intervals: {L: [95, 105]}, scenarios: 3, fresh: 0}"]
-    path, _ = record(5, tmp_path)
+    path, _ = record(6, tmp_path)
     identification = identify(heater(*wrong), path).result["identification"]
     assert "ruled_out" not in identification
     assert identification["rivals"]

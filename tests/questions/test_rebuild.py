@@ -18,7 +18,7 @@ KNOWN = "uncertainty={intervals: {b1: [3, 4]}, scenarios: 10, fresh: 0}"
 
 
 def rebuilt(change, *overrides, theta=None):
-    spec = parse_spec(SPEC, overrides=[KNOWN, *overrides])
+    spec = parse_spec(SPEC, overrides=[KNOWN, "solver.any_spectrum=true", *overrides])
     model = None if theta is None else build_model(spec).at(np.array(theta), np.array([[1.2]]))
     return Rebuild(spec, lambda spec: spec).at(model, change)
 

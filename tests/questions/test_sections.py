@@ -48,6 +48,7 @@ OTHER = {
     "solver": "{any_spectrum: true}",
     "simulation": "{runs: 3, seed: 3}",
     "report": "{ellipses: [[b1, f1]]}",
+    "figures": "{width: column}",
     "sweep": "{set: {noise.variance: [1, 2]}}",
 }
 # Where those would not count, or take long.

@@ -156,6 +156,7 @@ def test_the_unit_of_a_column_counts_however_it_is_named(column, log):
     assert codes(seconds) == ["unit-not-converted"]
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize(
     ("one", "other", "same"),
     [

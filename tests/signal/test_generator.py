@@ -12,10 +12,9 @@ from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.signal.multisine import gaussian_record
 from inputdesign_cli.signal.selection import best_record
 from inputdesign_cli.signal.settings import SignalSettings
-from inputdesign_cli.signal.spectral_factor import autocorrelation
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from tests.support.signals import COLOURED, block_spectrum, of_two_inputs
 
-COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
 KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "steps"]
 
 
@@ -23,21 +22,12 @@ def rng(seed=0):
     return np.random.default_rng(seed)
 
 
-def density(w):
-    """A moving average of three taps at each of two inputs, correlated with a phase that turns."""
-    phi = np.zeros((w.size, 2, 2), dtype=complex)
-    for tap, phase in ((1.0, 0), (0.5, 1)):
-        h = tap * np.exp(-1j * np.outer(w, [phase, 2 * phase])) @ np.array([[1.0, 0.2], [0.4, 3.0]])
-        phi += h[:, :, None] * h[:, None, :].conj()
-    return phi + 0.2 * np.eye(2)
-
-
 def one_input(w):
     return FirBasis(1, 3).density(COLOURED, w)
 
 
 LINES = np.array([0.2, 0.9])
-TWO = DesignedSpectrum(2, 13.58, density=density)
+TWO = DesignedSpectrum(2, 13.58, density=of_two_inputs)
 SPECTRA = {
     "moving average": DesignedSpectrum.of(FirBasis(1, 3), COLOURED),
     "density": DesignedSpectrum(1, COLOURED[0], density=one_input),
@@ -49,13 +39,6 @@ SPECTRA = {
 
 def generator(spectrum, samples=240, **settings):
     return SignalGenerator(SPECTRA[spectrum], SignalSettings(**settings), samples)
-
-
-def block_spectrum(record, blocks):
-    """The mean over blocks of the matrix periodogram (n, r, r)."""
-    period = len(record) // blocks
-    X = np.fft.rfft(record.reshape(blocks, period, -1), axis=1) / np.sqrt(period)
-    return np.einsum("bni,bnj->nij", X, X.conj()) / blocks
 
 
 @pytest.mark.parametrize("method", KINDS)
@@ -115,7 +98,7 @@ def test_gaussian_noise_has_the_spectrum_on_average():
     lines, draws = TWO.lines(24), 4000
     generator = rng()
     X = np.array([block_spectrum(gaussian_record(lines, generator), 1) for _ in range(draws)])
-    wanted = density(2 * np.pi * np.arange(13) / 24)
+    wanted = of_two_inputs(2 * np.pi * np.arange(13) / 24)
     wanted[[0, -1]] = wanted[[0, -1]].real
     error = X.std(axis=0) / np.sqrt(draws)
     assert np.all(np.abs(X.mean(axis=0) - wanted) < 5 * error + 1e-12)

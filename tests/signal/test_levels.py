@@ -10,40 +10,16 @@ from inputdesign_cli.signal.multisine import multisine_record
 from inputdesign_cli.signal.prbs import pseudo_random, register_length
 from inputdesign_cli.signal.settings import Quantiser
 from inputdesign_cli.signal.sinusoids import select
-from inputdesign_cli.signal.spectral_factor import autocorrelation
 from inputdesign_cli.spectrum import FirBasis
-
-COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
+from tests.support.signals import COLOURED, block_spectrum, of_two_inputs, periodogram
 
 
 def rng(seed=0):
     return np.random.default_rng(seed)
 
 
-def periodogram(x):
-    power = np.abs(np.fft.rfft(x) / x.size) ** 2
-    power[1 : (x.size + 1) // 2] *= 2
-    return power
-
-
-def density(w):
-    """A moving average of three taps at each of two inputs, correlated with a phase that turns."""
-    phi = np.zeros((w.size, 2, 2), dtype=complex)
-    for tap, phase in ((1.0, 0), (0.5, 1)):
-        h = tap * np.exp(-1j * np.outer(w, [phase, 2 * phase])) @ np.array([[1.0, 0.2], [0.4, 3.0]])
-        phi += h[:, :, None] * h[:, None, :].conj()
-    return phi + 0.2 * np.eye(2)
-
-
 def design(period):
-    return grid_lines(density(2 * np.pi * np.arange(period // 2 + 1) / period), period, 1.0)
-
-
-def block_spectrum(record, blocks):
-    """The mean over blocks of the matrix periodogram (n, r, r)."""
-    period = len(record) // blocks
-    X = np.fft.rfft(record.reshape(blocks, period, -1), axis=1) / np.sqrt(period)
-    return np.einsum("bni,bnj->nij", X, X.conj()) / blocks
+    return grid_lines(of_two_inputs(2 * np.pi * np.arange(period // 2 + 1) / period), period, 1.0)
 
 
 @pytest.mark.parametrize(("kind", "values"), [("binary", {-1.0, 1.0}), ("ternary", {-1.0, 0.0, 1.0})])
@@ -76,7 +52,7 @@ def test_few_levels_at_several_inputs(kind, number, samples):
     assert record.shape == (samples, 2)
     assert all(np.unique(column).size == number for column in record.T)
     np.testing.assert_allclose(np.mean(record[:480] ** 2, axis=0), lines.mean_squares, rtol=0.01)
-    wanted = density(2 * np.pi * np.arange(121) / 240)
+    wanted = of_two_inputs(2 * np.pi * np.arange(121) / 240)
 
     def error(x):
         return np.linalg.norm(block_spectrum(x[:480], 2) - wanted) / np.linalg.norm(wanted)

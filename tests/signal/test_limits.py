@@ -15,6 +15,7 @@ from inputdesign_cli.signal.selection import best_record
 from inputdesign_cli.signal.settings import Quantiser, SignalSettings
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.plants import arx
+from tests.support.signals import of_two_inputs
 
 COLOURED = np.array([1.0, 0.7, 0.3])
 
@@ -94,16 +95,10 @@ TARGET = Target(lambda M: float(np.sqrt(0.45 / np.linalg.eigvalsh(M)[0])), meets
 """A condition on the information in white coordinates: its least eigenvalue is at least 0.45."""
 
 
-def two_inputs(w):
-    """A moving average of two taps at each of two inputs, correlated with a phase that turns."""
-    phi = np.zeros((w.size, 2, 2), dtype=complex)
-    for tap, phase in ((1.0, 0), (0.5, 1)):
-        h = tap * np.exp(-1j * np.outer(w, [phase, 2 * phase])) @ np.array([[1.0, 0.2], [0.4, 3.0]])
-        phi += h[:, :, None] * h[:, None, :].conj()
-    return phi + 0.2 * np.eye(2)
-
-
-SPECTRA = {1: DesignedSpectrum.of(FirBasis(1, 2), COLOURED), 2: DesignedSpectrum(2, 13.1, density=two_inputs)}
+SPECTRA = {
+    1: DesignedSpectrum.of(FirBasis(1, 2), COLOURED),
+    2: DesignedSpectrum(2, 13.1, density=of_two_inputs),
+}
 SETTINGS = {
     "noise": {},
     "random": {"method": "multisine", "phases": "random"},

@@ -14,18 +14,13 @@ from inputdesign_cli.signal.phases import crest_factor, low_peak_phases, optimis
 from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.signal.sinusoids import Sinusoids
 from inputdesign_cli.spectrum import LinesBasis
+from tests.support.signals import periodogram
 
 
 def flat(lines, samples):
     power = np.zeros(samples // 2 + 1)
     power[1 : lines + 1] = 1.0 / lines
     return Sinusoids.on_grid(power, samples)
-
-
-def periodogram(x):
-    power = np.abs(np.fft.rfft(x) / x.size) ** 2
-    power[1 : (x.size + 1) // 2] *= 2
-    return power
 
 
 def rng(seed=0):

@@ -1,10 +1,7 @@
 """Questions that are asked one by one: a bad answer is told at once and asked again, and no other."""
 
-import numpy as np
 import pytest
 
-from inputdesign_cli import questions
-from inputdesign_cli.errors import OutputError
 from inputdesign_cli.wizard import composing
 from inputdesign_cli.wizard.composing import Conversation
 from inputdesign_cli.wizard.questions import KEYS
@@ -78,24 +75,6 @@ def test_a_plant_is_understood_once(tmp_path, monkeypatch):
     monkeypatch.setattr(composing, "understand_plant", lambda *a: (seen.append(a[0]), real(*a))[1])
     answered(Conversation({}, "x", tmp_path))
     assert seen == [GOOD["plant"]]
-
-
-@pytest.mark.slow
-def test_a_step_response_stands_beside_the_spec(tmp_path):
-    t = 5.0 * np.arange(400)
-    y = 20 + 20 * np.where(t > 1025, 1 - np.exp(-(t - 1025) / 180), 0)
-    y = y + 0.2 * np.random.default_rng(2).standard_normal(400)
-    u = np.where(t >= 1000, 50.0, 40.0)
-    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), u.tolist(), y.tolist(), strict=True)]
-    (tmp_path / "step.csv").write_text("\n".join(["time,u,y", *rows]))
-    talk = answered(Conversation({"plant": "step step.csv"}, "x", tmp_path))
-    assert (tmp_path / "x-model.yaml").is_file()
-    questions.validate(talk.draft.spec())
-    talk = answered(Conversation({"plant": "step step.csv"}, "x", tmp_path), "converter")
-    (tmp_path / "x-model.yaml").unlink()
-    (tmp_path / "x-model.yaml").mkdir()
-    with pytest.raises(OutputError):  # no other answer would help
-        talk.answer("no")
 
 
 def test_of_a_log_the_noise_is_not_asked(tmp_path):

@@ -8,7 +8,6 @@ import pytest
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.questions import in_their_words
 from inputdesign_cli.wizard.solving import lasting, to_log, verdict
 from inputdesign_cli.wizard.wishes import input_range
 from tests.wizard.test_wizard import ENGINEER
@@ -167,31 +166,12 @@ def test_the_column_is_told_once_what_can_be_done():
         compose({**ENGINEER, "plant": "column", "loop": "PI Kp 1, Ti 60"}, "x", Path())
 
 
-def test_nothing_is_said_twice():
-    """Blocks of answers may stand inside each other."""
-    error = SpecError.because("wrong-shape", "the controller has one channel", "", "accuracy.loop")
-    with pytest.raises(SpecError) as caught, in_their_words({}), in_their_words({}):
-        raise error
-    assert str(caught.value.diagnostics[0].message).count("What is the model for?") == 1
-
-
 @pytest.mark.parametrize(
     "text", ["5 % around 40 %", "5 around 40", "plus/minus 5 around 40", "± 5 % around 40 %", "35 to 45"]
 )
 def test_ranges_in_many_words(text):
     span = input_range(text)
     assert (span.amplitude, span.offset) == (5.0, 40.0)
-
-
-def test_what_is_enough_is_said_of_the_plants_that_it_is_enough_for():
-    spec = compose(ENGINEER, "x", Path()).spec()
-    fresh = {"draws": 200, "missed": 6, "largest": 1.6}
-    result = {"samples": 720, "signal": {"worst_ratio": 0.9}, "robust": {"scenarios": 30, "fresh": fresh}}
-    answer = {"signal": {"worst_ratio": 2.0}, "samples": 0}
-    first = verdict(spec, result, lambda changed: answer)[0]
-    assert "but not at every one within what you said of it" in first
-    fresh["largest"] = 1.05
-    assert "is enough:" in verdict(spec, result, lambda changed: answer)[0]
 
 
 def test_what_is_not_used_for_a_bode_plot_is_said():

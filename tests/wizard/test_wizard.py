@@ -118,20 +118,6 @@ def test_a_system_of_python_control_comes_as_a_file(tmp_path):
     assert draft.spec().sample_time == 5.0
 
 
-def test_what_is_told_was_designed():
-    spec = compose(ENGINEER, "x", Path()).spec()
-
-    def solve(changed):
-        ratio = 0.5 * np.sqrt(720 / changed.experiment.samples)
-        return {"signal": {"worst_ratio": ratio, "samples": changed.experiment.samples}, "samples": 0}
-
-    result = {"samples": 720, "signal": {"worst_ratio": 0.5}}
-    first, second = verdict(spec, result, solve)
-    assert "60 min at plus/minus 5 is enough" in first
-    assert f"{lasting(5 * 199)} would do" in second
-    assert "not enough" in verdict(spec, {"samples": 720, "signal": {"worst_ratio": 1.5}}, solve)[0]
-
-
 def test_a_length_that_does_is_found_where_the_error_does_not_fall_with_its_root():
     """Records that are shorter than the plant is slow tell far less, or cannot be designed."""
     spec, tried = compose(ENGINEER, "x", Path()).spec(), []

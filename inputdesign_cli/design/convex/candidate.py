@@ -26,7 +26,7 @@ _MIXINGS = 12
 
 @dataclass(frozen=True)
 class Candidate:
-    """A feasible design: z (size,), s, M' (S, k, k) of every scenario and the objective (the cost, or s).
+    """A feasible design: z (size,), s, M' (S, k, k) of every scenario, and the objective (the cost, or s).
 
     The spectrum is z / s; goals without s have s = 1.
     """
@@ -38,7 +38,7 @@ class Candidate:
 
 
 def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
-    """The candidate with these unknowns, whatever it meets."""
+    """Return the candidate with these unknowns, whether or not it meets the requirements."""
     informations = problem.fixed_information + problem.excited(z)
     if problem.scaled:
         informations = informations + s * problem.scaled_information
@@ -46,7 +46,7 @@ def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
 
 
 def least_scale(problem: Problem, z: Array) -> float:
-    """The least s for which z keeps to its upper limits."""
+    """Return the least s for which z keeps to its upper limits."""
     used = [
         functional.at(z) / limit.bound
         for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True)
@@ -60,7 +60,7 @@ def least_scale(problem: Problem, z: Array) -> float:
 
 
 def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> Candidate:
-    """z times the smallest factor that meets every requirement (s with it), found by the secant method.
+    """Scale z (and s) by the smallest factor that meets every requirement, found by the secant method.
 
     The search looks at `places` (requirement, frequency) only; the full check follows, and adds to them.
     """
@@ -86,7 +86,7 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
 
 
 def missing_floor(problem: Problem, z: Array) -> float:
-    """The factor by which z must grow to reach its lower limits (below one: it exceeds them)."""
+    """Return the factor by which z must grow to reach its lower limits (below one: it exceeds them)."""
     shares = [
         limit.bound / functional.at(z)
         for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True)
@@ -124,7 +124,7 @@ def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], facto
 
 
 def excess(problem: Problem, candidate: Candidate) -> float:
-    """How far the worst condition is missed, negative when all are met: requirements and limits alike."""
+    """Return the largest violation of requirements and limits, negative when all are met."""
     z, s, informations = candidate.z, candidate.s, candidate.informations
     try:
         ratios = [v.ratio**2 for _, v in problem.demands.violations(informations)]
@@ -142,7 +142,7 @@ def excess(problem: Problem, candidate: Candidate) -> float:
 
 
 def mixed(problem: Problem, z: Array, s: float, interior: Candidate) -> Candidate:
-    """The design nearest to (z, s) on the way to the strictly feasible `interior` that meets everything."""
+    """Return the feasible design nearest to (z, s) on the line to the strictly feasible `interior`."""
 
     def at(share: float) -> Candidate:
         return candidate_at(problem, z + share * (interior.z - z), s + share * (interior.s - s))

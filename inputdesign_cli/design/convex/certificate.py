@@ -7,8 +7,8 @@ for the goal "cost",
 
     cost(z) >= t (sum r - sum_s tr(Y_s M0_s) + sum_lower w b) - sum_upper w b
 
-(where the largest of several costs is paid, a mean of them with weights mu >= 0 of the sum one stands for the
-cost, which is no less)
+(for the largest of several costs, "cost" is their mean with weights mu >= 0 of the sum one, which is never
+larger than the largest)
 
 and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0, with the
 sum over the scenarios understood,
@@ -45,13 +45,13 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class Certificate:
-    """A proved lower bound on the objective, and the dual point that proves it.
+    """Holds a proved lower bound on the objective, and the dual point that proves it.
 
-    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that
-    price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
-    the spectra for which that is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of
-    which the largest is paid. `form` (m, r, r) is the part of the price that limits on the amplitude have,
-    a form of the lags of the excitation; signals within the amplitude take at most `form_share` of it.
+    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
+    on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
+    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of which the
+    largest is paid. `form` (m, r, r) is the part of the price that limits on the amplitude have, a form of the
+    lags of the excitation; signals within the amplitude take at most `form_share` of it.
     """
 
     bound: float
@@ -66,14 +66,14 @@ class Certificate:
 
     @property
     def shares(self) -> Array:
-        """(S,): the part that each scenario takes in the proof, by what it requires or by what it costs."""
+        """Return the part (S,) that each scenario takes in the proof, by its requirements or by its cost."""
         required = np.trace(self.weights, axis1=1, axis2=2)
         shares = required / max(float(required.sum()), _TINY)
         return np.maximum(shares, self.costs) if self.costs.size > 1 else shares
 
 
 def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certificate:
-    """The bound that these multipliers prove for the spectra of the problem.
+    """Prove a lower bound with these multipliers for the spectra of the problem.
 
     Args:
         rows: the limits that the weights `proof.rows` belong to.

@@ -23,7 +23,7 @@ _TOGETHER, _MOST_PAIRS = 4, 1 << 23
 
 
 class Entries:
-    """The entries of symmetric matrices (k, k) that are not zero throughout, as svec scales them, then s.
+    """Holds the entries of symmetric matrices (k, k) that are not zero throughout, scaled as in svec, then s.
 
     Matrices that fall into blocks keep few: products of all pairs of entries, which is what the linear system
     costs, then concern the blocks alone.
@@ -36,25 +36,25 @@ class Entries:
 
     @property
     def size(self) -> int:
-        """Number of unknowns that M-blocks see."""
+        """Return the number of unknowns that M-blocks see."""
         return self.kept.size + int(self.with_s)
 
     def matrix(self, at: Array) -> Array:
-        """(k, k) from the entries."""
+        """Build the matrix (k, k) from the entries."""
         found = np.zeros((self.order, self.order))
         values = at[: self.kept.size] / self.scale
         found[self.rows, self.columns] = found[self.columns, self.rows] = values
         return found
 
     def vector(self, matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(.., size) of symmetric matrices (.., k, k), zero for s."""
+        """Return the entries (.., size) of symmetric matrices (.., k, k), with zero for s."""
         values = matrices[..., self.rows, self.columns] * self.scale
         if not self.with_s:
             return values
         return np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
 
     def products(self, left: Stack, right: Stack) -> Array:
-        """(kept, kept): X -> sum over the stacks of (L X R + R X L) / 2, L and R symmetric (number, k, k)."""
+        """Return X -> sum of (L X R + R X L) / 2 as (kept, kept), L and R symmetric (number, k, k)."""
         i, j, k = self.rows, self.columns, self.order
         if len(left) >= _TOGETHER and k**4 <= _MOST_PAIRS:
             # pairs[a k + c, b k + d] = sum L_ac R_bd
@@ -74,7 +74,7 @@ class Entries:
         return total
 
     def _product(self, one: Array, first: NDArray[np.intp], other: Array, second: NDArray[np.intp]) -> Array:
-        """Columns `first` of one times columns `second` of the other, in room that is used again."""
+        """Multiply columns `first` of one by columns `second` of the other, in memory that is used again."""
         left, right = self._room
         np.take(one, first, axis=1, out=left, mode="clip")
         np.take(other, second, axis=1, out=right, mode="clip")
@@ -83,7 +83,7 @@ class Entries:
 
     @cached_property
     def _places(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-        """Where the pairs (i i', j j'), (j j', i i') and (i j', j i') stand."""
+        """Return the places of the pairs (i i', j j'), (j j', i i') and (i j', j i')."""
         i, j, k = self.rows, self.columns, self.order
         above, below = i[:, None] * k + i, j[:, None] * k + j
         return above * k**2 + below, below * k**2 + above, (i[:, None] * k + j) * k**2 + j[:, None] * k + i
@@ -98,7 +98,7 @@ class Entries:
 
 
 class Cone(ABC):
-    """One block with slack S and multiplier Z, and the step dS and dZ of both.
+    """A conic block with slack S and multiplier Z, and the step dS and dZ of both.
 
     `degree` is the number of its complementarity products; `curved` where S is not linear.
     """
@@ -112,7 +112,7 @@ class Cone(ABC):
 
     @property
     def gap(self) -> float:
-        """<S, Z>."""
+        """Return the duality gap <S, Z> of the block."""
         return float(np.sum(self.S * self.Z))
 
     @abstractmethod
@@ -125,7 +125,7 @@ class Cone(ABC):
 
     @abstractmethod
     def pull(self) -> Array:
-        """A^T Z: the weight of the multipliers on the unknowns."""
+        """Return A^T Z, the weight of the multipliers on the unknowns."""
 
     @abstractmethod
     def add_to(self, matrix: Array) -> None:
@@ -133,7 +133,7 @@ class Cone(ABC):
 
     @abstractmethod
     def push(self, target: float, *, corrected: bool) -> Array:
-        """A^T (target S^-1 - Z miss S^-1 - corrector)."""
+        """Return A^T (target S^-1 - Z miss S^-1 - corrector)."""
 
     @abstractmethod
     def turn(self, step: Array) -> None:
@@ -141,14 +141,14 @@ class Cone(ABC):
 
     @abstractmethod
     def lengths(self) -> tuple[float, float]:
-        """How far along dS and dZ the cone reaches, at most one."""
+        """Return the largest step lengths along dS and dZ that stay in the cone, at most one."""
 
     def gap_after(self, up: float, down: float) -> float:
-        """<S + up dS, Z + down dZ>."""
+        """Return the duality gap <S + up dS, Z + down dZ> after a step."""
         return float(np.sum((self.S + up * self.dS) * (self.Z + down * self.dZ)))
 
     def move(self, up: float, down: float) -> None:
-        """Take the step."""
+        """Move S and Z along dS and dZ by these lengths."""
         self.S = self.S + up * self.dS
         self.Z = self.Z + down * self.dZ
 
@@ -158,7 +158,7 @@ class Cone(ABC):
 
 
 class Orthant(Cone):
-    """offset + rows a >= 0, `rows` (l, number of unknowns)."""
+    """The linear inequalities offset + rows a >= 0, `rows` (l, number of unknowns)."""
 
     def __init__(self, rows: Array, offset: Array, slack: Array, weight: Array) -> None:
         self.rows, self.offset, self.S, self.Z = rows, offset, slack, weight
@@ -193,12 +193,12 @@ class Orthant(Cone):
         return reach(self.S, self.dS), reach(self.Z, self.dZ)
 
     def multipliers(self) -> list[Array]:
-        """All in one."""
+        """Return the multipliers of all inequalities as one array."""
         return [self.Z]
 
 
 class Atoms(Orthant):
-    """The first unknowns are nonnegative themselves, and are the slack."""
+    """The sign constraint on the first unknowns, which are nonnegative and are the slack."""
 
     def __init__(self, start: Array, weight: Array) -> None:
         super().__init__(np.zeros((0, 0)), np.zeros(0), start, weight)
@@ -229,7 +229,7 @@ class Atoms(Orthant):
 
 
 class Semidefinite(Cone):
-    """Matrices S_b >= 0 of one order d, with what all kinds of them share; `S` and `Z` are (number, d, d)."""
+    """Matrices S_b >= 0 of one order d, with what all their kinds share; `S` and `Z` are (number, d, d)."""
 
     def __init__(self, number: int, order: int, slack: float, weight: float) -> None:
         self.degree = number * order
@@ -238,24 +238,24 @@ class Semidefinite(Cone):
         self.dS, self.dZ = np.zeros_like(self.S), np.zeros_like(self.Z)
 
     def factor(self) -> None:
-        """Inverses of S and of the Cholesky factors."""
+        """Compute the inverses of S and of its Cholesky factors."""
         self.root = np.linalg.inv(np.linalg.cholesky(self.S))
         self.inverse = self.root.swapaxes(1, 2) @ self.root
         self.dual_root = np.linalg.inv(np.linalg.cholesky(self.Z))
 
     def scaled(self, X: Stack) -> Stack:
-        """Z X S^-1, made symmetric."""
+        """Return Z X S^-1, made symmetric."""
         return symmetric(self.Z @ X @ self.inverse)
 
     def aimed(self, target: float, *, corrected: bool) -> Stack:
-        """target S^-1 - corrector."""
+        """Return target S^-1 - corrector."""
         self.aim = target * self.inverse
         if corrected:
             self.aim = self.aim - symmetric(self.dZ @ self.dS @ self.inverse)
         return self.aim
 
     def answer(self, dS: Stack) -> None:
-        """dZ for this dS."""
+        """Return dZ for this dS."""
         self.dS = dS
         self.dZ = self.aim - self.Z - self.scaled(dS)
 
@@ -265,7 +265,7 @@ class Semidefinite(Cone):
         return up, furthest(self.dual_root @ self.dZ @ self.dual_root.swapaxes(1, 2))
 
     def multipliers(self) -> list[Array]:
-        """Z, one matrix each."""
+        """Return the multipliers Z, one matrix each."""
         return list(self.Z)
 
 
@@ -305,12 +305,12 @@ class Gram(Semidefinite):
 
 
 def symmetric(X: Stack) -> Stack:
-    """The symmetric parts."""
+    """Return the symmetric parts."""
     return 0.5 * (X + X.swapaxes(1, 2))
 
 
 def reach(values: Array, steps: Array) -> float:
-    """The largest share of the steps that keeps the values positive."""
+    """Return the largest share of the steps that keeps the values positive."""
     least = float(np.min(steps / values, initial=0.0))
     return -1.0 / least if least < 0.0 else np.inf
 

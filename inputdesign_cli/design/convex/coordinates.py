@@ -31,9 +31,9 @@ _UNSUITED = 1e8  # a condition beyond which coordinates do not suit
 
 
 def white_power(question: Question) -> float:
-    """The power of white excitation that answers the question at the nominal plant, 0 where none is needed.
+    """Return the white power that answers the question at the nominal plant, 0 where none is needed.
 
-    Where the nominal plant needs none it is that of the first scenario that does.
+    Where the nominal plant needs none, the first scenario that needs power sets it.
     """
     if question.goal == "cost":
         powers = (least_white_power(one.experiment, one.requirements) for one in question.plants)
@@ -48,7 +48,7 @@ def white_power(question: Question) -> float:
 
 
 def balanced_powers(question: Question, power: float) -> Array:
-    """The powers (r,) of the inputs that take equal shares of the price of white excitation.
+    """Return the powers (r,) of the inputs that take equal shares of the price of white excitation.
 
     Where the units of the inputs differ, so do their prices or limits: an excitation even over the
     inputs would then be a poor start, and its information matrix a poor measure. One input has `power`.
@@ -66,13 +66,13 @@ def balanced_powers(question: Question, power: float) -> Array:
 
 
 def whitened_problem(question: Question, powers: Array) -> Problem:
-    """The problem in coordinates where flat excitation of these powers gives M = I, each plant in its own."""
+    """Return the problem in coordinates where flat excitation of these powers gives M = I at each plant."""
     whitened = jointly_whitened([one.experiment for one in question.plants], powers)
     return _restated(_stated(question, question.experiment), question, whitened)
 
 
 def _restated(problem: Problem, question: Question, coordinates: Sequence[Experiment]) -> Problem:
-    """The problem with everything that is required, each plant in the coordinates of its experiment."""
+    """Return the problem with all its requirements, each plant in the coordinates of its experiment."""
     nominal, *others = (
         one.at(experiment) for one, experiment in zip(question.plants, coordinates, strict=True)
     )
@@ -116,7 +116,7 @@ def _suited_to(problem: Problem, experiment: Experiment, information: Array, sta
 
 
 def _stated(question: Question, experiment: Experiment) -> Problem:
-    """The problem but for what it requires."""
+    """Return the problem without its requirements."""
     densities = tuple(question.densities)
     # A limit holds at every plant; of the powers that are the same at all it stands there once.
     everywhere = [
@@ -183,7 +183,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
 
 
 def suffices(problem: Problem, informations: NDArray[np.float64]) -> bool:
-    """Whether informations (S, k, k) of the scenarios meet every requirement."""
+    """Return whether information matrices (S, k, k) of the scenarios meet every requirement."""
     if any(np.linalg.matrix_rank(M) < len(M) for M in informations):
         return False
     return worst([v for _, v in problem.demands.violations(informations)]).ratio <= 1.0
@@ -191,7 +191,7 @@ def suffices(problem: Problem, informations: NDArray[np.float64]) -> bool:
 
 @dataclass(frozen=True)
 class _Trial:
-    """Flat excitation in coordinates that suit the power whose logarithm is `at`."""
+    """Holds flat excitation in coordinates that suit the power whose logarithm is `at`."""
 
     experiment: Experiment
     factories: Sequence[RequirementFactory]
@@ -210,7 +210,7 @@ class _Trial:
         return self if abs(at - self.at) <= _SUITED else _Trial.of(self.experiment, self.factories, at)
 
     def excess(self, log_power: float) -> float:
-        """The logarithm of the worst ratio.
+        """Return the logarithm of the worst ratio.
 
         Raises:
             OutOfTimeError: see `seconds_left`.
@@ -221,7 +221,7 @@ class _Trial:
 
 
 def _enough(trial: _Trial) -> tuple[float, float, _Trial]:
-    """Logarithms of two powers, from that of the trial on, at the second of which the excess is gone."""
+    """Find the logarithms of two powers, at the second of which the requirements are met."""
     start = before = at = trial.at
     found = trial.excess(at)
     while found > 0.0:

@@ -13,12 +13,12 @@ Paid = Literal["nominal", "mean", "worst"]
 
 
 def paid_for(paid: Paid, costs: Sequence[float]) -> float:
-    """What a design costs whose powers cost so much at each of the plants that are looked at."""
+    """Return the cost of a design from its costs at each of the plants considered."""
     return max(costs) if paid == "worst" else sum(costs) / len(costs)
 
 
 def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | None, float]]:
-    """The positive weights of a cost: kind, channel (None is the sum over the channels), weight."""
+    """Return the positive weights of a cost: kind, channel (None is the sum over the channels), weight."""
     listed: list[tuple[PowerKind, int | None, float]] = []
     for kind, weight in cost.items():
         if isinstance(weight, tuple):
@@ -29,7 +29,7 @@ def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | 
 
 
 def weighted_sum(weights: Mapping[PowerKind, Weight], power: Mapping[PowerKind, Sequence[float]]) -> float:
-    """What powers, by kind and channel, cost at these weights."""
+    """Return the cost of powers, by kind and channel, at these weights."""
     return sum(
         weight * (sum(power[kind]) if channel is None else power[kind][channel])
         for kind, channel, weight in weights_of(weights)

@@ -10,7 +10,7 @@ from inputdesign_cli.design.convex.cones import Entries, Orthant, Semidefinite, 
 
 
 class Concave(Orthant):
-    """g_j(M) >= h_j for concave g_j of degree one, h_j one or s; a = (entries of svec M, s).
+    """The constraints g_j(M) >= h_j for concave g_j of degree one, h_j one or s; a = (entries of svec M, s).
 
     The Hessian of g is curvature (a a^T / g - M^-1 . a), a its gradient (see `ConcaveFunction`): the
     Lagrangian adds it to the usual Z / S a a^T. M itself is kept positive definite.
@@ -68,12 +68,12 @@ class Concave(Orthant):
         return min(up, furthest(self.change[None])), down
 
     def multipliers(self) -> list[Array]:
-        """Z times the gradients (k, k)."""
+        """Return Z times the gradients (k, k)."""
         return [z * gradient for z, gradient in zip(self.Z, self.gradients, strict=True)]
 
 
 class Inequalities(Semidefinite):
-    """h_b constant_b + scale M + nu_b form_b >= 0, h_b one or s; a = (entries of svec M, s).
+    """The constraints h_b constant_b + scale M + nu_b form_b >= 0, h_b one or s; a = (entries of svec M, s).
 
     M fills the leading (k, k) of matrices of order d. Where there are forms, each has an unknown nu_b >= 0 of
     its own, which is eliminated from the linear system.
@@ -122,7 +122,7 @@ class Inequalities(Semidefinite):
         return total
 
     def _back(self, X: Stack) -> Array:
-        """A^T X, summed over the inequalities."""
+        """Return A^T X, summed over the inequalities."""
         k = self.entries.order
         found = self.scale * self.entries.vector(X[:, :k, :k].sum(axis=0))
         if self.side.any():

@@ -24,7 +24,7 @@ _NEARLY = 0.99
 
 @dataclass(frozen=True)
 class Scenario:
-    """A plant that the design must serve, in coordinates of its own, and what is required of it there."""
+    """A plant that the design must serve, in coordinates of its own, with its requirements."""
 
     experiment: Experiment
     requirements: tuple[Requirement, ...]
@@ -33,7 +33,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Asked:
-    """One requirement of all, of the scenario with this number; `side` as in `Problem`."""
+    """A requirement with the number of its scenario; `side` as in `Problem`."""
 
     scenario: int
     requirement: Requirement
@@ -42,7 +42,7 @@ class Asked:
 
 @dataclass
 class _Seen:
-    """The ratios (S,) that scenarios had at most, and with which information (S, k, k) that was.
+    """Holds the largest ratios (S,) seen of the scenarios, and the information (S, k, k) they belong to.
 
     Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
     what it was. Most of many scenarios need not be looked at again. `looked` are bounds by a look at each
@@ -55,11 +55,11 @@ class _Seen:
 
     @classmethod
     def none(cls, number: int) -> _Seen:
-        """Nothing is known yet."""
+        """Return the state in which nothing is known yet."""
         return cls(np.full(number, np.inf), np.full(number, np.inf))
 
     def most(self, informations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(2, S): the largest ratios that are possible with these M_s (S, k, k), looked and searched."""
+        """Return the largest possible ratios (2, S) with these M_s (S, k, k), looked and searched."""
         ratios = np.stack([self.looked, self.searched])
         if self.informations is None:
             self.informations = np.broadcast_to(np.eye(informations.shape[1]), informations.shape).copy()
@@ -73,25 +73,25 @@ class _Seen:
             return np.where(share > 0.0, ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
 
     def look(self, number: int, information: Array, ratio: float) -> None:
-        """What a scenario was found to have, at most, once `most` has been asked."""
+        """Store the largest ratio of a scenario, once `most` has been called."""
         assert self.informations is not None
         self.informations[number] = information
         self.looked[number] = self.searched[number] = ratio
 
     def search(self, number: int, ratio: float) -> None:
-        """What the search for the maxima of the same scenario has found at most."""
+        """Store the largest ratio of the same scenario after a search for its maxima."""
         self.searched[number] = min(self.searched[number], ratio)
 
 
 @dataclass(frozen=True)
 class Demands:
-    """The requirements of all scenarios together, and what has been seen of their ratios so far."""
+    """Holds the requirements of all scenarios together, and the ratios seen so far."""
 
     scenarios: tuple[Scenario, ...]
 
     @cached_property
     def asked(self) -> tuple[Asked, ...]:
-        """All requirements, scenario by scenario, side ones after the others of theirs."""
+        """Return all requirements, scenario by scenario, side requirements after the others."""
         return tuple(
             Asked(number, requirement, side)
             for number, scenario in enumerate(self.scenarios)
@@ -101,11 +101,11 @@ class Demands:
 
     @cached_property
     def noise_informations(self) -> NDArray[np.float64]:
-        """Return the information (S, k, k) of the noise alone for each scenario, whatever is asked."""
+        """Return the information (S, k, k) of the noise alone for each scenario."""
         return joint_noise([scenario.experiment for scenario in self.scenarios])
 
     def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
-        """Whether just this is asked of the same nominal plant, and the rest of the same other plants."""
+        """Return whether the nominal plant, its requirements and the other plants are the same as these."""
         nominal, *known = self.scenarios
         same = len(known) == len(others) and all(map(operator.is_, known, others))
         alike = nominal.requirements is asked.requirements and nominal.side is asked.side
@@ -113,12 +113,12 @@ class Demands:
 
     @property
     def criterion(self) -> Criterion | None:
-        """The criterion of the nominal plant that is to be maximised, if that is the goal."""
+        """Return the criterion of the nominal plant that is to be maximised, if that is the goal."""
         return criterion_of(self.scenarios[0].requirements)
 
     @property
     def definite(self) -> bool:
-        """Whether a singular information matrix is out of the question."""
+        """Return whether the requirements exclude a singular information matrix."""
         return any(asked.requirement.definite for asked in self.asked)
 
     def requirement(self, index: int) -> Requirement:
@@ -153,7 +153,7 @@ class Demands:
         return found
 
     def largest(self, informations: NDArray[np.float64], *, default: float) -> float:
-        """The largest ratio of the requirements, side ones left out; the default without any."""
+        """Return the largest ratio of the requirements without side ones; the default without any."""
         found: list[float] = []
         for number in self._by_most(informations, False, -np.inf) if len(self.scenarios) > 1 else [0]:
             if found and self._seen[0].looked[number] <= max(found):
@@ -162,7 +162,7 @@ class Demands:
         return max(found, default=default)
 
     def _by_most(self, informations: NDArray[np.float64], side: bool, above: float) -> Iterator[int]:
-        """The scenarios that may have ratios above `above`, the largest first; what is possible is noted.
+        """Yield the scenarios that may have ratios above `above`, the largest first.
 
         A scenario is looked at when no other may have more, so that most of them never are.
         """
@@ -193,19 +193,19 @@ class Demands:
 
     @cached_property
     def _seen(self) -> tuple[_Seen, _Seen]:
-        """What is known of the ratios of requirements, and of side ones."""
+        """Return what is known of the ratios of requirements, and of side requirements."""
         return _Seen.none(len(self.scenarios)), _Seen.none(len(self.scenarios))
 
     @cached_property
     def _asked_of(self) -> list[list[int]]:
-        """The numbers of its requirements for each scenario."""
+        """Return the numbers of its requirements for each scenario."""
         return [
             [index for index, asked in enumerate(self.asked) if asked.scenario == number]
             for number in range(len(self.scenarios))
         ]
 
     def worst_ratio(self, informations: NDArray[np.float64]) -> Violation:
-        """The worst violation of all requirements, criteria left out."""
+        """Return the worst violation of all requirements, criteria left out."""
         found = [
             asked.requirement.worst(informations[asked.scenario])
             for asked in self.asked

@@ -29,14 +29,13 @@ _FAR_BELOW = 1e-12
 
 @dataclass(frozen=True)
 class Design:
-    """A design and the designs it is compared with.
+    """Holds a design and the designs it is compared with.
 
     `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even over
     the inputs and meets the same requirements (or exhausts the same limits). `white_power` is its power;
-    `white_within` says whether it keeps to the limits.
-    `any_spectrum` solves the same problem over all spectra. Its certificate bounds every excitation whatever
-    (limits on the density left out). It is None if it was not asked for or if time ran out. `any_record`
-    bounds all records within an amplitude, where that was asked for and is known.
+    `white_within` says whether it keeps to the limits. `any_spectrum` solves the same problem over all
+    spectra. Its certificate bounds every excitation (limits on the density left out). It is None if it was
+    not requested or if time ran out. `any_record` bounds all records within an amplitude, where it is known.
     """
 
     problem: Problem
@@ -49,7 +48,7 @@ class Design:
 
 
 class UnfinishedDesignError(OutOfTimeError):
-    """The time limit has passed; `design` is the best so far, with what is proved of it."""
+    """Raised when the time limit has passed; `design` is the best so far, with what is proved of it."""
 
     design: Design
 
@@ -121,13 +120,13 @@ def solve_design(
 
 
 def _cheaper(problem: Problem, start: Array, even: Array) -> Array:
-    """The better of two spectra to begin with: an unfinished design costs no more than even white input."""
+    """Return the cheaper of two spectra to begin with, so that no design costs more than even white input."""
     tried = [scaled_up(problem, _FAR_BELOW * x, 0.0, []) for x in (start, even)]
     return min(tried, key=lambda candidate: candidate.objective).z
 
 
 def _begins_flat(basis: Basis) -> bool:
-    """Whether its first function is the flat spectrum of power one, so that its integrals are known."""
+    """Return whether its first function is the flat spectrum of power one, whose integrals are known."""
     return basis.has_density and basis.even[0] == 1.0 and not np.any(basis.even[1:])
 
 
@@ -165,7 +164,7 @@ def _white(question: Question, flat: Problem, power: float) -> Candidate:
 
 
 def _nothing(problem: Problem) -> ExchangeResult:
-    """The answer when what is known already meets every requirement: no excitation at all."""
+    """Return a design without excitation, for when the known information meets every requirement."""
     none = Certificate(0.0, np.zeros_like(problem.baselines), np.zeros(0), np.zeros(len(problem.limits)))
     return ExchangeResult(
         basis=problem.basis,
@@ -235,9 +234,9 @@ _ROUNDING, _FAINT = 1e-12, 1e-9
 def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:
     """Return the design without the sinusoids that together hardly change its information.
 
-    The solver leaves a little power everywhere. Power alone does not show which lines can go. In a loop with
-    integral action, power near frequency zero costs almost nothing and far exceeds that of lines that matter.
-    If the cost is minimised, the other lines make up for the removed ones.
+    The solver keeps a little power everywhere. Power alone does not show which lines can go. In a loop with
+    integral action, power near frequency zero costs almost nothing and far exceeds the power of lines that
+    matter. If the cost is minimised, the other lines make up for the removed ones.
     """
     if found.basis.has_density or problem.has_floors or not found.x.any():
         return found

@@ -37,7 +37,7 @@ Enough = Callable[[float, float], bool]
 
 
 class UnfinishedError(OutOfTimeError):
-    """The time limit has passed; `found` is the best so far, with what is proved of it."""
+    """Raised when the time limit has passed; `found` is the best so far, with what is proved of it."""
 
     found: ExchangeResult
 
@@ -51,7 +51,7 @@ class UnfinishedError(OutOfTimeError):
 
 @dataclass(frozen=True)
 class ExchangeResult:
-    """A spectrum `x` of `basis` that meets everything, its information, and the proved bound.
+    """Holds a spectrum `x` of `basis` that meets everything, its information, and the proved bound.
 
     `objective` is what was minimised: the cost, or s (see `Problem`); `certificate.bound` is its proved
     lower bound. `informations` (S, k, k) are the M_s(x); for the goal "samples" they belong to s samples.
@@ -74,16 +74,16 @@ class ExchangeResult:
 
     @property
     def active_frequencies(self) -> Array:
-        """Frequencies (rad/sample) of the requirements that bind."""
+        """Return the frequencies (rad/sample) of the requirements that bind."""
         return np.array([w for _, w in self.active if w is not None])
 
     def active_at(self, index: int) -> Array:
-        """Frequencies (rad/sample) at which one requirement binds, side ones counted after the others."""
+        """Return the frequencies (rad/sample) at which one requirement binds; side ones count last."""
         return np.array([w for i, w in self.active if i == index and w is not None])
 
     @property
     def gap(self) -> float:
-        """|objective - bound| / objective: a bound beyond the objective is as wrong as one far below."""
+        """Return |objective - bound| / objective; a bound beyond the objective counts as an error."""
         difference = abs(self.objective - self.certificate.bound)
         return difference / self.objective if self.objective > 0 else 0.0
 

@@ -32,12 +32,12 @@ _PLENTY = 1e4
 
 
 class UnreachableError(Exception):
-    """The requirements cannot be met within the limits.
+    """Raised when the requirements cannot be met within the limits.
 
     `nearest` solves `problem` (goal "factor"), the best accuracy within the limits: the least s > 1 for which
     s times its information meets them, so that every error must be loosened by sqrt(s), with its certificate.
-    `within` keeps to all limits with room to spare, where some are lower ones. With `limits_alone` it is the
-    lower limits that contradict the upper ones, whatever the accuracy.
+    `within` keeps to all limits with room to spare, where some are lower ones. With `limits_alone` the lower
+    limits contradict the upper ones at any accuracy.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class UnreachableError(Exception):
 
 
 def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
-    """A spectrum that meets all requirements (side included) and limits with room to spare.
+    """Find a spectrum that meets all requirements (side included) and limits with room to spare.
 
     Args:
         start: (size,) any spectrum that excites every parameter (white).
@@ -126,7 +126,7 @@ KEEPS = 1e-9
 def solve_limited(
     problem: Problem, start: Array, tolerance: float, known: Sequence[Place] = ()
 ) -> ExchangeResult:
-    """The exchange, begun with what suits the limits of the problem; arguments as there.
+    """Solve the limited problem by the exchange, begun with what suits the limits; arguments as there.
 
     Raises:
         UnreachableError: the requirements cannot be met within the limits.
@@ -157,7 +157,7 @@ def solve_limited(
 def _within_limits(
     ended: OutOfTimeError, problem: Problem, start: Array, free: ExchangeResult | None
 ) -> OutOfTimeError:
-    """The error with a design that keeps the limits, if one is known.
+    """Return the error with a design that keeps the limits, if one is known.
 
     Args:
         free: of the problem without limits. It may keep them, or else even excitation; its bound holds.
@@ -189,6 +189,6 @@ def _keeps_limits(problem: Problem, found: ExchangeResult) -> bool:
 
 
 def _unweighted(problem: Problem, free: ExchangeResult) -> ExchangeResult:
-    """A design without limits as one of the problem with limits, which have no weight."""
+    """Return a design without limits as one of the problem with limits, which have no weight."""
     no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
     return replace(free, certificate=no_weight)

@@ -43,7 +43,7 @@ class MatrixPart:
 
 @dataclass(frozen=True)
 class FiniteProgram:
-    """minimise cost . v over v = (y on the face, multiples of kept spectra, s), (n,).
+    """The program minimise cost . v over v = (y on the face, multiples of kept spectra, s), (n,).
 
     `matrices` are the information matrices with their cuts, one a scenario; `signs` v >= 0 for the kept
     spectra and s; `limit_offset` + `limits` v >= 0. s in natural units is `unit` v[-1]; without s, `unit` is
@@ -61,7 +61,7 @@ class FiniteProgram:
 
     @property
     def work(self) -> int:
-        """Entries of the matrix inequalities that cuts are made of."""
+        """Return the number of entries of the matrix inequalities that make up the cuts."""
         cuts = [cut for part in self.matrices for cut in part.cuts]
         orders = [self.size if cut.concave is None else 2 * self.size for cut in cuts]
         return sum(svec_length(order) for order in orders)
@@ -69,7 +69,7 @@ class FiniteProgram:
 
 @dataclass(frozen=True)
 class FiniteSolution:
-    """v (n,), the weights of the limits, and for each matrix what the multipliers of its cuts prove.
+    """Holds v (n,), the weights of the limits, and for each matrix what the multipliers of its cuts prove.
 
     See `Cut.proof`.
     """
@@ -109,7 +109,7 @@ def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | No
     total = s_at + scaled + sum(blocks[0].auxiliary.shape[1] for part in parts for blocks in part)
 
     def placed(matrix: Array) -> sp.csc_matrix:
-        """Columns of v among all unknowns."""
+        """Place columns of v among all unknowns."""
         wide = np.zeros((len(matrix), total))
         wide[:, :number] = matrix[:, :number]
         wide[:, s_at : s_at + scaled] = matrix[:, number:]
@@ -198,9 +198,9 @@ def by_interior(program: FiniteProgram, *, tolerance: float) -> tuple[FiniteSolu
 
 
 def _seen(program: FiniteProgram, matrix: MatrixPart) -> tuple[Seen, list[int]]:
-    """The cones of one matrix with what they see, and which cut each of their multipliers belongs to.
+    """Return the cones of one matrix, the entries they see, and the cut that each multiplier belongs to.
 
-    Seen are the entries of M that anything may change or ask for, and s.
+    The cones see s and the entries of M that some unknown may change or some cut may need.
     """
     seen = np.abs(matrix.gains).max(axis=1) + np.abs(matrix.offset)
     kept = np.flatnonzero(seen > 1e-14 * seen.max())
@@ -214,7 +214,7 @@ def _seen(program: FiniteProgram, matrix: MatrixPart) -> tuple[Seen, list[int]]:
 
 
 def _cut_cones(part: MatrixPart, entries: Entries) -> tuple[list[Cone], list[int]]:
-    """The cuts gathered by their kind, and which cut each multiplier then belongs to."""
+    """Return the cones of the cuts, gathered by kind, and the cut that each multiplier belongs to."""
     cuts = list(zip(range(len(part.cuts)), part.cuts, part.sides, strict=True))
     found: list[Cone] = []
     order: list[int] = []
@@ -235,7 +235,7 @@ def _cut_cones(part: MatrixPart, entries: Entries) -> tuple[list[Cone], list[int
 
 
 def _among(total: int, pieces: Sequence[tuple[int, sp.csc_matrix]]) -> sp.csc_matrix:
-    """Matrices of as many rows, in ascending order each with its first column, among `total` columns."""
+    """Stack sparse matrices of as many rows, each at its first column (ascending), among `total` columns."""
     counts = np.zeros(total + 1, dtype=np.int32)
     for start, piece in pieces:
         counts[start + 1 : start + 1 + piece.shape[1]] = np.diff(piece.indptr)

@@ -15,13 +15,13 @@ from inputdesign_cli.plant import common_grid, graded_grid
 
 
 def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
-    """The scenarios whose weight Y_s of `weights` (S, k, k) is not zero."""
+    """Return the scenarios whose weight Y_s of `weights` (S, k, k) is not zero."""
     return np.flatnonzero(np.any(weights, axis=(1, 2))).tolist()
 
 
 @dataclass(frozen=True)
 class Gradients:
-    """The gradients of all plants, the nominal one first, kept for the grid they were last asked for at."""
+    """Holds the gradients of all plants, the nominal one first, for the last grid requested."""
 
     experiments: tuple[Experiment, ...]
     _grids: dict[frozenset[int], Array] = field(default_factory=dict, init=False, repr=False)
@@ -29,7 +29,7 @@ class Gradients:
 
     @cached_property
     def grid(self) -> Array:
-        """Frequencies that see every resonance of the nominal plant's densities, over the band."""
+        """Return frequencies that see every resonance of the nominal plant's densities, over the band."""
         nominal = self.experiments[0]
         return graded_grid(nominal.singularities, *nominal.band)
 
@@ -44,7 +44,7 @@ class Gradients:
         return self._grids[others]
 
     def value_density(self, weights: NDArray[np.float64]) -> Callable[[Array], NDArray]:
-        """The density of sum_s tr(Y_s M_s) for fixed Y = `weights` (S, k, k), as a function of frequency."""
+        """Return the density of sum_s tr(Y_s M_s) over frequency, for fixed Y = `weights` (S, k, k)."""
         weighty = weighty_ones(weights)
         grid = self.grid_of(weighty)
         known: list[NDArray] = []
@@ -61,12 +61,12 @@ class Gradients:
         return density
 
     def worthless(self, w: Array) -> NDArray:
-        """Zero at every frequency of `w` (n,): (n,), or (n, r, r) for several inputs."""
+        """Return zero at every frequency of `w` (n,): (n,), or (n, r, r) for several inputs."""
         r = self.experiments[0].inputs
         return np.zeros((np.size(w), *(() if r == 1 else (r, r))))
 
     def _worth(self, scenario: int, weight: Array, w: Array, *, on_grid: bool) -> NDArray:
-        """The density of tr(Y M_s) at frequencies `w`; the gradients on a grid are kept."""
+        """Return the density of tr(Y M_s) at frequencies `w`; the gradients on a grid are kept."""
         experiment = self.experiments[scenario]
         if not on_grid:
             return experiment.value_density(weight, w)

@@ -32,7 +32,7 @@ class QuadraticDesign:
     """The problem for a factor: M_lm = baseline_lm + tr(A_lm H H^*), tr(P H H^*) <= cap for each limit.
 
     `maps` (k, k, n, n) holds the A_lm and `limits` pairs (P, cap), Hermitian where H may be complex.
-    `scale` L (k, k): the criterion is that of L M L^T (raw or relative parameters).
+    `scale` is L (k, k): the criterion is of L M L^T (raw or relative parameters).
     """
 
     maps: NDArray
@@ -59,17 +59,17 @@ class QuadraticDesign:
         return self.baseline + np.einsum("lmab,ac,bc->lm", self.maps, H, H, optimize=True)
 
     def value(self, information: Array) -> float:
-        """log det, -tr of the inverse, smallest eigenvalue or trace of L M L^T."""
+        """Return log det, -tr of the inverse, smallest eigenvalue or trace of L M L^T."""
         return criterion_value(self.criterion, self.scale @ information @ self.scale.T)
 
     def feasible(self, H: Array) -> Array:
-        """H scaled until one limit binds."""
+        """Scale H until one limit binds."""
         used = max(float(np.sum(H * (P @ H))) / cap for P, cap in self.limits)
         return H / np.sqrt(used)
 
 
 def criterion_value(criterion: CriterionName, information: Array) -> float:
-    """The criterion of M (k, k), larger is better; minus infinity for singular M under D and A."""
+    """Return the criterion of M (k, k), larger is better; minus infinity for singular M under D and A."""
     eigenvalues = np.linalg.eigvalsh(0.5 * (information + information.T))
     if criterion == "T":
         return float(np.trace(information))
@@ -82,7 +82,7 @@ def criterion_value(criterion: CriterionName, information: Array) -> float:
 
 @dataclass(frozen=True)
 class HillClimb:
-    """The best factor H (n, c) found, what it attains, and the history of each start."""
+    """Holds the best factor H (n, c) found, its criterion, and the history of each start."""
 
     factor: NDArray
     value: float
@@ -143,7 +143,7 @@ def _climb(design: QuadraticDesign, step: _Step, H: Array) -> tuple[Array, list[
 
 
 class _Step:
-    """max phi(2 M(X, Y) - M(Y)) over X within the limits: compiled once, solved for every Y."""
+    """Maximises phi(2 M(X, Y) - M(Y)) over X within the limits: compiled once, solved for every Y."""
 
     def __init__(self, design: QuadraticDesign, columns: int) -> None:
         import cvxpy as cp
@@ -178,7 +178,7 @@ class _Step:
         self._problem: Any = cp.Problem(cp.Maximize(objective), constraints)
 
     def best(self, Y: Array) -> Array | None:
-        """The next factor (n, c), or None when the solver fails."""
+        """Return the next factor (n, c), or None when the solver fails."""
         import cvxpy as cp
 
         design = self.design
@@ -198,14 +198,14 @@ class _Step:
 
 
 def _embedded(A: NDArray) -> Array:
-    """Hermitian (.., n, n) -> real symmetric (.., 2 n, 2 n) with the same quadratic form."""
+    """Return Hermitian (.., n, n) as real symmetric (.., 2 n, 2 n) with the same quadratic form."""
     top = np.concatenate([A.real, -A.imag], axis=-1)
     bottom = np.concatenate([A.imag, A.real], axis=-1)
     return np.concatenate([top, bottom], axis=-2)
 
 
 def _leading(guess: NDArray, columns: int, *, stacked: bool) -> Array:
-    """The best approximation of guess guess^* by a factor of `columns` columns, in real numbers."""
+    """Return the best approximation of guess guess^* by a factor of `columns` columns, in real numbers."""
     u, s, _ = np.linalg.svd(guess, full_matrices=False)
     H = (u * s)[:, :columns]
     if H.shape[1] < columns:

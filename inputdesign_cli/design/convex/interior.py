@@ -33,7 +33,7 @@ _ROUNDING = 1e-5  # errors below this are as likely rounding
 
 @dataclass(frozen=True)
 class Seen:
-    """Blocks that depend on one information matrix, through a = `offset` (e,) + `gains` (e, n) v."""
+    """The blocks that depend on one information matrix, through a = `offset` (e,) + `gains` (e, n) v."""
 
     cones: Sequence[Cone]
     offset: Array
@@ -42,7 +42,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Reached:
-    """The best iterate: unknowns v (n,), multipliers of each block, its largest error; iterations taken."""
+    """Holds the best iterate v (n,), multipliers of each block, its largest error, and iterations taken."""
 
     v: Array
     multipliers: list[list[Array]]
@@ -98,7 +98,7 @@ def _look(cones: Sequence[Cone], at: Array) -> float:
 def _step(
     q: Array, v: Array, direct: Sequence[Cone], through: Sequence[Seen], gap: float, degree: int
 ) -> tuple[tuple[float, Array], float]:
-    """Predictor and corrector: (length, direction) of the unknowns, and the length of the multipliers."""
+    """Compute predictor and corrector: (length, direction) of the unknowns and the multipliers' length."""
     cones = [*direct, *(cone for seen in through for cone in seen.cones)]
     matrix = np.zeros((v.size, v.size))
     for seen in through:
@@ -141,7 +141,7 @@ def _lengths(cones: Sequence[Cone], share: float) -> tuple[float, float]:
 
 
 def _factored(matrix: Array) -> Callable[[Array], Array]:
-    """A solver with this positive definite matrix, its rounding refined away."""
+    """Return a solver with this positive definite matrix, with iterative refinement of rounding."""
     diagonal = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
     unit = matrix / diagonal / diagonal[:, None]
     lifted = unit + _REGULAR * len(matrix) * np.eye(len(matrix))

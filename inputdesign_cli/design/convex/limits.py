@@ -14,11 +14,11 @@ from inputdesign_cli.information import PowerKind
 
 @dataclass(frozen=True)
 class PowerLimit:
-    """A power of input, output, excitation or moves of the input is at most (`upper`) or at least `bound`.
+    """A limit: a power of input, output, excitation or moves is at most (`upper`) or at least `bound`.
 
     `channel` counts from 0; None is the sum over the channels. `scenario` is the number of the plant at which
-    the power is taken. `implied` says that a limit on single samples
-    stands behind it: |u| <= a leaves u no more power than a^2, moves of at most r leave theirs r^2.
+    the power is taken. `implied` says whether a limit on single samples implies it: |u| <= a bounds the power
+    of u by a^2, moves of at most r have at most r^2.
     """
 
     kind: PowerKind
@@ -34,20 +34,20 @@ class PowerLimit:
 
     @property
     def key(self) -> str:
-        """Its name in the spec."""
+        """Return the name of the limit in the spec."""
         if self.kind == "moves":
             return "limits.rate"
         return f"limits.amplitude.{self.kind}" if self.implied else f"limits.{self.kind}_power"
 
     @property
     def of_samples(self) -> str:
-        """What it bounds of single samples, where it is implied."""
+        """Return the name of the limit on single samples that implies this power limit."""
         return "moves" if self.kind == "moves" else "a peak"
 
 
 @dataclass(frozen=True)
 class DensityLimit:
-    """Phi(w) is at most (`upper`) or at least `level`(w) at every frequency of [grid[0], grid[-1]].
+    """A limit by which Phi(w) is at most (`upper`) or at least `level`(w) on [grid[0], grid[-1]].
 
     Of several inputs so is v^* Phi(w) v for every direction v of length one: an eigenvalue condition,
     Phi(w) <= level(w) I or Phi(w) >= level(w) I. `level` maps frequencies (n,) of the experiment to (n,);
@@ -62,7 +62,7 @@ class DensityLimit:
 
 
 def implied_power(density: DensityLimit, inputs: int = 1) -> PowerLimit:
-    """The power of the excitation that an upper density limit allows at most; it keeps programs bounded."""
+    """Return the largest excitation power that an upper density limit allows; it keeps programs bounded."""
     grid = density.grid
     middle = 0.5 * (grid[1:] + grid[:-1])
     highest = np.maximum(np.maximum(density.level(grid[1:]), density.level(grid[:-1])), density.level(middle))
@@ -71,7 +71,7 @@ def implied_power(density: DensityLimit, inputs: int = 1) -> PowerLimit:
 
 @dataclass(frozen=True)
 class DensityPlace:
-    """Where a density limit (by its index) is looked at: a frequency and a direction (r,) of length one."""
+    """A place where a density limit (by its index) is checked: a frequency and a unit direction (r,)."""
 
     limit: int
     frequency: float
@@ -80,10 +80,10 @@ class DensityPlace:
 
 @dataclass(frozen=True)
 class DensityBreach:
-    """How a density limit is used at a place.
+    """The use of a density limit at a place.
 
-    `ratio` is v^* Phi v over the level, or for a lower limit two minus that, so that it exceeds one where the
-    limit is missed and is affine in Phi.
+    `ratio` is v^* Phi v over the level, or two minus it for a lower limit. It exceeds one where the limit is
+    missed, and is affine in Phi.
     """
 
     place: DensityPlace
@@ -94,7 +94,7 @@ _TINY = np.finfo(float).tiny
 
 
 def breach_ratio(limit: DensityLimit, phi: NDArray, w: Array) -> Array:
-    """The ratio (n,) that must not exceed one, of the worst direction where Phi is (n, r, r)."""
+    """Return the ratio (n,) that must not exceed one, of the worst direction where Phi is (n, r, r)."""
     if phi.ndim > 1:
         phi = np.linalg.eigvalsh(phi)[:, -1 if limit.upper else 0]
     return _ratio(limit, phi, limit.level(w))
@@ -103,7 +103,7 @@ def breach_ratio(limit: DensityLimit, phi: NDArray, w: Array) -> Array:
 def breaches_at(
     limit: DensityLimit, index: int, phi: NDArray, w: Array, *, above: float
 ) -> list[DensityBreach]:
-    """The breaches above `above` at frequencies `w` (n,): one for each principal direction of Phi there."""
+    """Return the breaches above `above` at frequencies `w` (n,), one for each principal direction of Phi."""
     if phi.ndim == 1:
         values, vectors = phi[:, None], np.ones((w.size, 1, 1), dtype=complex)
     else:

@@ -36,7 +36,7 @@ _INDEFINITE = 1e-3
 
 @dataclass(frozen=True)
 class Row:
-    """One linear limit of the finite program: `functional` at most (`upper`) or at least `bound`.
+    """A linear limit of the finite program: `functional` is at most (`upper`) or at least `bound`.
 
     `limit` is the index of the power limit; `density` says where a density limit is looked at.
     """
@@ -51,7 +51,7 @@ class Row:
 
 @dataclass(frozen=True)
 class PlacedCut:
-    """A cut with the scenario whose M' it is about; of a `side` requirement s multiplies its constants."""
+    """A cut on the M' of a scenario; s multiplies its constants if the requirement is a `side` one."""
 
     cut: Cut
     scenario: int = 0
@@ -60,7 +60,7 @@ class PlacedCut:
 
 @dataclass(frozen=True)
 class Implied:
-    """tr(Y M') >= level for the M' of a scenario, or level times s for `side` ones; Y = `weight` (k, k)."""
+    """The inequality tr(Y M') >= level of a scenario, or level times s for `side`; Y = `weight` (k, k)."""
 
     weight: Array
     level: float
@@ -72,8 +72,9 @@ class Implied:
 class Proof:
     """Holds the multipliers of one round, in the problem's own units.
 
-    `cuts` holds what each cut implies, whatever the solver did. `rows` (number of rows,) are nonnegative
-    weights of the limits. `costs` are weights, with the sum one, of the costs of which the largest is paid.
+    `cuts` holds the inequality that each cut implies, valid for any multipliers. `rows` (number of rows,) are
+    nonnegative weights of the limits. `costs` are weights, with the sum one, of the costs of which the
+    largest is paid.
     """
 
     cuts: tuple[Implied, ...]
@@ -83,7 +84,7 @@ class Proof:
 
 @dataclass(frozen=True)
 class MasterSolution:
-    """The optimum of the finite program: y on the face, the spectrum z = columns y, s, and its proof.
+    """Holds the optimum of the finite program: y on the face, the spectrum z = columns y, s, and its proof.
 
     Without `converged` it is the last iterate of a solver that gave up: often good enough to scale the
     next attempt by, and the proof holds as always.
@@ -159,7 +160,7 @@ def _program(
     best: Candidate,
     turns: Mapping[int, Array],
 ) -> FiniteProgram:
-    """The finite program in scaled numbers; the last column stands for the largest of several costs."""
+    """Return the finite program in scaled numbers; the last column is the largest of several costs."""
     inside, number = face.columns.shape[1], columns.shape[1]
     worth = problem.price.at(best.z)
     matrices = []
@@ -199,7 +200,7 @@ def _shares(weights: Array) -> Array:
 def _turned(
     problem: Problem, scenario: int, turn: Array, columns: Array, worth: float, s: float
 ) -> tuple[Array, Array]:
-    """svec of K M' K^T, K = `turn`, as gains (entries, unknowns) and offset (entries,) of (y / worth, s)."""
+    """Return svec of K M' K^T, K = `turn`, as gains (entries, unknowns) and offset of (y / worth, s)."""
 
     def turned(information: NDArray[np.float64]) -> NDArray[np.float64]:
         return svec(turn @ information @ turn.T)
@@ -217,16 +218,16 @@ def _turned(
 
 
 def _in_cone(face: Face, y: Array) -> Array:
-    """The nearest y in the cone of the face: a solver leaves it by its tolerance."""
+    """Return the nearest y in the cone of the face, which a solver may leave by its tolerance."""
     if face.kind == "nonnegative":
         return np.maximum(y, 0.0)
     return svec(positive_part(smat(y)))
 
 
 def _congruence(information: Array, *, definite: bool) -> Array:
-    """K with K M K^T = I, or nearly so where M is close to singular.
+    """Return K with K M K^T = I, or nearly so where M is close to singular.
 
-    By the Cholesky factor, which leaves apart what M keeps apart.
+    It is a Cholesky factor, which does not mix parameters that M keeps apart.
     """
     if definite:
         with suppress(np.linalg.LinAlgError):
@@ -245,7 +246,7 @@ def _level(problem: Problem, row: Row, s: float) -> float:
 def _limits(
     problem: Problem, columns: Array, rows: Sequence[Row], s: float, worth: float
 ) -> tuple[Array, Array]:
-    """Each limit over its level at the best design: 1 (or s over its best value) minus the used share."""
+    """Return each limit over its level at the best design: 1 (or s over its best value) minus its share."""
     number = columns.shape[1]
     matrix = np.zeros((len(rows), number + int(problem.scaled)))
     offset = np.zeros(len(rows))

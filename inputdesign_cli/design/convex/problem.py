@@ -54,11 +54,11 @@ class Problem:
     "samples": the least number of samples N within the limits; the experiment's own number must be
     one. In (N x, N) this is linear: M' = prior + N noise information + sum z_i M_i, limits times N.
 
-    `requirements` are made for the coordinates of `experiment`, that of the nominal plant. `side`
-    requirements (goal "factor") must be met by M(x) itself. `others` are the scenarios besides, of the same
-    structure and length: each M_s meets the requirements of its own. A spectrum causes other powers at each
-    of them: limits name theirs, and `paid` says whether the cost is that of the nominal plant, the mean over
-    all, or that of the dearest.
+    `requirements` are made for the coordinates of `experiment`, which has the nominal plant. `side`
+    requirements (goal "factor") must be met by M(x) itself. `others` are the other scenarios, of the same
+    structure and length: each M_s meets its own requirements. A spectrum causes other powers at each of them:
+    limits name theirs, and `paid` selects the cost at the nominal plant, the mean over all, or the cost at
+    the dearest.
 
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
@@ -85,7 +85,7 @@ class Problem:
 
     @cached_property
     def demands(self) -> Demands:
-        """What is required at all S plants, the nominal one first."""
+        """Return the requirements at all S plants, the nominal one first."""
         if self._before:  # with what has been seen of them
             return self._before[0].demands
         asked = Scenario(self.experiment, self.requirements, self.side)
@@ -95,12 +95,12 @@ class Problem:
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
-        """All S plants, the nominal one first."""
+        """Return all S plants, the nominal one first."""
         return self.demands.scenarios
 
     @cached_property
     def gradients(self) -> Gradients:
-        """The gradients of all plants at frequencies."""
+        """Return the gradients of all plants at frequencies."""
         if self._before:
             return self._before[0].gradients
         return Gradients(tuple(scenario.experiment for scenario in self.scenarios))
@@ -137,12 +137,12 @@ class Problem:
 
     @property
     def scaled(self) -> bool:
-        """Whether an unknown s multiplies limits and known information (goals other than cost)."""
+        """Return whether an unknown s multiplies limits and known information (goals other than cost)."""
         return self.goal != "cost"
 
     @property
     def has_floors(self) -> bool:
-        """Whether some limit is a lower one."""
+        """Return whether some limit is a lower one."""
         powers = any(not limit.upper for limit in self.limits)
         return powers or any(not limit.upper for limit in self.densities)
 
@@ -206,7 +206,7 @@ class Problem:
 
     @cached_property
     def price(self) -> Functional:
-        """What x is measured by: the mean of the costs, or where none is sought powers over limits."""
+        """Return the price of x: the mean of the costs, or where no cost is sought powers over limits."""
         if self.goal == "cost":
             return self.costs[0] if len(self.costs) == 1 else self._cost_of(self.paying)
         parts = [self._limited(limit) * (1.0 / limit.bound) for limit in self.limits if limit.upper]
@@ -214,7 +214,7 @@ class Problem:
 
     @cached_property
     def costs(self) -> tuple[Functional, ...]:
-        """What a design costs is the largest of these (goal "cost")."""
+        """Return the costs of which the largest is the cost of a design (goal "cost")."""
         weights = weights_of(self.cost)
         if self.paid == "nominal" or not self._others_pay:
             parts = [self.power(kind, channel) * weight for kind, channel, weight in weights]
@@ -225,21 +225,21 @@ class Problem:
 
     @property
     def _others_pay(self) -> bool:
-        """Whether there are other plants at which the cost may be another."""
+        """Return whether there are other plants at which the cost may be another."""
         kinds = (kind for kind, _, _ in weights_of(self.cost))
         return bool(self.others) and any(self.experiment.depends_on_plant(kind) for kind in kinds)
 
     @property
     def paying(self) -> range:
-        """The numbers of the scenarios whose powers are paid for."""
+        """Return the numbers of the scenarios whose powers are paid for."""
         return range(1 if self.paid == "nominal" else len(self.scenarios))
 
     def cost_at(self, x: Array) -> float:
-        """What a spectrum costs (goal "cost")."""
+        """Return the cost of a spectrum (goal "cost")."""
         return max(cost.at(x) for cost in self.costs)
 
     def _cost_of(self, scenarios: range) -> Functional:
-        """The mean of the costs at these plants."""
+        """Return the mean of the costs at these plants."""
         known = self._costs.get(scenarios)
         if known is not None:
             return known
@@ -259,7 +259,7 @@ class Problem:
         return {}
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
-        """The power of input, output or excitation (of one channel) as a functional of the spectrum."""
+        """Return the power of input, output or excitation (of one channel) as a functional."""
         known = self._powers.get((kind, channel, scenario))
         if known is not None:
             return known
@@ -285,22 +285,22 @@ class Problem:
 
     @cached_property
     def limit_functionals(self) -> tuple[Functional, ...]:
-        """The limited powers, one a limit."""
+        """Return the limited powers, one a limit."""
         return tuple(self._limited(limit) for limit in self.limits)
 
     def value(self, weights: NDArray[np.float64]) -> Functional:
-        """sum_s tr(Y_s (M_s(x) - M0_s)) for fixed Y = `weights` (S, k, k) as a functional of the spectrum."""
+        """Return sum_s tr(Y_s (M_s(x) - M0_s)), Y = `weights` (S, k, k), as a functional of the spectrum."""
         weighty = weighty_ones(weights)
         vector = np.tensordot(self.information_maps[:, weighty], weights[weighty], axes=3)
         return Functional(vector, self.gradients.value_density(weights))
 
     def density_at(self, place: DensityPlace) -> Functional:
-        """v^* Phi v at one frequency as a functional; it has no density over frequency."""
+        """Return v^* Phi v at one frequency as a functional; it has no density over frequency."""
         vector = self.basis.directed(place.frequency, place.direction)
         return Functional(vector, self.gradients.worthless, concentrated=True)
 
     def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
-        """Local maxima of Phi over its limits times s (or once, for fixed ones), if above `above`."""
+        """Return local maxima of Phi over its limits times s (once for fixed ones), if above `above`."""
         found = []
         for index, limit in enumerate(self.densities):
             factor = self.bound_factor(limit.upper, s)
@@ -357,11 +357,11 @@ class Problem:
 
     @cached_property
     def _fine_grid(self) -> Array:
-        """Even, and denser at the ends of the band as polynomials oscillate: sixteen points a degree."""
+        """Return an even grid, denser at the ends of the band: sixteen points a degree."""
         lo, hi = self.experiment.band
         even = np.linspace(0.0, 1.0, 16 * (self.basis.degree + 1))
         return lo + (hi - lo) * np.union1d(even, 0.5 - 0.5 * np.cos(np.pi * even))
 
     def bound_factor(self, upper: bool, s: float) -> float:
-        """What a limit is multiplied by: s where limits scale, else one."""
+        """Return the factor of a limit: s where limits scale, else one."""
         return s if self.scaled and (upper or not self.floors_fixed) else 1.0

@@ -16,26 +16,26 @@ from inputdesign_cli.spectrum import Basis
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another plant that the design must serve, in raw parameters; see `Question`."""
+    """A plant besides the nominal one that the design must serve, in raw parameters; see `Question`."""
 
     experiment: Experiment
     requirements: Sequence[RequirementFactory]
     side: Sequence[RequirementFactory] = ()
 
     def at(self, coordinates: Experiment) -> Scenario:
-        """Its requirements in the coordinates of this experiment."""
+        """Return its requirements in the coordinates of this experiment."""
         required = tuple(make(coordinates) for make in self.requirements)
         return Scenario(coordinates, required, tuple(make(coordinates) for make in self.side))
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, in raw parameters: requirements are made for the coordinates of a design.
+    """A design question in raw parameters: requirements are made for the coordinates of a design.
 
-    `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
-    `side` must hold besides. The other goals meet all of them. All of that is asked of the nominal plant,
-    that of `experiment`, and of each of the `others`; `paid` as in `Problem`. `anywhere` is the band of every
-    spectrum, where the best is only approached at an end of that of the experiment.
+    The goal "factor" improves on `goal_requirements` (a criterion, or all requirements); `side` must also
+    hold. The other goals meet all of them. They hold at the nominal plant, which `experiment` has, and at
+    each of the `others`; `paid` is as in `Problem`. `anywhere` is the band of every spectrum, for a best
+    design only approached at an end of the experiment's band.
     """
 
     experiment: Experiment
@@ -52,7 +52,7 @@ class Question:
 
     @property
     def plants(self) -> list[Alternative]:
-        """All that must be served, the nominal plant first."""
+        """Return all plants that must be served, the nominal plant first."""
         return [Alternative(self.experiment, self.requirements, self.side), *self.others]
 
     def at_alpha(self, alpha: float) -> Question:

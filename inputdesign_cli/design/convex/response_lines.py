@@ -26,7 +26,7 @@ _ROUNDING = 1e-9
 
 
 class UnreachableError(IdesignError):
-    """The limits exclude the accuracy; with them deviations are `factor` times what is admitted at least.
+    """Raised when the limits exclude the accuracy; deviations are at least `factor` times the allowed ones.
 
     The factor is infinite where the limits contradict each other.
     """
@@ -38,7 +38,7 @@ class UnreachableError(IdesignError):
 
 @dataclass(frozen=True)
 class ResponseLines:
-    """Holds G (L, p, r), the noise Phi_v (L, p) and r_adm (L, p, r) at L lines.
+    """Holds G (L, p, r), the noise spectrum Phi_v (L, p) and r_adm (L, p, r) at L lines.
 
     `share`: r_adm is this much of |G|; None if it does not depend on G.
     """
@@ -49,13 +49,13 @@ class ResponseLines:
     share: float | None = None
 
     def at(self, G: ComplexArray) -> ResponseLines:
-        """Return the lines with another G (L, p, r); an error without a bound has none there."""
+        """Return the lines with another G (L, p, r); an unbounded error stays unbounded."""
         if self.share is None:
             return replace(self, G=G)
         return replace(self, G=G, admitted=np.where(np.isinf(self.admitted), np.inf, self.share * np.abs(G)))
 
     def where(self, kept: NDArray[np.bool_]) -> ResponseLines:
-        """Only the lines that are kept (L,)."""
+        """Return only the lines that are kept (L,)."""
         return replace(self, G=self.G[kept], noise=self.noise[kept], admitted=self.admitted[kept])
 
     def needed(self, samples: int) -> NDArray[np.float64]:
@@ -80,7 +80,7 @@ class ResponseLines:
 
 @dataclass(frozen=True)
 class ResponseProblem:
-    """Powers x of n lines (each of one input), where x = 1 just meets r_adm in N samples: x >= 1.
+    """The powers x of n lines (each of one input) with x >= 1, where x = 1 just meets r_adm in N samples.
 
     Attributes:
         needed: (n,) the power that just meets r_adm.
@@ -101,7 +101,7 @@ class ResponseProblem:
 
     @cached_property
     def upper(self) -> tuple[NDArray[np.float64], Array]:
-        """The rows and bounds of limits from above, in the units of x."""
+        """Return the rows and bounds of limits from above, in the units of x."""
         return self._limited(True)
 
     @cached_property
@@ -115,7 +115,7 @@ class ResponseProblem:
         return self.rows[kept] * self.needed, bounds
 
     def alike(self, x: Array) -> float:
-        """The largest s with s x within the limits from above; infinite without any."""
+        """Return the largest s with s x within the limits from above; infinite without any."""
         rows, bounds = self.upper
         used = rows @ x
         return float(np.min(bounds[used > 0] / used[used > 0], initial=np.inf))
@@ -123,7 +123,7 @@ class ResponseProblem:
 
 @dataclass(frozen=True)
 class ResponseDesign:
-    """Powers (n,), and a value with the bound that multipliers of the limits prove for it.
+    """Holds powers (n,), and a value with the bound that multipliers of the limits prove for it.
 
     The value is a cost, or s. Variances are then 1 / s of the admissible ones, and 1 / s of the samples is
     enough.
@@ -135,12 +135,12 @@ class ResponseDesign:
 
     @property
     def gap(self) -> float:
-        """The relative distance of value and bound."""
+        """Return the relative distance of value and bound."""
         return abs(self.value - self.bound) / max(abs(self.value), np.finfo(float).tiny)
 
 
 def cheapest(problem: ResponseProblem) -> ResponseDesign:
-    """The least cost that meets r_adm at every line.
+    """Solve for the least cost that meets r_adm at every line.
 
     Raises:
         UnreachableError: the limits exclude that.
@@ -196,7 +196,9 @@ def most_accurate(problem: ResponseProblem) -> ResponseDesign:
 def _program(
     problem: ResponseProblem, costs: Array, least: float, unit: float = 0.0
 ) -> tuple[Array, Array, Array]:
-    """x and the multipliers of upper and lower limits: min costs x, x >= least; or max s, x >= s `unit`.
+    """Return x and the multipliers of upper and lower limits.
+
+    Minimises costs x for x >= least, or maximises s for x >= s `unit`.
 
     Raises:
         UnreachableError: the limits contradict each other.
@@ -236,7 +238,7 @@ def _share(most: Array, taken: Array) -> float:
 
 
 def _exhausted(problem: ResponseProblem, x: Array) -> list[PowerLimit]:
-    """The limits from above that x breaks."""
+    """Return the limits from above that x breaks."""
     rows, bounds = problem.upper
     upper = [limit for limit in problem.limits if limit.upper]
     return [limit for limit, used, most in zip(upper, rows @ x, bounds, strict=True) if used > most]

@@ -15,7 +15,7 @@ from inputdesign_cli.arrays import Array
 
 
 def unlikely(risk: float, scenarios: int, unknowns: int) -> float:
-    """A bound on the probability that the solution violates more than `risk`.
+    """Bound the probability that the solution violates more than `risk`.
 
     sum_{i < d} C(N, i) risk^i (1 - risk)^(N - i), [campi-garatti-2008], Theorem 1.
     """
@@ -25,7 +25,7 @@ def unlikely(risk: float, scenarios: int, unknowns: int) -> float:
 
 
 def samples_for(risk: float, beta: float, unknowns: int) -> int:
-    """The fewest scenarios with which the violation stays below `risk` with probability 1 - beta."""
+    """Return the fewest scenarios whose violation stays below `risk` with probability 1 - beta."""
     few, many = 0, unknowns
     while unlikely(risk, many, unknowns) > beta:
         few, many = many, 2 * many
@@ -36,7 +36,7 @@ def samples_for(risk: float, beta: float, unknowns: int) -> int:
 
 
 def risk_before(scenarios: int, beta: float, unknowns: int) -> float:
-    """The violation that holds with probability 1 - beta, known before the design; one where nothing does."""
+    """Return the violation that holds with probability 1 - beta before the design; one where nothing does."""
     if scenarios <= unknowns:
         return 1.0
     return float(scipy.special.bdtri(unknowns - 1, scenarios, beta))
@@ -45,8 +45,8 @@ def risk_before(scenarios: int, beta: float, unknowns: int) -> float:
 def risk_after(scenarios: int, beta: float, support: int) -> float:
     """Return the risk once the number of support constraints is known: wait and judge.
 
-    1 - t with t in (0, 1) the root of beta / (N + 1) sum_{m=k}^{N} C(m, k) t^(m - k) = C(N, k) t^(N - k)
-    [campi-garatti-2018], Theorem 2. It holds for programs that are not degenerate.
+    The risk is 1 - t, t in (0, 1) the root of beta / (N + 1) sum_{m=k}^{N} C(m, k) t^(m - k) = C(N, k) t^(N -
+    k) [campi-garatti-2018], Theorem 2. It holds for programs that are not degenerate.
     """
     if support >= scenarios:
         return 1.0
@@ -54,7 +54,7 @@ def risk_after(scenarios: int, beta: float, support: int) -> float:
     weights = _log_binomial(m, support)
 
     def excess(t: float) -> float:
-        """log of the left side over the right side: positive near zero, negative near one."""
+        """Return the log of the left side over the right side: positive near zero, negative near one."""
         left = scipy.special.logsumexp(weights + (m - support) * np.log(t))
         return float(np.log(beta / (scenarios + 1)) + left - weights[-1] - (scenarios - support) * np.log(t))
 

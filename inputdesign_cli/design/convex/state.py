@@ -40,7 +40,7 @@ _MOST_ROWS = 12
 
 @dataclass
 class State:
-    """What the method knows: the face, cuts and rows of the finite program, the best design and proof."""
+    """Holds the state of the method: face, cuts and rows of the finite program, the best design and proof."""
 
     problem: Problem
     face: Face
@@ -58,17 +58,17 @@ class State:
 
     @property
     def gap(self) -> float:
-        """The relative distance of the best design from what is proved of all."""
+        """Return the relative distance of the best design from the proved bound."""
         return (self.best.objective - self.certificate.bound) / self.best.objective
 
     @property
     def placed(self) -> list[PlacedCut]:
-        """The cuts with their scenarios."""
+        """Return the cuts with their scenarios."""
         asked = [self.problem.demands.asked[index] for index, _ in self.keys]
         return [PlacedCut(cut, a.scenario, a.side) for cut, a in zip(self.cuts, asked, strict=True)]
 
     def improve(self, tolerance: float) -> bool:
-        """One round: solve, prove, repair, enlarge. False when another could not improve anything."""
+        """Solve, prove, repair and enlarge once; return False when another round cannot improve anything."""
         problem, face, best, cuts = self.problem, self.face, self.best, len(self.cuts)
         answer = solve_master(
             problem,
@@ -141,7 +141,7 @@ class State:
         self.proof = replace(proof, cuts=tuple(proof.cuts[i] for i in kept))
 
     def _definite(self, z: Array, s: float) -> tuple[Array, float]:
-        """(z, s), or halfway to the best design when z leaves some parameter without information."""
+        """Return (z, s), or halfway to the best design when z leaves some parameter without information."""
         if not self.problem.demands.definite:
             return z, s
         for _ in range(_HALVINGS):
@@ -163,7 +163,7 @@ class State:
         self.rows = [on_basis(problem, row) for row in self.rows]
 
     def on(self, problem: Problem) -> State:
-        """The best so far as a spectrum of `problem`, with the proof that holds there."""
+        """Return the best design so far as a spectrum of `problem`, with the proof that holds there."""
         if self.problem.basis.size >= problem.basis.size:
             return self
         if self.solved:
@@ -172,7 +172,7 @@ class State:
         return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
 
     def tight(self) -> State:
-        """Return the state, its best design with just the s it needs: an interior one has room to spare."""
+        """Return the state with the least s for its best design, which has room to spare if interior."""
         if self.problem.goal != "factor":
             return self
         worst = self.problem.demands.largest(self.best.informations, default=1.0)
@@ -204,7 +204,7 @@ class State:
 
 
 def first_state(problem: Problem, start: Array, interior: Array | None, known: Sequence[Place]) -> State:
-    """Return the state before the first round; the arguments are the ones of `exchange`."""
+    """Return the state before the first round; the arguments are as in `exchange`."""
     size, inner = problem.basis.size, None
     if interior is not None:
         inner = _inner(problem, interior[:size])
@@ -241,7 +241,7 @@ def first_state(problem: Problem, start: Array, interior: Array | None, known: S
 
 
 def _inner(problem: Problem, x: Array) -> Candidate:
-    """The interior design in the unknowns (z, s), its requirements met with room where s allows that."""
+    """Return the interior design in (z, s), its requirements met with room where s allows that."""
     unit = candidate_at(problem, x, 1.0)
     if not problem.scaled:
         return unit
@@ -253,9 +253,9 @@ def _inner(problem: Problem, x: Array) -> Candidate:
 
 
 def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: list[Place]) -> list[Place]:
-    """Where to cut next: the worst places that have no cut yet (a flat ratio has hundreds of maxima).
+    """Return the worst places that have no cut yet, to cut next (a flat ratio has hundreds of maxima).
 
-    Of many scenarios the worst few: what serves them serves most of the others.
+    Of many scenarios only the worst few are cut: their cuts help most of the others.
     """
     most = 2 * problem.experiment.size + _MORE_CUTS
     ranked = [
@@ -280,7 +280,7 @@ _MORE = 6
 
 
 def power_rows(problem: Problem) -> list[Row]:
-    """One row for each power limit."""
+    """Return one row for each power limit."""
     pairs = zip(problem.limits, problem.limit_functionals, strict=True)
     return [
         Row(functional, limit.bound, limit.upper, limit=index)
@@ -289,7 +289,7 @@ def power_rows(problem: Problem) -> list[Row]:
 
 
 def density_row(problem: Problem, place: DensityPlace) -> Row:
-    """A density limit at one frequency in one direction."""
+    """Return the row of a density limit at one frequency in one direction."""
     limit = problem.densities[place.limit]
     level = float(limit.level(np.array([place.frequency]))[0])
     return Row(problem.density_at(place), level, limit.upper, density=place)
@@ -301,7 +301,7 @@ def form_row(problem: Problem, form: NDArray[np.float64]) -> Row:
 
 
 def first_density_rows(problem: Problem) -> list[Row]:
-    """Rows to begin with: spread over the band, along each channel and pair of channels."""
+    """Return rows to begin with: spread over the band, along each channel and pair of channels."""
     w = np.linspace(*problem.experiment.band, 2 * (problem.basis.degree + 1) + _MORE)
     directions = first_directions(np.ones(problem.experiment.inputs))
     return [
@@ -323,7 +323,7 @@ def on_basis(problem: Problem, row: Row) -> Row:
 
 
 def alike(problem: Problem, row: Row, place: DensityPlace) -> bool:
-    """Whether the row stands for the same limit at nearly the same place."""
+    """Return whether the row stands for the same limit at nearly the same place."""
     if row.density is None or row.density.limit != place.limit:
         return False
     lo, hi = problem.experiment.band

@@ -27,7 +27,7 @@ from inputdesign_cli.spectrum import svec
 
 @dataclass(frozen=True)
 class GridResult:
-    """The optimum on the grid: spectrum `x` (m + 1,), its cost, and the bound that its multipliers prove."""
+    """Holds the optimum on the grid: spectrum `x` (m + 1,), its cost, and the bound from its multipliers."""
 
     x: Array
     cost: float
@@ -83,7 +83,7 @@ def solve_on_grid(
 
 
 def _positive(c, order: int, positivity: str) -> list:
-    """c_0 + 2 sum c_r cos(r w) >= 0 for all w."""
+    """Return the constraints for c_0 + 2 sum c_r cos(r w) >= 0 at all w."""
     import cvxpy as cp
 
     if order == 0:

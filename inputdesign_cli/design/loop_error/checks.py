@@ -16,7 +16,7 @@ _VANISHES = 1e-7
 
 
 def check_invertible(plant: MatrixPlant, *, key: str) -> None:
-    """The determinant of the square G is not zero at every frequency.
+    """Raise if the determinant of the square G is zero at every frequency.
 
     Raises:
         SpecError: `singular-plant`.
@@ -31,7 +31,7 @@ def check_invertible(plant: MatrixPlant, *, key: str) -> None:
 
 
 def check_circle(plant: MatrixPlant, target: TransferMatrix | None, *, key: str) -> None:
-    """No zero of the plant lies on the unit circle, but where `target` vanishes.
+    """Raise if a zero of the plant lies on the unit circle where `target` does not vanish.
 
     Raises:
         SpecError: `infinite-criterion`.
@@ -50,7 +50,7 @@ def check_circle(plant: MatrixPlant, target: TransferMatrix | None, *, key: str)
 
 
 def check_model_reference(plant: MatrixPlant, target: TransferMatrix, *, key: str) -> None:
-    """G^-1 T is causal and stable.
+    """Raise unless G^-1 T is causal and stable.
 
     Raises:
         SpecError: `delay-too-short`, `non-minimum-phase`, `infinite-criterion`.
@@ -73,7 +73,7 @@ def check_model_reference(plant: MatrixPlant, target: TransferMatrix, *, key: st
 
 
 def check_minimum_variance(plant: MatrixPlant, T: ComplexArray, *, key: str) -> None:
-    """The plant is minimum phase with the same delay in every direction, and the law asks something of it.
+    """Raise unless the plant is minimum phase, with one delay in every direction, and the law gives feedback.
 
     Args:
         T: (K, n, n), the loop that the law gives, at some frequencies.
@@ -104,7 +104,7 @@ def check_minimum_variance(plant: MatrixPlant, T: ComplexArray, *, key: str) -> 
 
 
 def _not_cancelled(zeros: ComplexArray, target: TransferMatrix) -> ComplexArray:
-    """The zeros at which the desired loop does not vanish."""
+    """Return the zeros at which the desired loop does not vanish."""
     if not zeros.size:
         return zeros
     values = np.abs(at(target.numerator, 1 / zeros)).max(axis=(1, 2))

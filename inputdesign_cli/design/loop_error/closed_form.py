@@ -13,13 +13,13 @@ from inputdesign_cli.design.loop_error.laws import kronecker
 
 
 def eigen(matrix: ComplexArray) -> tuple[Array, ComplexArray]:
-    """Eigenvalues (K, n), rounding below zero removed, and eigenvectors of Hermitian matrices."""
+    """Return eigenvalues (K, n), rounding below zero removed, and eigenvectors of Hermitian matrices."""
     values, vectors = np.linalg.eigh(0.5 * (matrix + adjoint(matrix)))
     return np.maximum(values, 0.0), vectors
 
 
 def power_of(matrix: ComplexArray, exponent: float) -> ComplexArray:
-    """A Hermitian nonnegative matrix to a power, for each frequency."""
+    """Raise a Hermitian nonnegative matrix to a power, for each frequency."""
     values, vectors = eigen(matrix)
     with np.errstate(divide="ignore"):
         scaled = vectors * (values**exponent)[:, None, :]
@@ -27,13 +27,13 @@ def power_of(matrix: ComplexArray, exponent: float) -> ComplexArray:
 
 
 def best_spectrum(A: ComplexArray, M: ComplexArray) -> ComplexArray:
-    """Phi (K, n, n) from A = Z^T and the price M > 0 of power, both (K, n, n)."""
+    """Return the best spectrum Phi (K, n, n) for A = Z^T and the price M > 0 of power, both (K, n, n)."""
     outer, inner = power_of(M, 0.5), power_of(M, -0.5)
     return np.asarray(inner @ power_of(outer @ A @ outer, 0.5) @ inner)
 
 
 def error_of(A: ComplexArray, Phi: ComplexArray) -> Array:
-    """Return tr(A Phi^-1), zero where A is, infinite where A acts on the null space of Phi, (K,)."""
+    """Return tr(A Phi^-1), zero where A is zero, infinite where A acts on the null space of Phi, (K,)."""
     values, vectors = eigen(Phi)
     share = np.einsum("kai,kab,kbi->ki", np.conj(vectors), A, vectors).real
     negligible = share <= 1e-14 * np.abs(share).max(initial=0.0)
@@ -43,16 +43,16 @@ def error_of(A: ComplexArray, Phi: ComplexArray) -> Array:
 
 
 def adjoint(matrix: ComplexArray) -> ComplexArray:
-    """The conjugate transpose for each frequency."""
+    """Return the conjugate transpose for each frequency."""
     return np.conj(np.swapaxes(matrix, -1, -2))
 
 
 def weight(propagation: ComplexArray, entering: ComplexArray, noise: ComplexArray) -> ComplexArray:
-    """Z: how much a unit of variance of the plant estimate at a frequency hurts the loop.
+    """Return the weight Z of the variance of the plant estimate at a frequency in the error of the loop.
 
-    [rojas-asymptotic] (13), (17) and (19) without the factor n/(2 pi N), so that N E||y - y0||^2 is the mean
-    over frequency of tr(Z Phi^-T) for n = 1: Z (K, n, n) from d vec(S G Delta C S) / d vec G (K, n^2, n^2),
-    see `laws.propagation`.
+    [rojas-asymptotic] (13), (17) and (19) without the factor n/(2 pi N): for n = 1, N E||y - y0||^2 is the
+    mean over frequency of tr(Z Phi^-T). Z (K, n, n) follows from d vec(S G Delta C S) / d vec G (K, n^2,
+    n^2), see `laws.propagation`.
 
     The middle factor of (13) is split as (S^T (x) S G)^* (Phi^* (x) I) (S^T (x) S G), which squares no
     condition numbers.

@@ -29,7 +29,7 @@ class WhiteInput:
 
     Attributes:
         level: of its flat spectrum.
-        value: N E||y - y0||^2 of the covariance that was asked for.
+        value: N E||y - y0||^2 of the requested covariance.
         information: (k, k) for one sample.
     """
 
@@ -46,7 +46,7 @@ class LoopErrorDesign:
         frequencies: (K,) nodes of the rule, or lines, in rad/sample.
         spectrum: (K, n, n) density there, or power matrices of the lines.
         weights: (K,) with which a sum over them is a mean over frequency; one for lines.
-        value, lower_bound: N E||y - y0||^2 of the covariance that was asked for, J_o included.
+        value, lower_bound: N E||y - y0||^2 of the requested covariance, J_o included.
         noise_part: J_o, which no input changes.
         information: (k, k) for one sample.
         powers: (p,) mean tr(M_i Phi) of the limits.
@@ -75,28 +75,28 @@ class LoopErrorDesign:
 
     @property
     def of_lines(self) -> bool:
-        """Whether the spectrum consists of sinusoids."""
+        """Return whether the spectrum consists of sinusoids."""
         return self.multipliers is None
 
     @property
     def gap(self) -> float:
-        """(value - lower_bound) / value."""
+        """Return the relative gap (value - lower_bound) / value."""
         return abs(self.value - self.lower_bound) / self.value
 
     def density(self, w: Array) -> ComplexArray:
-        """Phi (K, n, n) at any normalised frequencies, of a design that is not `of_lines`."""
+        """Return Phi (K, n, n) at any normalised frequencies, of a design that is not `of_lines`."""
         assert self.multipliers is not None
         return self.problem.spectrum_at(w, self.multipliers, self.scale)
 
     def white_density(self, w: Array) -> ComplexArray:
-        """The spectrum (K, n, n) of `white`, zero outside the band."""
+        """Return the spectrum (K, n, n) of `white`, zero outside the band."""
         lo, hi = self.problem.band
         inside = ((w >= lo) & (w <= hi))[:, None, None]
         return np.where(inside, flat(self.white.level, w.size, self.problem.plant.inputs), 0.0)
 
     @property
     def input_covariance(self) -> Array:
-        """(n, n) of the input."""
+        """Return the covariance (n, n) of the input."""
         return np.asarray(np.einsum("kab,k->ab", self.spectrum, self.weights).real)
 
     @property
@@ -109,7 +109,7 @@ class LoopErrorDesign:
 def design_loop_error(
     problem: LoopErrorProblem, covariance: Literal["asymptotic", "parametric"], *, tolerance: float
 ) -> LoopErrorDesign:
-    """The best input for the closed-loop error, [rojas-asymptotic] Section VI.
+    """Design the best input for the closed-loop error, [rojas-asymptotic] Section VI.
 
     Args:
         covariance: of the estimate, in the limit of a high model order or exact for the model structure.
@@ -225,7 +225,7 @@ def _parametric(
 
 
 def _white(problem: LoopErrorProblem, power: float, rule: Quadrature) -> tuple[float, ComplexArray]:
-    """Level and density at the nodes (K, n, n) of white noise of this total power."""
+    """Return the level, and the density (K, n, n) at the nodes, of white noise of this total power."""
     inputs = problem.plant.inputs
     level = power / (inputs * float(rule.weights.sum()))
     return level, flat(level, rule.nodes.size, inputs)

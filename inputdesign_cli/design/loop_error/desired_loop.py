@@ -15,7 +15,7 @@ from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
 @dataclass(frozen=True)
 class DesiredLoop:
-    """T = b F: `free` F is stated, b is the all-pass of the zeros of the plant outside the unit circle.
+    """The desired loop T = b F: F is `free`, b the all-pass of the plant zeros outside the unit circle.
 
     A controller can have b only from the model, so b errs with the model.
 
@@ -28,7 +28,7 @@ class DesiredLoop:
 
     @cached_property
     def kept(self) -> Rational:
-        """b of the plant, with gain one at frequency zero."""
+        """Return the all-pass b of the plant, with gain one at frequency zero."""
         if self.outside is None or not self.outside.size:
             return Rational(np.ones(1))
         above = np.poly(self.outside).real
@@ -37,11 +37,11 @@ class DesiredLoop:
 
     @cached_property
     def whole(self) -> TransferMatrix:
-        """T of the plant."""
+        """Return the desired loop T of the plant."""
         return self.free.scaled(self.kept)
 
     def mirrored(self, determinants: Array) -> Array:
-        """Polynomials m (runs, l) with b = determinant / m for the determinants (runs, l) of models.
+        """Return polynomials m (runs, l) with b = determinant / m for the determinants (runs, l) of models.
 
         Zeros outside the circle are mirrored into it, and the value at frequency zero stays.
         """
@@ -58,7 +58,7 @@ class DesiredLoop:
         return found
 
     def gradient(self, logarithmic: Array, rule: Quadrature) -> ComplexArray | None:
-        """dT (K, k, n, n) at the nodes, as b errs with the model. None if b is one.
+        """Return dT (K, k, n, n) at the nodes, as b errs with the model. None if b is one.
 
         A zero z_i that moves by dz_i adds -dz_i / (z - z_i) to d log det G, its only poles outside the
         circle. With P their sum, d log b = 2j Im P on the circle.

@@ -32,25 +32,25 @@ from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
 
 class ControlLaw(Protocol):
-    """What the design needs to know of a control law."""
+    """Holds what the design needs to know of a control law."""
 
     @property
     def desired(self) -> DesiredLoop | None:
-        """T, and the zeros that it keeps. None if T follows from the noise."""
+        """Return T, and the zeros that it keeps. None if T follows from the noise."""
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
-        """T = G C (I + G C)^-1, the loop that the true plant would give."""
+        """Return T = G C (I + G C)^-1, the loop that the true plant would give."""
 
     def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """C(G)."""
+        """Return the controller C(G)."""
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
-        """d vec C / d vec H: (K, n^2, n^2). None if C ignores the noise model."""
+        """Return the derivative d vec C / d vec H (K, n^2, n^2). None if C ignores the noise model."""
 
     def loop_gradient(
         self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
     ) -> ComplexArray | None:
-        """dT (K, k, n, n) at the nodes as the parameters of the model move. None if T is fixed.
+        """Return dT (K, k, n, n) at the nodes as the parameters of the model move. None if T is fixed.
 
         Args:
             logarithmic: (K, k), tr(G^-1 dG).
@@ -59,7 +59,7 @@ class ControlLaw(Protocol):
         """
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
-        """The controller can run on this plant: it is causal, stable, and finite on the circle.
+        """Raise unless the controller can run on this plant: causal, stable, and finite on the circle.
 
         Raises:
             SpecError: see `checks`.
@@ -67,13 +67,13 @@ class ControlLaw(Protocol):
 
     @property
     def singularities(self) -> ComplexArray:
-        """Poles, and zeros of S, as points of the frequency plane."""
+        """Return poles, and zeros of S, as points of the frequency plane."""
 
 
 def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-    """Return d vec(S G Delta C S) / d vec G, what an error of the model does to the loop, (K, n^2, n^2).
+    """Return d vec(S G Delta C S) / d vec G, the effect of a model error on the loop, (K, n^2, n^2).
 
-    Equal to (S^T (x) S G) (d vec C / d vec G), but finite where S has a zero and C a pole.
+    It equals (S^T (x) S G) (d vec C / d vec G), but is finite where S has a zero and C a pole.
     """
     T = law.complementary(w)
     S = sensitivity(T)
@@ -81,7 +81,7 @@ def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:
 
 
 def complement(numerator: Array, denominator: Array) -> Array:
-    """The matrix of polynomials d I - N (n, n, l) of I - N / d."""
+    """Return the matrix of polynomials d I - N (n, n, l) of I - N / d."""
     n, size = numerator.shape[0], max(numerator.shape[-1], denominator.size)
     found = np.zeros((n, n, size))
     found[..., : numerator.shape[-1]] -= numerator
@@ -90,12 +90,12 @@ def complement(numerator: Array, denominator: Array) -> Array:
 
 
 def sensitivity(T: ComplexArray) -> ComplexArray:
-    """S = I - T for each frequency."""
+    """Return the sensitivity function S = I - T for each frequency."""
     return np.asarray(np.eye(T.shape[1]) - T, dtype=complex)
 
 
 def kronecker(left: NDArray, right: NDArray) -> ComplexArray:
-    """left (x) right for each frequency."""
+    """Return the Kronecker product left (x) right for each frequency."""
     product = np.einsum("kab,kcd->kacbd", left, right)
     rows, columns = left.shape[1] * right.shape[1], left.shape[2] * right.shape[2]
     return product.reshape(-1, rows, columns)
@@ -106,20 +106,20 @@ def _transposed(matrix: NDArray) -> NDArray:
 
 
 class _DesiredLaw:
-    """Laws that state the loop T, and ignore the noise model."""
+    """Control laws that state the loop T, and ignore the noise model."""
 
     if TYPE_CHECKING:
 
         @property
         def desired(self) -> DesiredLoop:
-            """T, and the zeros that it keeps."""
+            """Return T, and the zeros that it keeps."""
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
         """See `ControlLaw`."""
         return self.desired.whole.at(w)
 
     def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """C = G^-1 T (I - T)^-1."""
+        """Return the controller C = G^-1 T (I - T)^-1."""
         T = self.complementary(w)
         return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
 
@@ -144,7 +144,7 @@ class _DesiredLaw:
 
 @dataclass(frozen=True)
 class ModelReference(_DesiredLaw):
-    """C = G^-1 T (I - T)^-1: the loop from reference to output is T, [rojas-asymptotic] (18)."""
+    """The law C = G^-1 T (I - T)^-1: the loop from reference to output is T, [rojas-asymptotic] (18)."""
 
     target: TransferMatrix
 
@@ -160,7 +160,7 @@ class ModelReference(_DesiredLaw):
 
 @dataclass(frozen=True)
 class InternalModel(_DesiredLaw):
-    """C = (I - Q G)^-1 Q with Q = G^-1 T, T = b f I.
+    """The law of internal model control, C = (I - Q G)^-1 Q with Q = G^-1 T, T = b f I.
 
     f is the filter with the delay of the plant, b the all-pass of the zeros that G^-1 may not invert.
     """
@@ -169,7 +169,7 @@ class InternalModel(_DesiredLaw):
 
     @classmethod
     def build(cls, plant: MatrixPlant, filter_: Rational) -> InternalModel:
-        """With the delay and the zeros outside the unit circle of the plant in the loop."""
+        """Build the law with the delay, and the zeros outside the unit circle, of the plant in the loop."""
         missing = max(plant.inverse_delay - delay_of(filter_.numerator), 0)
         late = Rational(np.append(np.zeros(missing), filter_.numerator), filter_.denominator)
         outside = plant.zeros[np.abs(plant.zeros) > 1]
@@ -182,7 +182,7 @@ class InternalModel(_DesiredLaw):
 
 @dataclass(frozen=True)
 class MinimumVariance:
-    """C = G^-1 (H E^-1 - I): the output is E e, E the first `delay` terms of H."""
+    """The minimum-variance law C = G^-1 (H E^-1 - I): the output is E e, E the first `delay` terms of H."""
 
     plant: MatrixPlant
 
@@ -193,11 +193,11 @@ class MinimumVariance:
 
     @property
     def delay(self) -> int:
-        """The samples that pass before the input acts."""
+        """Return the number of samples that pass before the input acts."""
         return self.plant.inverse_delay
 
     def unavoidable(self, w: ArrayLike) -> ComplexArray:
-        """E (K, n, n), diagonal: what no controller can remove from the noise."""
+        """Return E (K, n, n), diagonal: the part of the noise that no controller can remove."""
         q = unit_circle(w)
         E = np.zeros((q.size, self.plant.outputs, self.plant.outputs), dtype=complex)
         for i, terms in enumerate(self._terms()):
@@ -214,13 +214,13 @@ class MinimumVariance:
         return np.asarray(np.linalg.inv(G) @ X)
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """d vec C / d vec H with E held: its few terms are known far better than H pointwise."""
+        """Return d vec C / d vec H with E held, since its few terms are known far better than H pointwise."""
         return kronecker(_transposed(np.linalg.inv(self.unavoidable(w))), np.linalg.inv(G))
 
     def loop_gradient(
         self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
     ) -> ComplexArray | None:
-        """dT = E H^-1 dH H^-1 - dE H^-1, with dE the first terms of dH, see `ControlLaw`."""
+        """Return dT = E H^-1 dH H^-1 - dE H^-1, with dE the first terms of dH, see `ControlLaw`."""
         H, q = self.plant.noise_at(rule.nodes)[:, None], unit_circle(rule.nodes)
         powers = q ** np.arange(self.delay)[:, None]
         terms = np.einsum("dk,klab->dlab", rule.weights / powers, H @ relative_noise).real

@@ -41,7 +41,7 @@ class LimitedDesign:
 
     @property
     def gap(self) -> float:
-        """(value - lower_bound) / value."""
+        """Return the relative gap (value - lower_bound) / value."""
         return (self.value - self.lower_bound) / self.value if self.value > 0 else 0.0
 
 
@@ -99,7 +99,7 @@ def design_within(A: ComplexArray, metrics: ComplexArray, limits: Array, weights
 
 @dataclass(frozen=True)
 class _Point:
-    """The dual function, its derivatives and the primal it suggests, at one set of multipliers."""
+    """Holds the dual function, its derivatives and the primal it suggests, at one set of multipliers."""
 
     spectrum: ComplexArray
     powers: Array
@@ -136,7 +136,7 @@ class _Point:
 
 
 def _ascent(point: _Point, share: Array) -> Array:
-    """Newton's direction in the variables that are free to move, damped where the dual is nearly flat."""
+    """Return Newton's direction in the free variables, damped where the dual is nearly flat."""
     fading = (share < 1e-8 * share.max()) & (point.gradient < 0)
     free = ~fading
     curvature = -point.hessian[np.ix_(free, free)]
@@ -157,7 +157,7 @@ def _dual(A: ComplexArray, metrics: ComplexArray, share: Array, weights: Array) 
 
 
 def _best_length(A: ComplexArray, metrics: ComplexArray, share: Array, weights: Array) -> float:
-    """t that maximises the dual along t * share: 2 sqrt(t) a - t b is greatest at (a/b)^2."""
+    """Return t that maximises the dual along t * share: 2 sqrt(t) a - t b is greatest at (a/b)^2."""
     total = float(share.sum())
     half = 0.5 * (_dual(A, metrics, share, weights) + total)
     return (half / total) ** 2

@@ -33,7 +33,7 @@ _MARGIN = 0.1
 
 @dataclass(frozen=True)
 class ParametricCriterion:
-    """tr(W (M0 + M(Phi))^-1) for one sample; W and M0 (k, k) real and symmetric.
+    """The criterion tr(W (M0 + M(Phi))^-1) for one sample; W and M0 (k, k) real and symmetric.
 
     `sources(w)` gives X (K, k, n, m) = Phi_v^-1/2 dG_l, so that
     M_lm(Phi) = mean Re tr(X_l Phi X_m^*).
@@ -44,19 +44,19 @@ class ParametricCriterion:
     sources: Callable[[Array], ComplexArray]
 
     def information(self, w: Array, Phi: ComplexArray, weights: Array) -> Array:
-        """M (k, k) of the spectrum Phi (K, n, n) at `w`, for a mean with `weights` (K,)."""
+        """Return M (k, k) of the spectrum Phi (K, n, n) at `w`, for a mean with `weights` (K,)."""
         X = self.sources(w)
         excited = X @ Phi[:, None]
         return self.noise_information + np.einsum("klab,kmab,k->lm", excited, np.conj(X), weights).real
 
     def value(self, information: Array) -> float:
-        """tr(W M^-1)."""
+        """Return the criterion tr(W M^-1)."""
         return float(np.trace(np.linalg.solve(information, self.W)))
 
 
 @dataclass(frozen=True)
 class LineDesign:
-    """Sinusoids: `spectrum` (J, n, n) are power matrices, whose sum's real part is the covariance of u."""
+    """Holds sinusoids: `spectrum` (J, n, n) are power matrices; Re of their sum is the covariance of u."""
 
     frequencies: Array
     spectrum: ComplexArray
@@ -67,34 +67,34 @@ class LineDesign:
 
     @property
     def gap(self) -> float:
-        """(value - lower_bound) / value."""
+        """Return the relative gap (value - lower_bound) / value."""
         return (self.value - self.lower_bound) / self.value
 
 
 @dataclass(frozen=True)
 class WeightedCovariance(OneCondition):
-    """tr(V^T P V) <= 1, V = `directions` (k, q) in the coordinates of the experiment."""
+    """The requirement tr(V^T P V) <= 1, V = `directions` (k, q) in the coordinates of the experiment."""
 
     directions: Array
 
     @property
     def name(self) -> str:
-        """`closed_loop_error`."""
+        """Return the name `closed_loop_error`."""
         return "closed_loop_error"
 
     def ratio(self, information: Array) -> float:
-        """The root of the trace."""
+        """Return the root of the trace."""
         return float(np.linalg.norm(inverse_factor(information) @ self.directions))
 
     def cut(self, frequency: float | None) -> Cut:
-        """The requirement itself."""
+        """Return the requirement itself as a cut."""
         return VarianceCut(self.directions)
 
 
 def least_error(
     criterion: ParametricCriterion, experiment: Experiment, limits: Sequence[PowerLimit], *, tolerance: float
 ) -> LineDesign:
-    """The sinusoids of the least tr(W P), with a bound that holds for every spectrum within the limits.
+    """Find the sinusoids of the least tr(W P), with a bound for every spectrum within the limits.
 
     Args:
         experiment: one sample of the model structure in open loop, within the band.
@@ -129,7 +129,7 @@ _STEP = 0.02
 
 @dataclass(frozen=True)
 class LossTheory:
-    """N E||y - y0||^2 = `value`, and mean and standard deviation of its root over experiments."""
+    """Holds N E||y - y0||^2 = `value`, and mean and standard deviation of its root over experiments."""
 
     value: float
     mean: float
@@ -137,19 +137,19 @@ class LossTheory:
 
 
 def loss_theory(criterion: ParametricCriterion, information: Array) -> LossTheory:
-    """For the model structure; `information` (k, k) is that of one sample."""
+    """Return the theory for the model structure; `information` (k, k) is of one sample."""
     covariance = np.asarray(np.linalg.inv(information))
     return LossTheory(criterion.value(information), *root_moments(error_eigenvalues(criterion.W, covariance)))
 
 
 def error_eigenvalues(W: Array, covariance: Array) -> Array:
-    """Eigenvalues of P^1/2 W P^1/2, nonnegative: the weights of the squared normal variables."""
+    """Return eigenvalues of P^1/2 W P^1/2, nonnegative: the weights of the squared normal variables."""
     root = np.linalg.cholesky(covariance)
     return np.asarray(np.maximum(np.linalg.eigvalsh(root.T @ W @ root), 0.0))
 
 
 def root_moments(eigenvalues: Array) -> tuple[float, float]:
-    """Mean and standard deviation of sqrt(sum_i eigenvalue_i z_i^2), z_i standard normal.
+    """Return mean and standard deviation of sqrt(sum_i eigenvalue_i z_i^2), z_i standard normal.
 
     E sqrt(Q) = (1 / 2 sqrt(pi)) integral over s > 0 of (1 - E exp(-s Q)) s^-3/2, and
     E exp(-s Q) = prod (1 + 2 s eigenvalue_i)^-1/2; the trapezoidal rule in log s is exact to rounding.

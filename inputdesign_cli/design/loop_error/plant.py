@@ -14,7 +14,7 @@ from inputdesign_cli.plant.polynomial_model import PolynomialModel
 
 
 class MatrixPlant(PolynomialModel):
-    """`PolynomialModel` as G = R^-1 N, R diagonal, with what inverting a square G takes."""
+    """A `PolynomialModel` as G = R^-1 N, R diagonal, with the parts needed to invert a square G."""
 
     @classmethod
     def of(cls, channels: PolynomialModel) -> MatrixPlant:
@@ -28,13 +28,13 @@ class MatrixPlant(PolynomialModel):
         return self.of(super().at(theta, covariance))
 
     def disturbance_at(self, w: ArrayLike) -> ComplexArray:
-        """Phi_v (K, n, n), the spectrum of the noise at the outputs."""
+        """Return Phi_v (K, n, n), the spectrum of the noise at the outputs."""
         H = self.noise_at(w)
         return H @ self.covariance @ np.conj(np.swapaxes(H, 1, 2))
 
     @property
     def numerator(self) -> Array:
-        """N (outputs, inputs, l): G = R^-1 N with R diagonal, R_i = A_i prod_j F_ij."""
+        """Return N (outputs, inputs, l): G = R^-1 N with R diagonal, R_i = A_i prod_j F_ij."""
         return self._fractions[:, 1:]
 
     @cached_property
@@ -43,28 +43,28 @@ class MatrixPlant(PolynomialModel):
 
     @cached_property
     def regular(self) -> bool:
-        """Whether the square G has an inverse at all."""
+        """Return whether the square G has an inverse at all."""
         return bool(np.any(self._inverse[0]))
 
     @cached_property
     def inverse_delay(self) -> int:
-        """The least d for which q^-d G^-1 is causal."""
+        """Return the least d for which q^-d G^-1 is causal."""
         det, adj = self._inverse
         return delay_of(det) - delay_of(adj)
 
     @cached_property
     def delay(self) -> int:
-        """The least delay among the entries of G."""
+        """Return the least delay among the entries of G."""
         return delay_of(self.numerator)
 
     @cached_property
     def zeros(self) -> ComplexArray:
-        """Transmission zeros in z of the square G (with stable ones that cancel against F)."""
+        """Return the transmission zeros in z of the square G (with stable ones that cancel against F)."""
         return roots_in_z(self._inverse[0])
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros of G and H as points of the frequency plane."""
+        """Return poles and zeros of G and H as points of the frequency plane."""
         poles = super().singularities
         if self.outputs != self.inputs or not self.regular:
             return poles

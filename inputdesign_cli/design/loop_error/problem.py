@@ -33,7 +33,7 @@ _WHITE = Rational(np.ones(1))
 
 
 def metric(limit: PowerLimit, w: ArrayLike, G: ComplexArray) -> ComplexArray:
-    """Return M (K, n, n) with mean tr(M Phi) the limited power; G is that of the plant at `w`."""
+    """Return M (K, n, n) with mean tr(M Phi) the limited power; G is the plant at `w`."""
     size = G.shape[1] if limit.kind == "output" else G.shape[2]
     picked = np.eye(size) if limit.channel is None else np.diag(np.eye(size)[limit.channel])
     if limit.kind == "output":
@@ -44,7 +44,7 @@ def metric(limit: PowerLimit, w: ArrayLike, G: ComplexArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class LoopErrorProblem:
-    """E||y - y0||^2 of the loop with the controller designed on the model, and what the input may cost.
+    """The error E||y - y0||^2 of the loop with the controller designed on the model, and the input limits.
 
     Attributes:
         estimated: the model in what is estimated, with the G and H of `plant`. None stands for every
@@ -65,26 +65,26 @@ class LoopErrorProblem:
 
     @property
     def structure(self) -> Model:
-        """The model in what is estimated."""
+        """Return the model in the parameters that are estimated."""
         return self.plant if self.estimated is None else self.estimated
 
     def entering(self, w: ArrayLike) -> ComplexArray:
-        """Phi_r + Phi_v (K, n, n)."""
+        """Return the spectrum Phi_r + Phi_v (K, n, n) that drives the error of the loop."""
         noise = self.plant.disturbance_at(w)
         reference = np.abs(self.reference_filter.at(w))[:, None, None] ** 2 * np.diag(self.reference_variance)
         return np.asarray(noise + reference)
 
     def weight(self, w: ArrayLike) -> ComplexArray:
-        """Z (K, n, n), [rojas-asymptotic] (17)."""
+        """Return the weight Z (K, n, n), [rojas-asymptotic] (17)."""
         sent = propagation(self.law, self.plant.plant_at(w), w)
         return weight_from(sent, self.entering(w), self.plant.disturbance_at(w))
 
     def target(self, w: ArrayLike) -> ComplexArray:
-        """Z^T, which is what Phi^-1 is weighted with."""
+        """Return Z^T, the weight of Phi^-1."""
         return np.swapaxes(self.weight(w), 1, 2)
 
     def metrics(self, w: ArrayLike) -> ComplexArray:
-        """M_i (p, K, n, n) of the limits."""
+        """Return the weights M_i (p, K, n, n) of the limits."""
         G = self.plant.plant_at(w)
         return np.array([metric(limit, w, G) for limit in self.limits])
 
@@ -95,17 +95,17 @@ class LoopErrorProblem:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Where integrands over frequency are not analytic, as points of the frequency plane."""
+        """Return the points of the frequency plane at which integrands over frequency are not analytic."""
         reference = logarithmic_distance(self.reference_filter.poles)
         return np.concatenate([self.plant.singularities, self.law.singularities, reference])
 
     def rule(self, refine: int, *, band: bool = True) -> Quadrature:
-        """Nodes and weights of means over frequency, inside the band or over all of the circle."""
+        """Return nodes and weights of means over frequency, inside the band or over all of the circle."""
         lo, hi = self.band if band else (0.0, np.pi)
         return graded_quadrature(self.singularities, lo=lo, hi=hi, refine=refine)
 
     def settled(self, compute: Callable[[Quadrature], float]) -> tuple[Quadrature, float]:
-        """The coarsest rule whose mean agrees with that of halved panels, and the relative change."""
+        """Return the coarsest rule whose mean agrees with halved panels, and the relative change."""
         rule = self.rule(0)
         value, change = compute(rule), np.inf
         for refine in range(1, _HALVINGS + 1):
@@ -118,7 +118,7 @@ class LoopErrorProblem:
         return rule, change
 
     def asymptotic(self) -> tuple[LimitedDesign, Quadrature, float]:
-        """The best spectrum at the nodes of a rule, the rule, and how far its means have settled."""
+        """Return the best spectrum at the nodes of a rule, the rule, and the relative change of its means."""
 
         def total(rule: Quadrature) -> float:
             A = self.target(rule.nodes)
@@ -132,7 +132,7 @@ class LoopErrorProblem:
         return design, rule, change
 
     def spectrum_at(self, w: ArrayLike, multipliers: Array, scale: float = 1.0) -> ComplexArray:
-        """Phi (K, n, n) that belongs to the multipliers, at any frequencies; zero outside the band."""
+        """Return the Phi (K, n, n) of the multipliers at any frequencies; zero outside the band."""
         w = np.asarray(w, dtype=float)
         Phi = scale * best_spectrum(self.target(w), self._price(multipliers, w))
         inside = (w >= self.band[0] * (1 - 1e-12)) & (w <= self.band[1] * (1 + 1e-12))
@@ -142,7 +142,7 @@ class LoopErrorProblem:
         return np.asarray(np.einsum("p,pkab->kab", multipliers, self.metrics(w)))
 
     def model_of_noise_part(self) -> float:
-        """J_o: what the error of the noise model adds, whatever the input (zero if C ignores H)."""
+        """Return J_o, the error due to the noise model, whatever the input (zero if C ignores H)."""
         rule = self.rule(1, band=False)
         w, n = rule.nodes, self.plant.outputs
         G = self.plant.plant_at(w)
@@ -158,7 +158,7 @@ class LoopErrorProblem:
         return float(np.einsum("kab,kba,k->", adjoint(J) @ entering @ J, variance, rule.weights).real)
 
     def parametric(self) -> ParametricCriterion:
-        """tr(W P) of the model structure."""
+        """Return the criterion tr(W P) of the model structure."""
         plant, model, rule = self.plant, self.structure, self.rule(1, band=False)
         X, relative = self._parameter_errors(rule)
         inverse = np.linalg.inv(plant.covariance)
@@ -170,7 +170,7 @@ class LoopErrorProblem:
         return ParametricCriterion(W, M0, lambda w: np.asarray(whitener @ model.input_gradient(w)))
 
     def _parameter_errors(self, rule: Quadrature) -> tuple[ComplexArray, ComplexArray]:
-        """X_l (K, k, n, n) of the loop at the nodes, see `parametric`, and H^-1 dH_l."""
+        """Return X_l (K, k, n, n) of the loop at the nodes, see `parametric`, and H^-1 dH_l."""
         plant, model, w = self.plant, self.structure, rule.nodes
         dG, relative = model.plant_gradient(w), model.noise_gradient(w)
         G, T = plant.plant_at(w), self.law.complementary(w)
@@ -180,6 +180,6 @@ class LoopErrorProblem:
         return (X if moved is None else X + moved), relative
 
     def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
-        """The best input of the model structure among all spectra within the limits."""
+        """Find the best input of the model structure among all spectra within the limits."""
         experiment = Experiment(self.structure, 1, self.band)
         return least_error(criterion, experiment, self.limits, tolerance=tolerance)

@@ -51,7 +51,7 @@ class BranchAndBound:
 
     @staticmethod
     def start(problem: ToeplitzProblem) -> BranchAndBound:
-        """All shapes in one box, nothing known."""
+        """Return the start of the proof: all shapes in one box, nothing known."""
         edge = np.ones(problem.m - 1)
         tree = BranchAndBound(problem, Lift(problem))
         tree.open.append(Node(-np.inf, next(tree._order), Box(-edge, edge)))
@@ -59,12 +59,12 @@ class BranchAndBound:
 
     @property
     def assumed(self) -> bool:
-        """Whether `bound` rests on the assumption of `limits.SMALLEST_EIGENVALUE`."""
+        """Return whether `bound` rests on the assumption of `limits.SMALLEST_EIGENVALUE`."""
         return self.closed_assumed or any(node.assumed for node in self.open)
 
     @property
     def bound(self) -> float:
-        """The error at least, over all boxes, at the largest energy that was asked about so far."""
+        """Return the least error over all boxes, at the largest energy considered so far."""
         return min(self.closed, self.open[0].bound if self.open else np.inf)
 
     def prove(
@@ -136,7 +136,7 @@ class BranchAndBound:
 
 
 def _without_shapes(box: Box) -> bool:
-    """Whether some vector shows that P11 is nowhere positive semidefinite in the box."""
+    """Return whether some vector shows that P11 is nowhere positive semidefinite in the box."""
     m = box.lower.size + 1
     i = np.arange(m)
     lag = np.abs(i[:, None] - i[None, :])

@@ -12,11 +12,11 @@ from inputdesign_cli.design.regression.model import Regression
 
 
 def least_energy(regression: Regression, target: float) -> Array:
-    """(n, n): the R of least trace whose worst mean-squared error is `target` ([eckhard-mse], Theorem 2).
+    """Return the R (n, n) of least trace with worst mean-squared error `target` ([eckhard-mse], Theorem 2).
 
-    k solves k^2 |L2|^2 alpha^2 + k S + gamma = 0. Of it and of 1 + k, which solves a quadratic of its
-    own, the quotient is written with the sum of terms of one sign: nothing cancels and nothing is
-    divided by alpha or |L2|.
+    k solves k^2 |L2|^2 alpha^2 + k S + gamma = 0. k and 1 + k, which solves another quadratic, are both
+    written as the quotient with a sum of terms of one sign. So nothing cancels and nothing is divided by
+    alpha or |L2|.
     """
     a2 = regression.neglected_norm**2
     first = a2 * float(regression.estimated @ regression.estimated)
@@ -44,11 +44,11 @@ def least_error(regression: Regression, energy: float) -> Array:
 
 
 def energy_bound(regression: Regression, target: float, R: Array) -> float:
-    """A lower bound on the least energy of any R >= 0, whatever its structure.
+    """Return a lower bound on the least energy of any R >= 0, whatever its structure.
 
     Energy is at least |y|^2 / q for y = [L1; z], z = R21 w, and q = w^T R11 w (Schur complement), and
     |y|^2 / q >= 2 s^T y - q |s|^2 for every s. With sigma^2 q <= gamma - alpha^2 |z - L2|^2 the minimum
-    over z is explicit. s is read off `R`; the bound holds whatever it is.
+    over z is explicit. s is read off `R`; the bound holds for any s.
     """
     s = _slope(regression, R)
     size = float(s @ s)
@@ -65,10 +65,10 @@ def energy_bound(regression: Regression, target: float, R: Array) -> float:
 
 
 def error_bound(regression: Regression, energy: float) -> float:
-    """A lower bound on the error of any R >= 0 of trace `energy`, whatever its structure.
+    """Return a lower bound on the error of any R >= 0 of trace `energy`, whatever its structure.
 
-    The error is at least alpha^2 |d|^2 + sigma^2 (|L1|^2 + |L2 + d|^2) / E for some d, and
-    alpha^2 |d|^2 >= 2 p^T d - |p|^2 / alpha^2 for every p. The p of the optimum is taken.
+    The error is at least alpha^2 |d|^2 + sigma^2 (|L1|^2 + |L2 + d|^2) / E for some d. Further, alpha^2 |d|^2
+    >= 2 p^T d - |p|^2 / alpha^2 for every p. The p of the optimum is taken.
     """
     a2, variance = regression.neglected_norm**2, regression.variance
     fixed = variance * float(regression.estimated @ regression.estimated) / energy

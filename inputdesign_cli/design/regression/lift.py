@@ -33,7 +33,7 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Box:
-    """lower <= rho_1 .. rho_{m-1} <= upper, both (m - 1,)."""
+    """The box lower <= rho_1 .. rho_{m-1} <= upper, both (m - 1,)."""
 
     lower: Array
     upper: Array
@@ -44,7 +44,7 @@ class Box:
         return 0.5 * (self.lower + self.upper)
 
     def halves(self, coordinate: int, at: float) -> tuple[Box, Box]:
-        """The box cut in two across a coordinate."""
+        """Return the two halves of the box, cut across a coordinate."""
         upper, lower = self.upper.copy(), self.lower.copy()
         upper[coordinate] = lower[coordinate] = at
         return Box(self.lower, upper), Box(lower, self.upper)
@@ -52,7 +52,7 @@ class Box:
 
 @dataclass(frozen=True)
 class BoxLimits:
-    """u = D w with |w|^2 <= limit for all shapes of a box that matter (see `limits.box_limits`).
+    """The bound |w|^2 <= limit, with u = D w, for all shapes of a box that matter (see `limits.box_limits`).
 
     The limit keeps the relaxation bounded and pays for the last digits of its dual point.
 
@@ -69,7 +69,7 @@ class BoxLimits:
 
 @dataclass(frozen=True)
 class NodeBound:
-    """`bound` on |b|^2 + kappa v over the shapes of a box, and what its relaxation suggests.
+    """Holds a lower `bound` on |b|^2 + kappa v over a box, and the start that its relaxation suggests.
 
     Attributes:
         rho: (n,) autocorrelations of the relaxed optimum, a good start.
@@ -83,7 +83,7 @@ class NodeBound:
 
 @dataclass(frozen=True)
 class Lift:
-    """The relaxation of a problem; one object serves all boxes and weights.
+    """The relaxation of a problem; one object is used for all boxes and weights.
 
     Whatever is affine in the unknowns is an array whose first axis holds the constant, then the derivative
     with respect to each unknown: the Y_ij (but E[rho_0] = 1, the constant), then svec of B >= E[b b^T].
@@ -98,7 +98,7 @@ class Lift:
 
     @cached_property
     def _unknowns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return Y_ij by lag (t, m + 1, m + 1, n). (t, biases, biases): B."""
+        """Return Y_ij by lag (t, m + 1, m + 1, n), and B (t, biases, biases)."""
         n, size = self.problem.n, self.problem.m + 1
         first, second = np.triu_indices(size)
         rows, columns, scale = svec_layout(self.biases)
@@ -112,7 +112,7 @@ class Lift:
 
     @cached_property
     def products(self) -> tuple[Block, ...]:
-        """Y >= 0 on the symmetric and on the skew vectors."""
+        """Return the constraint Y >= 0 on the symmetric and on the skew vectors."""
         parts = [basis.T @ self.problem.lags @ basis for basis in self.problem.halves]
         lifted = [np.einsum("tijk,kab->tiajb", self._unknowns[0], lags) for lags in parts]
         return tuple(
@@ -125,13 +125,13 @@ class Lift:
         return np.einsum("tijk,kra->tijra", self._unknowns[0], self.problem.lags[:, :, : self.problem.m])
 
     def _errors(self, D: Array) -> NDArray[np.float64]:
-        """(t, m + 1, n): E[(1, w)_i (P u - L)], P u from the first m columns of P: its first rows vanish."""
+        """Return E[(1, w)_i (P u - L)] (t, m + 1, n), P u from m columns of P; the first rows vanish."""
         wanted = np.concatenate([self.problem.first, self.problem.second])
         excited = np.einsum("tijra,aj->tir", self._multiplied[:, :, 1:], D)
         return excited - self._unknowns[0][:, :, 0, 0, None] * wanted
 
     def bound(self, box: Box, kappa: float, allowed: BoxLimits) -> NodeBound | None:
-        """A lower bound on |b|^2 + kappa v over the box; None when the solver gave nothing to build on."""
+        """Return a lower bound on |b|^2 + kappa v over the box; None when the solver gave no multipliers."""
         m = self.problem.m
         blocks = self.blocks(box, allowed)
         q, scale = self.cost(kappa, allowed.D)
@@ -148,14 +148,14 @@ class Lift:
         return NodeBound(value, rho, spread)
 
     def cost(self, kappa: float, D: Array) -> tuple[Array, float]:
-        """|b|^2 + kappa L1^T D w, divided by the second value returned."""
+        """Return |b|^2 + kappa L1^T D w, divided by the second value returned."""
         Y, B = self._unknowns
         scale = max(1.0, kappa)
         variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ D))
         return (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale, scale
 
     def blocks(self, box: Box, allowed: BoxLimits) -> list[Block]:
-        """The products come first, then the Gram matrix and the limit: `_repaired` goes by their places."""
+        """Return the constraint blocks of the semidefinite program, in the order that `_repaired` expects."""
         Y, B = self._unknowns
         size, m = len(Y), self.problem.m
         errors = self._errors(allowed.D)
@@ -179,11 +179,12 @@ class Lift:
     def _repaired(
         self, q: Array, blocks: Sequence[Block], multipliers: Sequence[Array], limit: float, weight: float
     ) -> float:
-        """The value of a dual point made feasible from the solver's multipliers.
+        """Return the value of a dual point made feasible from the solver's multipliers.
 
         q^T x >= residual^T x - sum offset_i^T z_i with the residual q - sum matrix_i^T z_i, whenever every
-        z_i lies in its cone. Each is projected, that of the Gram matrix with exactly the `weight` of B, so
-        that B has no residual. No E[(1, w)_i (1, w)_j rho_k] exceeds the limit on |w|^2, or its root, or one.
+        z_i lies in its cone. Each is projected. The multiplier of the Gram matrix keeps exactly the `weight`
+        of B, so that B has no residual. No E[(1, w)_i (1, w)_j rho_k] exceeds the limit on |w|^2, or its
+        root, or one.
         """
         z, many = list(multipliers), len(self.products)
         z[many] = self._with_weight(z[many], weight)
@@ -199,7 +200,7 @@ class Lift:
         return -lost - float(sum(block.offset @ own for block, own in zip(blocks, z, strict=True)))
 
     def _with_weight(self, z: Array, weight: float) -> Array:
-        """A multiplier [[T, G], [G^T, weight I]] >= 0 of the Gram matrix, as near as can be to z."""
+        """Return the multiplier [[T, G], [G^T, weight I]] >= 0 of the Gram matrix nearest to z."""
         matrix, head = smat(z), self.problem.m + 1
         G = matrix[:head, head:]
         least = G @ G.T / weight

@@ -20,11 +20,11 @@ _ROUNDING = 1e-12
 
 
 def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimits:
-    """Return what a box allows for shapes with v <= `largest_v`.
+    """Return the limits in a box on shapes with v <= `largest_v`.
 
-    With C at the centre of the box, r the change of P11 over it and D = sqrt(s) (C + r)^(-1/2) in each part,
-    |w|^2 = u^T (C + r) u / s <= (v + 2 r |u|^2) / s, and also <= (largest eigenvalue) |u|^2 / s. s is chosen
-    to make that of order one.
+    C is P11 at the centre of the box, r its change over the box, and D = sqrt(s) (C + r)^(-1/2) in each part.
+    Then |w|^2 = u^T (C + r) u / s <= (v + 2 r |u|^2) / s, and also <= (largest eigenvalue) |u|^2 / s. s is
+    chosen to make the limit of order one.
     """
     C = scipy.linalg.toeplitz(np.concatenate([[1.0], box.centre]))
     change = scipy.linalg.toeplitz(np.concatenate([[0.0], 0.5 * (box.upper - box.lower)]))
@@ -48,7 +48,7 @@ def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimit
 
 
 def _most(weight: float, lowest: float, largest_v: float, *, single: bool) -> tuple[float, bool]:
-    """Return what |u|^2 of a part is at most, and whether that rests on `SMALLEST_EIGENVALUE`.
+    """Return an upper bound on |u|^2 of a part, and whether it rests on `SMALLEST_EIGENVALUE`.
 
     Args:
         weight: |L1|^2 of the part; `lowest` bounds its eigenvalues from below, `single`: it has one.

@@ -25,7 +25,7 @@ _RELAXED = (1.0, 1e-2, 1e-4, 1e-6, 1e-9)
 
 @dataclass(frozen=True)
 class Goal:
-    """Least error for an energy, or least energy for a target error, in the units of `ToeplitzProblem`.
+    """The goal: least error for an energy, or least energy for a target error, in units of `ToeplitzProblem`.
 
     Attributes:
         kappa: sigma^2 n / (energy unit): the error of v = 1 when the energy is given; else None.
@@ -37,7 +37,7 @@ class Goal:
     biased: bool = True
 
     def value(self, shape: Autocorrelations) -> float:
-        """What is minimised: the error, or 1 / kappa (the energy but for a factor); infinite if not met."""
+        """Return what is minimised: the error, or 1 / kappa (energy up to a factor); infinite if not met."""
         if self.kappa is not None:
             return Weight(self.kappa, self.biased)(shape)
         assert self.target is not None
@@ -45,13 +45,13 @@ class Goal:
         return shape.v / slack if slack > 0.0 else np.inf
 
     def weight(self, value: float) -> Weight:
-        """The convexified goal at a value that is reached: least error at that energy, [dinkelbach-1967]."""
+        """Return the convexified goal at a reached value: least error at that energy, [dinkelbach-1967]."""
         return Weight(self.kappa if self.kappa is not None else 1.0 / value, self.biased)
 
 
 @dataclass
 class Counter:
-    """How many small programs were solved."""
+    """Counts the small programs that were solved."""
 
     solves: int = field(default=0)
 
@@ -59,7 +59,7 @@ class Counter:
 def descend(
     problem: ToeplitzProblem, region: Region, goal: Goal, start: Autocorrelations, counter: Counter
 ) -> Autocorrelations:
-    """A local minimum of the goal from `start`; it may miss the target if no feasible shape was met."""
+    """Find a local minimum of the goal from `start`; it may miss the target if no feasible shape was met."""
     shape = start
     for relaxed in _RELAXED:
         if np.isfinite(goal.value(shape)):
@@ -113,7 +113,7 @@ def _trust_region(
 
 
 def starts(problem: ToeplitzProblem, count: int, rng: np.random.Generator) -> list[Autocorrelations]:
-    """White, and random shapes of a few lines over a little white noise."""
+    """Return starts: white, and random shapes of a few lines over a little white noise."""
     shapes = [problem.evaluate(np.eye(problem.n)[0])]
     for _ in range(count):
         lines = rng.integers(1, problem.n + 1)
@@ -135,9 +135,9 @@ _SETTLED = 1e-9
 def alternate(
     problem: ToeplitzProblem, goal: Goal, start: Autocorrelations, counter: Counter
 ) -> Autocorrelations:
-    """Where the alternation of [eckhard-mse], Section 4.2, ends: fix R11 and solve, fix Z and solve, repeat.
+    """Run the alternation of [eckhard-mse], Section 4.2: fix R11 and solve, fix Z and solve, repeat.
 
-    With Z = R11^-1 R12 fixed, R is generally only free to scale: for m >= 2 the shape of R11 never leaves its
+    With Z = R11^-1 R12 fixed, R is generally only free to scale: for m >= 2 the shape of R11 stays as at its
     start. It is here so that one can see that; its gap comes from the proof of the others.
 
     A target that the present shape misses is approached by reducing the bias alone.

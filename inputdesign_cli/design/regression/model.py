@@ -20,20 +20,20 @@ _OUTSIDE = 1e-6
 
 @dataclass(frozen=True)
 class ErrorSplit:
-    """Worst-case mean-squared error over |theta_2| <= alpha: squared bias and variance."""
+    """Holds the worst-case mean-squared error over |theta_2| <= alpha: squared bias and variance."""
 
     bias_squared: float
     variance: float
 
     @property
     def total(self) -> float:
-        """The mean-squared error."""
+        """Return the mean-squared error."""
         return self.bias_squared + self.variance
 
 
 @dataclass(frozen=True)
 class Regression:
-    """Weights of the quantity of interest and what is known of the system.
+    """Holds the weights of the quantity of interest and what is known of the system.
 
     Attributes:
         estimated: (m,) L1, weights of the estimated parameters.
@@ -49,12 +49,12 @@ class Regression:
 
     @property
     def m(self) -> int:
-        """Number of estimated parameters."""
+        """Return the number of estimated parameters."""
         return self.estimated.size
 
     @property
     def n(self) -> int:
-        """Number of all parameters."""
+        """Return the number of all parameters."""
         return self.estimated.size + self.neglected.size
 
     def bias(self, R: Array) -> Array:
@@ -62,7 +62,7 @@ class Regression:
         return R[self.m :, : self.m] @ self._weights(R) - self.neglected
 
     def error(self, R: Array) -> ErrorSplit:
-        """The worst mean-squared error that the moments R (n, n) buy [eckhard-mse] (6), (33), (34).
+        """Return the worst mean-squared error with the moments R (n, n), [eckhard-mse] (6), (33), (34).
 
         Infinite when R11 does not excite all of L1.
         """
@@ -84,7 +84,7 @@ class Regression:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of the optimal value (envelope theorem: at the optimum only the data move).
+    """Holds the derivatives of the optimal value (envelope theorem: at the optimum only the data move).
 
     `goal` is with respect to the target error for a least-energy design and to the energy for a
     least-error design.

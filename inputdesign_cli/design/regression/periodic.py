@@ -28,9 +28,9 @@ _HEAVY = 1e3  # weight of the equation that the powers add up to one
 
 @dataclass(frozen=True)
 class PeriodicDesign:
-    """Shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
+    """Holds the shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
 
-    `exact` says whether the Gram matrix is the one that was asked for.
+    `exact` says whether the Gram matrix is the requested one.
     """
 
     shares: Array
@@ -42,11 +42,11 @@ class PeriodicDesign:
 def design_periodic(
     regression: Regression, rho: Array, energy: float, period: int, *, target: float | None
 ) -> PeriodicDesign:
-    """The shape rho on the lines of a period, or the nearest good design on them.
+    """Return the shape rho on the lines of a period, or the nearest good design on them.
 
     Args:
         target: the error to be met with the least energy; None: the energy stays, the error follows.
-            A target that the lines cannot meet leaves the energy as it is, too.
+            If the lines cannot meet the target, the energy stays, too.
     """
     problem = ToeplitzProblem.of(regression)
     lines = 2.0 * np.pi * np.arange(period // 2 + 1) / period
@@ -77,14 +77,14 @@ def design_periodic(
 
 
 def _fit(rho: Array, lines: Array) -> Array:
-    """Nonnegative powers, one in sum, whose autocorrelations are nearest to rho."""
+    """Return nonnegative powers, one in sum, whose autocorrelations are nearest to rho."""
     A = np.vstack([np.cos(np.arange(rho.size)[:, None] * lines), np.full(lines.size, _HEAVY)])
     powers, _ = scipy.optimize.nnls(A, np.append(rho, _HEAVY))
     return powers / powers.sum()
 
 
 def _candidates(shares: Array) -> NDArray[np.intp]:
-    """Indices of all lines if they are few; else those around the lines in use, and some everywhere."""
+    """Return indices of all lines if they are few; else around the used lines, and some everywhere."""
     count = shares.size
     if count <= _ALL_LINES:
         return np.arange(count)

@@ -34,17 +34,17 @@ class Region:
 
 
 def all_shapes(problem: ToeplitzProblem) -> Region:
-    """Every rho with P >= 0."""
+    """Return the set of every rho with P >= 0."""
     return _beginning_with(problem, np.ones(1))
 
 
 def line_shapes(problem: ToeplitzProblem, frequencies: Array) -> Region:
-    """The rho of nonnegative powers at `frequencies` (L,) (rad/sample) that add up to one."""
+    """Return the rho of nonnegative powers at `frequencies` (L,) (rad/sample) that add up to one."""
     return Region(np.zeros(problem.n), np.cos(np.arange(problem.n)[:, None] * frequencies), True)
 
 
 def _beginning_with(problem: ToeplitzProblem, head: Array) -> Region:
-    """The shapes whose first autocorrelations are `head`."""
+    """Return the shapes whose first autocorrelations are `head`."""
     n, held = problem.n, head.size
     return Region(np.append(head, np.zeros(n - held)), np.eye(n)[:, held:])
 
@@ -52,7 +52,7 @@ def _beginning_with(problem: ToeplitzProblem, head: Array) -> Region:
 def step(
     problem: ToeplitzProblem, region: Region, weight: Weight, at: Autocorrelations, radius: float
 ) -> tuple[Array, float] | None:
-    """The best shape within `radius` of `at` for linearised bias and exact variance, and its model value.
+    """Return the best shape within `radius` of `at` (linearised bias, exact variance) and its model value.
 
     minimise |b + J (rho - rho_at)|^2 + kappa q subject to [[P11, L1], [L1^T, q]] >= 0.
     """
@@ -65,7 +65,7 @@ def step(
 
 
 def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | None:
-    """The best rho that begins with `head` (m,): the bias is then linear and the variance fixed.
+    """Return the best rho that begins with `head` (m,): the bias is then linear and the variance fixed.
 
     This is the first half of the alternation of [eckhard-mse] (R11 fixed).
     """
@@ -81,10 +81,10 @@ def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | Non
 
 
 def rescale(problem: ToeplitzProblem, weight: Weight, at: Autocorrelations) -> Array | None:
-    """The best rho with the same Z = R11^-1 R12 as `at`: the second half of the alternation.
+    """Return the best rho with the same Z = R11^-1 R12 as `at`: the second half of the alternation.
 
-    Z fixed makes R11 Z = R12 linear, n - m equations for each of the m rows. Where they leave no
-    freedom but the scale, which no shape has, `at` itself is returned.
+    Z fixed makes R11 Z = R12 linear, n - m equations for each of the m rows. Where only the scale is then
+    free, which no shape has, `at` itself is returned.
     """
     m = problem.m
     P = scipy.linalg.toeplitz(at.rho)
@@ -109,10 +109,10 @@ def _solve(
     *,
     varies: bool = True,
 ) -> tuple[Array, float] | None:
-    """minimise t + kappa q over (x, q, t), t >= |bias|^2, q at least the variance where that varies.
+    """Minimise t + kappa q over (x, q, t), t >= |bias|^2, q at least the variance where that varies.
 
     Args:
-        bias: (n - m, 1 + size), its value at x = 0 and its derivatives; `near` of what is at most `radius`.
+        bias: (n - m, 1 + size), its value at x = 0 and its derivatives; `near` is limited to `radius`.
 
     Returns:
         rho and the value of the model; None when the solver found nothing.

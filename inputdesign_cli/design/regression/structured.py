@@ -33,7 +33,7 @@ _PROVED_MULTIPLES = (1e6, 1e4, 1e2)
 
 
 class OutOfReachError(Exception):
-    """No energy meets the target: the bias alone is too large.
+    """Raised when no energy meets the target: the bias alone is too large.
 
     Attributes:
         bias: |b| / |L1| of the least biased shape that was found.
@@ -76,13 +76,13 @@ class Normalisation:
 
     @property
     def error(self) -> float:
-        """Error for one unit of |b|^2 + kappa v."""
+        """Return the error for one unit of |b|^2 + kappa v."""
         r = self.regression
         alpha = r.neglected_norm if r.neglected_norm > 0.0 else 1.0
         return alpha**2 * float(r.estimated @ r.estimated)
 
     def kappa(self, energy: float) -> float:
-        """kappa of an energy."""
+        """Return kappa of an energy."""
         r = self.regression
         return r.n * r.variance * float(r.estimated @ r.estimated) / (energy * self.error)
 
@@ -101,14 +101,14 @@ def design_toeplitz(
     rng: np.random.Generator,
     alternating: bool = False,
 ) -> ToeplitzDesign:
-    """Sequential convex programming from several starts, then branch and bound.
+    """Design by sequential convex programming from several starts, then branch and bound.
 
     Args:
-        target: the error that is allowed; the energy is minimised. Or
+        target: the error that is allowed; the energy is minimised. Or else
         energy: the trace of R; the error is minimised.
         tolerance: the relative gap to be proved; larger gaps are proved where it cannot be.
-        most_nodes: how many boxes the proof may bound; None: what takes seconds.
-        alternating: that of [eckhard-mse], run from white, in place of sequential convex programming;
+        most_nodes: the number of boxes that the proof may bound; None: a number that takes seconds.
+        alternating: run the alternation of [eckhard-mse] from white, not sequential convex programming;
             its design is kept as it is and only the bound comes from here.
 
     Raises:
@@ -153,7 +153,7 @@ def design_toeplitz(
 
 
 def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorrelations:
-    """Without alpha the bias is free: of the shapes with this R11 the least biased, the limit alpha -> 0."""
+    """Return the least biased shape with this R11, the limit alpha -> 0 where the bias is free."""
     if problem.biased or problem.n == problem.m:
         return shape
     rho = extend(replace(problem, biased=True), Weight(1.0), shape.rho[: problem.m])
@@ -164,8 +164,8 @@ def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorr
 def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Autocorrelations:
     """Return the design on lines at multiples of 15 degrees, if it is no worse for it.
 
-    An optimum is flat, so a search knows rho only to the root of its tolerance; a constant or
-    alternating signal, for one, is recognised here.
+    An optimum is flat, so a search finds rho only to the root of its tolerance. A constant or alternating
+    signal, for example, is recognised here.
     """
     lines = np.pi * np.arange(13) / 12
     columns = np.cos(np.arange(problem.n)[:, None] * lines)
@@ -192,7 +192,7 @@ class _Proof:
         self.tree = BranchAndBound.start(problem)
 
     def run(self, tolerance: float, most_nodes: int) -> float:
-        """The lower bound on the goal's value."""
+        """Return the lower bound on the goal's value."""
         goal, kept = self.goal, 1.0 - tolerance
         if goal.kappa is not None:
             kappa = goal.kappa
@@ -250,9 +250,9 @@ def _out_of_reach(
 
 
 def least_variance(problem: ToeplitzProblem) -> float:
-    """A lower bound on v = L1^T P11^-1 L1 over all shapes.
+    """Return a lower bound on v = L1^T P11^-1 L1 over all shapes.
 
-    v >= (y^T L1)^2 / (y^T P11 y) for every y, and y^T P11 y is a mean of |sum_i y_i e^{-jiw}|^2 over the
+    For every y, v >= (y^T L1)^2 / (y^T P11 y). Here y^T P11 y is a mean of |sum_i y_i e^{-jiw}|^2 over the
     spectrum of the shape. The y of the least v that is found is taken.
     """
     head = ToeplitzProblem(problem.first, np.zeros(0), biased=False)

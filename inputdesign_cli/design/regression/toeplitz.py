@@ -27,7 +27,7 @@ _OUTSIDE = 1e-7
 
 @dataclass(frozen=True)
 class Autocorrelations:
-    """What the autocorrelations `rho` (n,) with rho_0 = 1 cost and give."""
+    """Holds the cost and the errors of the autocorrelations `rho` (n,) with rho_0 = 1."""
 
     rho: Array
     bias: Array
@@ -35,7 +35,7 @@ class Autocorrelations:
 
     @property
     def bias_squared(self) -> float:
-        """|b|^2."""
+        """Return the squared bias |b|^2."""
         return float(self.bias @ self.bias)
 
 
@@ -55,7 +55,7 @@ class ToeplitzProblem:
 
     @staticmethod
     def of(regression: Regression) -> ToeplitzProblem:
-        """The problem of a regression; `Weight` carries the units that are left out here."""
+        """Return the problem of a regression; `Weight` carries the units that are left out here."""
         scale = float(np.linalg.norm(regression.estimated))
         return ToeplitzProblem(
             regression.estimated / scale, regression.neglected / scale, regression.neglected_norm > 0.0
@@ -63,24 +63,24 @@ class ToeplitzProblem:
 
     @property
     def m(self) -> int:
-        """Number of estimated parameters."""
+        """Return the number of estimated parameters."""
         return self.first.size
 
     @property
     def n(self) -> int:
-        """Number of all parameters."""
+        """Return the number of all parameters."""
         return self.first.size + self.second.size
 
     @cached_property
     def lags(self) -> NDArray[np.float64]:
-        """Return lags[k] has ones where |i - j| = k, (n, n, n)."""
+        """Return matrices lags[k] with ones where |i - j| = k, (n, n, n)."""
         i = np.arange(self.n)
         distance = np.abs(i[:, None] - i[None, :])
         return (distance[None] == i[:, None, None]).astype(float)
 
     @cached_property
     def halves(self) -> tuple[NDArray[np.float64], ...]:
-        """Orthonormal bases (n, .) of the symmetric and the skew vectors.
+        """Return orthonormal bases (n, .) of the symmetric and the skew vectors.
 
         A symmetric Toeplitz matrix maps each into itself, so a cone of order n falls into two of half
         that order.
@@ -98,7 +98,7 @@ class ToeplitzProblem:
         return (symmetric, skew) if half else (symmetric,)
 
     def evaluate(self, rho: Array) -> Autocorrelations | None:
-        """The shape of autocorrelations, made positive semidefinite; None if L1 is not excited."""
+        """Return the shape of autocorrelations, made positive semidefinite; None if L1 is not excited."""
         rho = _inside(rho)
         P = scipy.linalg.toeplitz(rho)
         u = self.weights(P)
@@ -116,7 +116,7 @@ class ToeplitzProblem:
         return vectors[:, kept] @ (parts[kept] / values[kept])
 
     def bias_jacobian(self, rho: Array) -> NDArray[np.float64]:
-        """(n - m, n - 1): derivatives of b with respect to rho_1 .. rho_{n-1}."""
+        """Return the derivatives (n - m, n - 1) of b with respect to rho_1 .. rho_{n-1}."""
         m = self.m
         P = scipy.linalg.toeplitz(rho)
         inverse = np.linalg.pinv(P[:m, :m], rcond=_RANK, hermitian=True)
@@ -127,22 +127,22 @@ class ToeplitzProblem:
 
 @dataclass(frozen=True)
 class Weight:
-    """Minimise |b|^2 + kappa v: the error for a given energy in the units of `ToeplitzProblem`.
+    """Weighs |b|^2 + kappa v: the error for a given energy in the units of `ToeplitzProblem`.
 
-    error = unit (|b|^2 + kappa v) with unit = alpha^2 |L1|^2; without bias (alpha = 0) it is kappa v alone.
+    The error is unit (|b|^2 + kappa v) with unit = alpha^2 |L1|^2; without bias (alpha = 0) kappa v alone.
     """
 
     kappa: float
     biased: bool = True
 
     def __call__(self, shape: Autocorrelations) -> float:
-        """The weighted sum for a shape."""
+        """Return the weighted sum for a shape."""
         bias = shape.bias_squared if self.biased else 0.0
         return bias + self.kappa * shape.v
 
 
 def _inside(rho: Array) -> Array:
-    """Autocorrelations scaled towards white until their Toeplitz matrix has no negative eigenvalue."""
+    """Return autocorrelations scaled towards white until their Toeplitz matrix has no negative eigenvalue."""
     rho = rho / rho[0]
     lowest = float(np.linalg.eigvalsh(scipy.linalg.toeplitz(rho))[0])
     shrunk = rho / (1.0 + max(0.0, -lowest))

@@ -1,7 +1,7 @@
 """Data -> does the real experiment meet the target, and if not, what is still to be done.
 
-A verdict holds for one estimate and its information: that of the given records together, and of the prior
-where the spec states the estimate that it belongs to. A prior without it counts for designs only.
+A verdict holds for one estimate and its information. The information is that of all given records, and of the
+prior where the spec states its estimate. A prior without it counts for designs only.
 """
 
 from __future__ import annotations
@@ -50,24 +50,24 @@ Part = TypeVar("Part", Table, Curves)
 
 @dataclass(frozen=True)
 class Assessment:
-    """Whether the data meet what the spec asks for, with the results of the identification or the top-up."""
+    """Holds whether the data meet the spec, with the results of the identification or the top-up."""
 
     verdict: Verdict
     results: Results
 
     @property
     def met(self) -> bool:
-        """Whether the data meet it."""
+        """Return whether the data meet the accuracy that the spec asks for."""
         return self.verdict == "met"
 
 
 def assess(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Assessment:
-    """Identify the model from real experiments and compare what the data buy with what is asked.
+    """Identify the model from real experiments and compare the accuracy of the data with the one asked.
 
     Both sides are evaluated at the new estimate: r_u by the information of the data themselves, r_adm by the
     new model. Where tests refute the structure, or the question cannot be asked of the estimate, nothing is
     decided. Where the data fall short, the experiment that this model still needs is designed as `solve`
-    does, with the data as prior information; where there is none, the result says why.
+    does. The data are its prior information. Where there is no such experiment, the result says why.
 
     Raises:
         SpecError: nothing is asked that data could meet.
@@ -166,7 +166,7 @@ def _assessed(judged: Results, **more: Any) -> Results:
 
 
 def _remarks(task: Identification, found: Identified, topped: Results) -> list[Finding]:
-    """Return what is to be known of a top-up: about what its record varies, and what it does not count on."""
+    """Return remarks on a top-up: the levels its record varies about, and what it does not count on."""
     remarks, signal = [], topped.outcome.signal
     if "signal" in topped.tables and signal is not None and not task.header.units.closed_loop:
         point, levels = signal.operating_point, found.preparation.levels
@@ -192,7 +192,7 @@ def _without_model(judged: Results, units: Units, found: Identified) -> Results:
 
 
 def _experiments(question: ModelQuestion, both: Array) -> int | None:
-    """How many experiments meet all after the data, with whom one has information (k, k); None: too many."""
+    """Return the number of experiments that the data lack; with one they have (k, k). None: too many."""
     data = question.information
     more = question.experiment.whiten_matrix(both) - data
 

@@ -100,7 +100,7 @@ def operating_point(spec: Spec) -> dict[str, float]:
 
 
 def _offset(spec: Spec, levels: Mapping[str, float]) -> dict[str, object]:
-    """The change that gives a record the levels of the data as its offset, unless the spec states one."""
+    """Return the change that gives a record the levels of the data, unless the spec states an offset."""
     inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
     if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
         return {}
@@ -109,7 +109,7 @@ def _offset(spec: Spec, levels: Mapping[str, float]) -> dict[str, object]:
 
 
 def _reaching(spec: Spec, values: Mapping[str, float]) -> dict[str, object]:
-    """The change that widens intervals as far as the estimate."""
+    """Return the change that widens intervals as far as the estimate."""
     if spec.uncertainty is None or spec.uncertainty.intervals is None:
         return {}
     reaching = {

@@ -83,16 +83,16 @@ class ModelQuestion:
 
     @property
     def asked(self) -> Sequence[OnModelError]:
-        """What is asked of the model error."""
+        """Return the requirements on the model error."""
         return model_errors(self.requirements)
 
     @property
     def errors(self) -> Sequence[OnModelError]:
-        """What has r_u: what is asked of the model error, or else every entry of G."""
+        """Return the model errors that r_u is computed for: those required, or else every entry of G."""
         return self.asked or self.entries
 
     def ratio(self, information: Array) -> float:
-        """Return the largest ratio to what is asked at an information (k, k) in these coordinates."""
+        """Return the largest ratio to the admitted error at an information (k, k) in these coordinates."""
         return max(requirement.worst(information).ratio for requirement in self.requirements)
 
 
@@ -104,11 +104,11 @@ class Identification:
         nominal: the structure; its parameters are one of the starts.
         nominal_covariance: (k, k), of its parameters, zero where the spec states none.
         assessable: whether any accuracy is asked for that data could meet or miss.
-        operating_point: by channel, what the spec says that signals vary about.
+        operating_point: by channel, the levels in the spec that signals vary about.
         earlier: the prior as an estimate, which counts along; None if it has no values.
         has_prior: whether it states prior information.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
-        knowledge: what else it says of the parameters; None if it says nothing.
+        knowledge: further knowledge of the parameters in the spec; None if there is none.
         foreseen: the plants that the design was made for; None if it was made for the plant of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
@@ -131,7 +131,7 @@ class Identification:
 
 @dataclass(frozen=True)
 class Identified:
-    """An estimate, its data, and what is asked of it.
+    """Holds an estimate, its data, and the accuracy asked of it.
 
     Attributes:
         question: None where it cannot be asked of this estimate; `unasked` says why.
@@ -152,7 +152,7 @@ class Identified:
     noise_refuted: float | None = None
 
     def asked_by(self, task: Identification, source: str) -> Identified:
-        """Return it with what a spec asks at the estimate, where it can be asked."""
+        """Return the estimate with the question that the spec asks at it, where it can be asked."""
         samples, factor = len(self.data.y), self.estimate.factor
         try:
             return replace(self, question=task.at(self.model, samples, factor, source))
@@ -194,7 +194,7 @@ def identified(
 def estimated(
     task: Identification, data: Record, first: Path, taken: Preparation, *, start: Array | None = None
 ) -> Identified:
-    """Return the same from data that have been read.
+    """Return the estimate, and the question that it answers, from data that have been read.
 
     Args:
         first: the file that an objection to the data names.
@@ -237,12 +237,12 @@ def estimated(
 
 
 def told(error: IdesignError) -> str:
-    """What is wrong and how to mend it, as a sentence."""
+    """Return the messages and hints of an error as one sentence."""
     return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
 
 def findings_of(task: Identification, found: Identified) -> list[Finding]:
-    """Return everything that speaks for or against data and estimate."""
+    """Return all findings for or against the data and the estimate."""
     units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
     rivals = (
         other_minima(units, model, estimate, question.asked, question.entries, question.information)
@@ -267,7 +267,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
 
 
 def speaking_against(task: Identification, found: Identified) -> list[Finding]:
-    """Return what speaks against the model; faults of measurement alone, since they upset the other tests."""
+    """Return findings against the model; faults of measurement alone, as they upset other tests."""
     data, estimate, units = found.data, found.estimate, task.header.units
     return mismeasured(task, found) or [
         # Where an expression ends G may vanish, whatever the inputs do.
@@ -286,7 +286,7 @@ def mismeasured(task: Identification, found: Identified) -> list[Finding]:
 
 
 def identification_results(task: Identification, found: Identified, began: float) -> Results:
-    """Return what `idesign identify` writes.
+    """Return the results that `idesign identify` writes.
 
     Args:
         began: `time.perf_counter()` when the work began.

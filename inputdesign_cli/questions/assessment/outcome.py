@@ -1,4 +1,4 @@
-"""What an estimate gives: its entries of `result.json`, model.yaml, tables and curves."""
+"""The results of an estimate: its entries of `result.json`, model.yaml, tables and curves."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _FAR = 0.2
 def identification_entry(
     estimate: Estimate, preparation: Preparation, ruled_out: Sequence[Rival]
 ) -> Identification:
-    """Return `identification` of `result.json`."""
+    """Return the entry `identification` of `result.json`."""
     single, centred = estimate.noise.size == 1, preparation.detrend == "constant"
     levels = None if centred else dict(preparation.levels)
     return Identification(
@@ -76,7 +76,7 @@ def identification_entry(
 
 
 def information_entry(estimate: Estimate) -> Information:
-    """Return `information` of `result.json`."""
+    """Return the entry `information` of `result.json`."""
     return Information(estimate.names, estimate.information, estimate.covariance, _deviations(estimate))
 
 
@@ -175,7 +175,7 @@ def bound_of_data(
     """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
 
     Args:
-        errors: what has r_u; `asked` says whether requirements state r_adm.
+        errors: the model errors of r_u; `asked` says whether requirements state r_adm.
         information: (k, k) of the data.
     """
     bound = Bound(confidence.alpha, confidence=confidence.reported)

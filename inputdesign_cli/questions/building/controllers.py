@@ -56,7 +56,7 @@ _REAL = 1e-9
 
 @dataclass(frozen=True)
 class Process:
-    """gain e^(-dead_time s) / (time_constant s + 1), or gain e^(-dead_time s) / s without a time constant."""
+    """Holds gain e^(-dead_time s) / (time_constant s + 1), or gain e^(-dead_time s) / s without constant."""
 
     gain: float
     time_constant: float | None
@@ -80,7 +80,7 @@ def loop_controller(spec: Spec, stated: loop.LoopMargin, model: Model) -> loop.C
 
 
 def _with_values(spec: Spec, model: Model) -> Spec:
-    """The spec with the values of a model for the named parameters of its plant."""
+    """Return the spec with the values of a model for the named parameters of its plant."""
     if spec.plant.kind != "continuous":
         return spec
     values = dict(zip(model.names, model.theta.tolist(), strict=True))

@@ -134,8 +134,8 @@ _MARGIN = 0.01
 def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     """Return the experiment with a finite information matrix: its band starts at the lowest line.
 
-    Near a pole at z = 1 that is not in a loop, the gradient of the prediction has no bound, and neither has
-    the information of any power there. Raises `SpecError`: `infinite-information`.
+    Near a pole at z = 1 outside a loop, the gradient of the prediction has no bound. The information of any
+    power there has no bound either. Raises `SpecError`: `infinite-information`.
     """
     source = experiment.model if experiment.loop is None else experiment.loop
     if not experiment.model.continuous:
@@ -168,23 +168,22 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     other = "spectrum: {type: free} with " if fir else ""
     what = f"gives infinite information about {grown}" if grown else "makes the outputs drift without bound"
     band = f"limits: {{band: [{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}"
-    raise spec.complain(
-        "infinite-information" if grown else "infinite-output",
-        f"the plant integrates: power at frequency zero {what}",
-        hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}{band}; or make the "
-        f"experiment in closed loop, under a controller{integrates}",
-        key="spectrum" if spec.spectrum is not None else "plant",
-    )
+    code = "infinite-information" if grown else "infinite-output"
+    avoid = f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}{band}"
+    hint = f"{avoid}; or make the experiment in closed loop, under a controller{integrates}"
+    key = "spectrum" if spec.spectrum is not None else "plant"
+    message = f"the plant integrates: power at frequency zero {what}"
+    raise spec.complain(code, message, hint=hint, key=key)
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
-    """The names of the parameters whose gradient (n, k, ..) has a pole at frequency zero."""
+    """Return the names of the parameters whose gradient (n, k, ..) has a pole at frequency zero."""
     grows = _grows(experiment, gradient)
     return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
 
 
 def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]) -> NDArray[np.bool_]:
-    """Which parts (k,) of a response (n, k, ..) have a pole at frequency zero.
+    """Return whether each part (k,) of a response (n, k, ..) has a pole at frequency zero.
 
     Its principal part follows from Cauchy's integrals over a circle that encloses no other pole. Values on
     the axis would show a weak pole only from very near.
@@ -203,7 +202,7 @@ def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]
 
 
 def _lowest_line(spec: Spec, hi: float) -> float | None:
-    """The lowest frequency of an excitation of lines, in the unit of the experiment; None for others."""
+    """Return the lowest frequency of a line spectrum in the experiment's unit; None for other spectra."""
     unit = build_units(spec).frequency
     match spec.spectrum:
         case spectrum.MultisineSpectrum(frequencies=given) if given:

@@ -7,7 +7,7 @@ from inputdesign_cli.specification import Spec
 
 
 def build_units(spec: Spec) -> Units:
-    """Units and names of the experiment of a spec."""
+    """Build the units and channel names of the experiment of a spec."""
     return Units(
         time_unit=spec.time_unit,
         sample_time=spec.sample_time,
@@ -21,5 +21,5 @@ def build_units(spec: Spec) -> Units:
 
 
 def build_header(spec: Spec) -> Header:
-    """The header of all results of a spec."""
+    """Build the header of all results of a spec."""
     return Header(spec.title, spec.to_yaml(), build_units(spec))

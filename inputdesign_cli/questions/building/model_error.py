@@ -44,7 +44,7 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 
 def build_calibration(spec: Spec) -> Calibration | None:
-    """Return how alpha is calibrated for `confidence: {exact: ..}`; None without it."""
+    """Return the calibration of alpha for `confidence: {exact: ..}`; None without it."""
     stated = None if (error := spec.accuracy.error) is None else error.calibrated
     return None if stated is None or stated.exact is None else Calibration(stated.exact, stated.draws)
 
@@ -145,20 +145,18 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
     if stated is None or not isinstance(admissible, accuracy.Sensitivity):
         return None
     peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
-    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
-    return spec.complain(
-        "admissible-not-positive",
-        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most",
-        hint=f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}",
-        key=_LOOP,
+    message = (
+        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most"
     )
+    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
+    hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
+    return spec.complain("admissible-not-positive", message, hint=hint, key=_LOOP)
 
 
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
     """Raise `SpecError` (`unbounded-error`) if no information is enough for the requirement.
 
-    At a pole of G on the unit circle, a small error of the estimated pole makes the error of G grow faster
-    than G itself.
+    Near a pole of G on the unit circle, the error of G by an error of the pole grows faster than G itself.
     """
     lo, hi = requirement.band
     units = build_units(spec)

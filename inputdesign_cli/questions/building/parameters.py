@@ -67,7 +67,7 @@ def reparametrised(
 def _of_named(
     spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameters: Sequence[Parameter]
 ) -> Parametrisation:
-    """The named parameters of the plant, then the coefficients of the noise."""
+    """Return the parametrisation by the named parameters of the plant, then the noise coefficients."""
     named = plant.named_parameters
     noise = [p for p in parameters if p.letter in "cd"]
     # Names of parameters of the plant are in ASCII: these differ from all of them.
@@ -92,7 +92,7 @@ def _of_named(
 
 
 def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> Expression:
-    """A coefficient of the model as an expression in the named parameters of the plant."""
+    """Return a coefficient of the model as an expression in the named parameters of the plant."""
     letter, (i, j) = parameter.letter, parameter.places[0]
     if plant.kind == "state_space":
         return plant.term(letter, i, j)

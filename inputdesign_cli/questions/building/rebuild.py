@@ -31,7 +31,7 @@ def restated(spec: Spec, model: Model, source: str) -> Spec:
 
 @dataclass(frozen=True)
 class Change:
-    """How the design of a part differs from the design of the whole experiment.
+    """Describes how the design of a part differs from the design of the whole experiment.
 
     Attributes:
         samples: of the experiment that is planned; `seed`: of its record.

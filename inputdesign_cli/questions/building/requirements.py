@@ -27,10 +27,10 @@ _RELATIVE_ZERO = 1e-9
 
 
 class AddedRequirement(Protocol):
-    """A section of `accuracy` that another package adds (`specification.plugins`)."""
+    """Describes a section of `accuracy` that another package adds (`specification.plugins`)."""
 
     def build(self, spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-        """Return what makes its requirements in the coordinates of a design."""
+        """Return the function that makes its requirements in the coordinates of a design."""
 
 
 def build_requirements(

@@ -1,4 +1,4 @@
-"""`signal:` and the limits on single samples -> what is asked of the record, and whether it can exist."""
+"""`signal:` and the limits on single samples -> the requirements on the record, and whether it can exist."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SEARCHED = 2
 
 
 def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
-    """Return everything that the spec asks of its record, for a model with a number of parameters.
+    """Return the requirements of the spec on its record, for a model with a number of parameters.
 
     Raises:
         SpecError: `needs-band`; `too-large`; `beyond-nyquist` when samples are too far apart for the band.
@@ -130,7 +130,7 @@ def _offsets(spec: Spec) -> Array:
 
 
 def _quantisers(spec: Spec) -> tuple[Quantiser, ...]:
-    """The converter of each input; all have the same number of bits."""
+    """Return the converter of each input; all have the same number of bits."""
     stated = spec.signal.quantisation
     if stated is None:
         return ()
@@ -150,14 +150,14 @@ def sampling_rate(spec: Spec) -> float:
 
 
 def _method(spec: Spec) -> str:
-    """The type of signal: stated, or the one that other keys belong to."""
+    """Return the type of signal: as stated, or as other keys imply."""
     signal = spec.signal
     implied = "multisine" if signal.stated("phases", "lines") else "prbs" if signal.bits is not None else ""
     return signal.type or implied or _usual_method(spec)
 
 
 def _usual_method(spec: Spec) -> str:
-    """The type if none is stated: filtered noise for one input and output in q^-1, otherwise a multisine."""
+    """Return the type if none is stated: filtered noise for one input and output in q^-1, or multisine."""
     plant, spectrum = spec.plant, spec.spectrum
     single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
     banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
@@ -166,7 +166,7 @@ def _usual_method(spec: Spec) -> str:
 
 
 def _other_methods(spec: Spec) -> tuple[str, ...]:
-    """Other types that may serve as well; empty if the spec states how the signal is made."""
+    """Return other types that may serve too; empty if the spec states how the signal is made."""
     if spec.signal.stated("phases", "lines", "bits"):
         return ()
     others = [_usual_method(spec), "multisine"]

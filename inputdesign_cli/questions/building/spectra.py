@@ -35,7 +35,7 @@ _SAME = 1e-9
 
 
 class AddedSpectrum(Protocol):
-    """A section of `spectrum` that another package adds (`specification.plugins`)."""
+    """Describes a section of `spectrum` that another package adds (`specification.plugins`)."""
 
     def build(self, spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
         """Return the family of spectra of inputs in a band; see `build_basis`."""
@@ -109,7 +109,7 @@ def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
 
 
 def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, float]) -> Array:
-    """The stated frequencies in the unit of the experiment, or evenly spaced ones inside the band.
+    """Return the stated frequencies in the experiment's unit, or evenly spaced ones in the band.
 
     `lines: L` in discrete time are l pi / L, l = 1 .. L, the harmonics of a period of 2 L samples up to the
     Nyquist frequency, where a spectrum is real. In continuous time they are evenly spaced inside
@@ -176,7 +176,7 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
 
 
 def _read(spec: Spec, name: str, symbol: str, r: int, *, least: int) -> tuple[Array, ComplexArray]:
-    """Frequencies (n,) and Hermitian values (n, r, r)."""
+    """Read frequencies (n,) and Hermitian values (n, r, r) of a spectrum."""
     pairs = [(i, j) for i in range(r) for j in range(i + 1, r)]
     names: dict[str, tuple[int, int, complex]] = {symbol: (0, 0, 1.0)}
     if r > 1:

@@ -1,4 +1,4 @@
-"""Spec -> plant, loop and experiment: what is excited, for how long, in which loop, at what price."""
+"""Spec -> plant, loop and experiment: the excited channels, the length, the loop and the price."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
 
 
 def _stated_band(spec: Spec) -> tuple[float, float] | None:
-    """The band of the spectrum or of the limits; in continuous time also of a given excitation."""
+    """Return the band of the spectrum or the limits; in continuous time also of a given excitation."""
     match spec.spectrum:
         case spectrum.PolynomialSpectrum(band=band):
             return band
@@ -230,7 +230,7 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
-    """The information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
+    """Return the information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
     if (stated := parameters.stated_prior(spec, experiment.model.names)) is not None:
         return stated[0]
     record = prior_record(spec)

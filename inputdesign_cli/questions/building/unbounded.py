@@ -1,8 +1,8 @@
 """Spec -> whether a design has a best value.
 
 It has no best value if some excitation informs about the parameters and is neither paid for nor limited.
-Combinations of the inputs may be free, and frequencies: at a pole of the plant on the unit circle, a loop
-takes all power of the input away, while the power of the output there informs about the pole.
+Combinations of the inputs may be free, and frequencies. At a pole of the plant on the unit circle, a loop
+takes all power of the input away. The power of the output there informs about the pole.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _free_direction(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:
 
 
 def check_reach(spec: Spec, question: Question) -> Reach:
-    """Return what a bound over every spectrum may claim; refuse a family that has no best spectrum.
+    """Return the validity of a bound over every spectrum; refuse a family without a best spectrum.
 
     Raises `SpecError`: `no-cost` or `needs-limits`.
     """
@@ -169,7 +169,7 @@ def price_density(experiment: Experiment, priced: list[PricedPower], w: Array) -
 
 
 def _free_frequencies(experiment: Experiment, priced: list[PricedPower]) -> list[float]:
-    """Frequencies at which some direction of the excitation costs nothing."""
+    """Return frequencies at which some direction of the excitation costs nothing."""
     near = np.concatenate([experiment.singularities, experiment.model.singularities])
     grid = graded_grid(near, *experiment.band)
     typical = float(np.median(np.linalg.eigvalsh(price_density(experiment, priced, grid))[:, -1]))
@@ -182,7 +182,7 @@ def _free_frequencies(experiment: Experiment, priced: list[PricedPower]) -> list
 
 
 def _gain(experiment: Experiment, priced: list[PricedPower], place: float) -> tuple[Array, Array] | None:
-    """The information (k, k) at unit price near a frequency, and much nearer; None if it does not grow."""
+    """Return the information (k, k) at unit price near a frequency, then nearer; None if it does not grow."""
     hi = experiment.band[1]
     distance = np.abs(experiment.singularities - place)
     scale = float(np.min(distance[distance > _ON * hi], initial=0.1 * hi))

@@ -1,4 +1,4 @@
-"""`uncertainty` -> what is known of the plant before any data, the plants it may be, rival dead times."""
+"""`uncertainty` -> knowledge of the plant before any data, the plants it may be, rival dead times."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _AWAY = 3.0
 
 
 class _NoPlantError(Exception):
-    """Parameters give no stable plant; with the code of the error, and what is wrong."""
+    """Says that parameters give no stable plant, with the code of the error and the reason."""
 
     def __init__(self, code: str, what: str) -> None:
         super().__init__(what)
@@ -55,7 +55,7 @@ class _NoPlantError(Exception):
 
 @dataclass(frozen=True)
 class UncertainPlant:
-    """The parameters of an uncertain plant, and the plants that they make.
+    """Holds the parameters of an uncertain plant, and the plants that they make.
 
     Attributes:
         spec: exists here only while a question is built.
@@ -69,12 +69,12 @@ class UncertainPlant:
 
     @property
     def nominal(self) -> Model:
-        """The plant of the spec."""
+        """Return the plant of the spec."""
         return self.experiment.model
 
     @cached_property
     def spread(self) -> Knowledge:
-        """How far the parameters spread around the nominal ones (k,), in columns (k, m).
+        """Return the spread of the parameters around the nominal ones (k,), in columns (k, m).
 
         They are even over the box of all intervals, or normal with the covariance columns columns^T. Raises
         `SpecError`: `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, or
@@ -137,7 +137,7 @@ class UncertainPlant:
         return Knowledge(centre, columns, box=True)
 
     def _covariance(self) -> Array:
-        """The covariance (k, k) of the parameters, zero for known ones."""
+        """Return the covariance (k, k) of the parameters, zero for known ones."""
         stated, names = self.stated, self.nominal.names
         key = f"{KEY}.{stated.stated(*SOURCES)[0]}"
         source = stated.covariance if stated.covariance is not None else stated.information
@@ -179,7 +179,7 @@ class UncertainPlant:
 
     @cached_property
     def _radius(self) -> float:
-        """The radius beyond which poles are too near to the unit circle, or outside."""
+        """Return the radius beyond which poles are outside the unit circle or too near to it."""
         return farthest_radius(self.spec, self.experiment)
 
     def at(self, theta: Array, radius: float) -> Alternative:
@@ -216,19 +216,17 @@ class UncertainPlant:
             except SpecError as error:
                 raise _NoPlantError("no-stable-plant", error.diagnostics[0].message) from error
         if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
-            what = "the plant" if loop is None else "the loop"
-            raise _NoPlantError(
-                "no-stable-plant", f"{what} has a pole, or C a root, on or beyond the unit circle"
-            )
+            what = f"{'the plant' if loop is None else 'the loop'} has a pole, or C a root"
+            raise _NoPlantError("no-stable-plant", f"{what}, on or beyond the unit circle")
         return model, loop
 
     @cached_property
     def _act(self) -> NDArray[np.bool_]:
-        """Which entries (p, r) of the nominal G are not zero."""
+        """Return whether each entry (p, r) of the nominal G is other than zero."""
         return self._acting(self.nominal)
 
     def _acting(self, model: Model) -> NDArray[np.bool_]:
-        """Which entries (p, r) of G are not zero at some of a few frequencies."""
+        """Return whether each entry (p, r) of G is other than zero at some of a few frequencies."""
         lo, hi = self.experiment.band
         return np.any(model.plant_at(lo + (hi - lo) * _PROBES) != 0.0, axis=0)
 
@@ -361,10 +359,10 @@ def _needed(spec: Spec, basis: Basis | None) -> int | None:
 
 
 def _unknowns(spec: Spec, basis: Basis | None) -> int:
-    """Count the unknowns of the program: of the spectrum, and the factor, length or cost.
+    """Return the number of unknowns of the program: of the spectrum, and the factor, length or cost.
 
-    A given excitation has no unknowns. The number of plants that prove a risk is then the number for one:
-    (1 - risk)^plants is the probability that all of them meet the accuracy by chance.
+    A given excitation has no unknowns. A risk is then proved by as many plants as with one unknown. All of
+    them meet the accuracy by chance with probability (1 - risk)^plants.
     """
     if basis is None:
         return 1
@@ -433,7 +431,7 @@ def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
 
 
 def build_foresight(spec: Spec, nominal: Experiment) -> Foresight | None:
-    """Return how rival dead times are foreseen; None for plants that have none to be estimated.
+    """Return the search for rival dead times; None for plants without dead times to be estimated.
 
     Args:
         nominal: the experiment, in raw parameters.

@@ -1,4 +1,4 @@
-"""Refuse what a spec states and a kind of question does not handle."""
+"""Refuse keys of a spec that a kind of question does not handle."""
 
 from __future__ import annotations
 

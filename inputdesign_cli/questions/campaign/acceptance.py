@@ -93,7 +93,7 @@ def _check_answers(given: str, part: Part) -> None:
 
 
 def _renamed(applied: str, other: str) -> str:
-    """Return how to name the columns; a reference is known by the header alone."""
+    """Return the hint that names the columns rightly; a reference is known by the header alone."""
     if applied.startswith("r"):
         return "give the columns their right names in the first line of the file"
     return f"say which column is which, --columns {applied}=NAME,{other}=NAME,.."

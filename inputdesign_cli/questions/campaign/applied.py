@@ -34,7 +34,7 @@ _COPY = 1e-10
 
 @dataclass(frozen=True)
 class Match:
-    """The relation of a record to a plan.
+    """Describes how well a record follows a plan.
 
     Attributes:
         begins: the sample of the plan that the record begins with.

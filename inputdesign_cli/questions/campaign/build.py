@@ -161,7 +161,7 @@ def build_campaign(spec: Spec) -> CampaignTask:
 
 
 def build_rounds(spec: Spec) -> Rounds:
-    """Return what the rounds of a real campaign need.
+    """Return all that the rounds of a real campaign need.
 
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.

@@ -114,7 +114,7 @@ def _again(
     said: Outcome,
     given: Path | None = None,
 ) -> Results:
-    """Decide by all records that count.
+    """Decide on the next part from all records that count.
 
     Args:
         said: notes and findings about a new record, which was `given`.

@@ -48,7 +48,7 @@ _DIGESTS = "digests"
 
 @dataclass(frozen=True)
 class Memory:
-    """The content of a directory: its campaign, and the bytes of plans, records and estimates."""
+    """Holds the content of a directory: its campaign, and the bytes of plans, records and estimates."""
 
     directory: Path
     campaign: Campaign
@@ -58,7 +58,7 @@ class Memory:
 
     @property
     def folder(self) -> Path:
-        """The folder that names of files in the spec are relative to."""
+        """Return the folder that names of files in the spec are relative to."""
         return self.directory / self.campaign.folder
 
 
@@ -151,7 +151,7 @@ def _changed(directory: Path, name: str, campaign: Campaign) -> DataError:
 
 
 def _decisions(campaign: Mapping[str, object]) -> str:
-    """Return the digest of all but the digests, whatever the order of the keys."""
+    """Return the digest of all entries but the digests, whatever the order of the keys."""
     kept = {key: value for key, value in campaign.items() if key != _DIGESTS}
     return _sha256(json.dumps(kept, sort_keys=True).encode())
 

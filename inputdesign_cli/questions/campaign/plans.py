@@ -40,7 +40,7 @@ _SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
 @dataclass(frozen=True)
 class Planner:
-    """Asks and plans at any estimate.
+    """Asks for the accuracy and plans the experiment at any estimate.
 
     Attributes:
         nominal: the experiment on the plant of the spec, in raw parameters.
@@ -147,7 +147,7 @@ class Planner:
 
     @cached_property
     def _unlearned(self) -> float:
-        """Cost of a sample of the design for the plant of the spec; infinite without one, or if free."""
+        """Return the cost of a sample of the design for the plant of the spec; infinite if none or free."""
         try:
             return self._designed(self.nominal.model, Change(self.nominal.samples, self.seed)).cost or np.inf
         except IdesignError:
@@ -242,7 +242,7 @@ class Planner:
 
 @dataclass(frozen=True)
 class _Found:
-    """A design, of which the record is made when it is wanted."""
+    """Holds a design, whose record is made when it is wanted."""
 
     task: ConvexTask
     done: Designed
@@ -250,12 +250,12 @@ class _Found:
 
     @cached_property
     def cost(self) -> float:
-        """Cost of a sample."""
+        """Return the cost of a sample."""
         return design_cost(self.done.design, self.done.cost)
 
     @property
     def planned(self) -> Planned:
-        """The plan with its record; zero if nothing needs to be applied."""
+        """Return the plan with its record; zero if nothing needs to be applied."""
         done = self.done
         made = fitting_record(self.task.record, done.question, done.design, done.experiment.samples).record
         silent = np.zeros((done.experiment.samples, done.experiment.inputs))
@@ -263,7 +263,7 @@ class _Found:
         return Planned(record, len(record), power_of(record), self.cost, self.kind, claim=self._claim)
 
     def _claim(self) -> PlanClaim:
-        """Return what is proved of the design, evaluated once more by other means.
+        """Return the proof of the design, evaluated a second time by other means.
 
         Raises:
             InaccurateError: `internal-disagreement`.

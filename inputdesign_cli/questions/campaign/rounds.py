@@ -41,7 +41,7 @@ _CONTINUES = 0.1
 
 @dataclass(frozen=True)
 class Rounds:
-    """What all rounds of a campaign need.
+    """Holds all that the rounds of a campaign need.
 
     Attributes:
         offsets: (r,) the levels that the excitation varies about.
@@ -55,7 +55,7 @@ class Rounds:
 
 @dataclass(frozen=True)
 class Past:
-    """The campaign so far.
+    """Describes the campaign so far.
 
     Attributes:
         records: the files that count, each with u and y of a part.
@@ -78,7 +78,7 @@ class Past:
 
 @dataclass(frozen=True)
 class Decision:
-    """The outcome of a round.
+    """Holds the outcome of a round.
 
     Attributes:
         seed: of the record of the next part.
@@ -101,7 +101,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Part:
-    """A record of a part.
+    """Holds a record of a part.
 
     Attributes:
         table: times, inputs, outputs and, in a loop, the reference.
@@ -118,7 +118,7 @@ class Part:
 
     @property
     def samples(self) -> int:
-        """Number of samples that were applied, up to the last known one."""
+        """Return the number of samples that were applied, up to the last known one."""
         return int(self.rows[-1]) + 1
 
 

@@ -26,7 +26,7 @@ _REMAINDER = 0.1
 
 @dataclass(frozen=True)
 class Schedule:
-    """The lengths of the parts.
+    """Holds the lengths of the parts.
 
     Attributes:
         parts: samples of the first parts; later parts have `block`.
@@ -55,7 +55,7 @@ class Schedule:
 
     @property
     def looks(self) -> int:
-        """The largest number of parts."""
+        """Return the largest number of parts."""
         done = parts = 0
         while done < self.most:
             done += self.take(done)
@@ -69,7 +69,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Rules:
-    """The rules of a campaign; see `campaign` of the spec."""
+    """Holds the rules of a campaign; see `campaign` of the spec."""
 
     schedule: Schedule
     pilot_power: float | None = None
@@ -92,7 +92,7 @@ class Rules:
 
     @property
     def end(self) -> int:
-        """Samples after which the experiment is over, whatever was reached."""
+        """Return the number of samples after which the experiment is over, whatever was reached."""
         return self.schedule.most if self.stops else min(self.schedule.samples, self.schedule.most)
 
     def over(self, done: int, *, met: bool) -> bool:
@@ -109,7 +109,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Standing:
-    """The model that plans are built on, and its accuracy.
+    """Holds the model that plans are built on, and its accuracy.
 
     Attributes:
         model: the estimate, or a model on the way to it.
@@ -126,13 +126,13 @@ class Standing:
 
     @property
     def met(self) -> bool:
-        """Whether the data suffice."""
+        """Return whether the data suffice."""
         return self.share == 1.0 and self.ratio <= REACHED
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A plan for the rest of the experiment.
+    """Holds a plan for the rest of the experiment.
 
     Attributes:
         record: (rest, r) about the operating point, of which `take` samples are applied.
@@ -163,7 +163,7 @@ class Planned:
 
     @property
     def designed(self) -> bool:
-        """Whether a design is behind it, so that the first such plan sets the cap."""
+        """Return whether the plan comes from a design, so that the first such plan sets the cap."""
         return self.kind not in ("pilot", "stopgap")
 
     @property
@@ -200,7 +200,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Oracle:
-    """The cost of an experiment whose design knows the true plant, summed over its samples.
+    """Holds the cost of an experiment whose design knows the true plant, summed over its samples.
 
     Attributes:
         cost: of the spectrum; `record`: of the delivered record on the true plant, None without one.

@@ -37,7 +37,7 @@ _ENDINGS: tuple[Ending, ...] = ("stopped", "missed", "undecided", "unplanned")
 
 @dataclass(frozen=True)
 class CampaignTask:
-    """A spec with a campaign: solved it is the experiment in one shot, simulated it goes in parts."""
+    """Solves a spec with a campaign as one experiment in one shot, and simulates it in parts."""
 
     design: ConvexTask
     study: CampaignStudy
@@ -47,7 +47,7 @@ class CampaignTask:
         return self.design.solve()
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Design, and try whole campaigns and experiments in one shot on the true system.
+        """Design, and simulate whole campaigns and experiments in one shot on the true system.
 
         Raises:
             SpecError: `not-supported` for prior information without data.
@@ -121,7 +121,7 @@ def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) 
 def campaigns_entry(
     true: Experiment, ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None, *, runs: int, seed: int
 ) -> Simulation:
-    """Return the study.
+    """Return the entry of the study in the result.
 
     Args:
         true: the experiment on the true system.

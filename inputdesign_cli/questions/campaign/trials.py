@@ -29,7 +29,7 @@ _SEEDS = 2**31
 
 @dataclass(frozen=True)
 class CampaignStudy:
-    """A study of whole campaigns.
+    """Holds a study of whole campaigns.
 
     Attributes:
         true: the experiment on the true system, of the planned length.
@@ -50,7 +50,7 @@ class CampaignStudy:
 
 @dataclass(frozen=True)
 class Ended:
-    """The end of one run.
+    """Describes the end of one run.
 
     Attributes:
         status: `stopped` if the data met what is asked; `unplanned` if no experiment could be planned.
@@ -73,13 +73,13 @@ class Ended:
 
 
 def run_campaigns(study: CampaignStudy, runs: int, rng: np.random.Generator) -> list[Ended]:
-    """Return several campaigns from rest, one after the other."""
+    """Run several campaigns from rest, one after the other, and return their ends."""
     return [_Run(study, rng).end() for _ in range(runs)]
 
 
 @dataclass
 class _Run:
-    """One campaign. The noise of all samples is drawn first, so that other ways meet the same noise."""
+    """Runs one campaign. The noise of all samples is drawn first, so that other ways meet the same noise."""
 
     study: CampaignStudy
     rng: np.random.Generator
@@ -188,7 +188,7 @@ class _Run:
         )
 
     def _true_ratio(self) -> float | None:
-        """Return the ratio of the true plant by the samples applied."""
+        """Return the largest r_u / r_adm of the true plant, by the samples applied."""
         true = replace(self.study.true, samples=len(self.r))
         if true.model.names != self.last.names:
             return None

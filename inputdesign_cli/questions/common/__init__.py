@@ -1,1 +1,1 @@
-"""What several kinds of questions share once their objects are built."""
+"""Steps that several kinds of questions share once their objects are built."""

@@ -1,4 +1,4 @@
-"""What an information matrix shows over frequency and of parameters: bound.csv, nyquist.csv, ellipses.
+"""Curves of an information matrix over frequency and of parameters: bound.csv, nyquist.csv, ellipses.
 
 bound.csv has r_u against r_adm, entry by entry. nyquist.csv has the loop of one input and one output.
 """
@@ -31,7 +31,7 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Informed:
-    """What an information matrix M (k, k), in the coordinates of the errors, says of them over frequency.
+    """Relates an information matrix M (k, k), in the coordinates of the errors, to them over frequency.
 
     Without r_adm `stated` the errors are r_u of entries of G. Each binds at its `active` frequencies. For
     comparison there are M of the baseline `white`, of white excitation with `equal` means, and of the
@@ -119,7 +119,7 @@ class Informed:
 
 
 def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
-    """Return M (k, k) of white excitation at the cost or length of the design; None if limits bind both.
+    """Return the information (k, k) of white noise at the design's cost or length; None if limits bind both.
 
     M less what is known without excitation is in proportion to both. The `ratio` is that of the costs.
     """
@@ -134,7 +134,7 @@ def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
 def nyquist_curves(
     units: Units, errors: Sequence[OnModelError], information: Array, active: Sequence[Array] = ()
 ) -> tuple[dict[str, Table], dict[str, plots.Curves]]:
-    """Return C G with discs of radius |C| r_u, by file stem; nothing without a loop, or for several channels.
+    """Return the loop gain C G with discs of radius |C| r_u, by file stem; empty without a scalar loop.
 
     The loop is that whose sensitivity is bounded, else that of the experiment.
     """

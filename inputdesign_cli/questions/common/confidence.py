@@ -1,4 +1,4 @@
-"""The confidence factor alpha: as stated, or calibrated to what estimates really do."""
+"""The confidence factor alpha: as stated, or calibrated to the scatter of simulated estimates."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _EACH, _LONG = 20, 100
 
 @dataclass(frozen=True)
 class SimulatedEstimates:
-    """Estimates from `runs` records of an excitation on the nominal plant, in raw parameters.
+    """Holds estimates from `runs` records of an excitation on the nominal plant, in raw parameters.
 
     Its length is that of the records. `sets` of runs correct alpha; others check it.
     """
@@ -62,12 +62,12 @@ class SimulatedEstimates:
         return found
 
     def checked(self, coverage: Coverage, errors: Sequence[ModelError], within: float) -> Coverage:
-        """The coverage with what fresh runs say of r_adm times `within`."""
+        """Return the coverage with the share of fresh runs within r_adm times `within`."""
         largest = largest_error(errors, self._estimates(_TO_CHECK))
         return replace(coverage, runs=self.runs, kept=int(np.sum(largest <= within)))
 
     def _estimates(self, seed: int) -> Array:
-        """Return NaN where the search did not settle, (runs, k)."""
+        """Return the estimates (runs, k), NaN where the search did not settle."""
         seconds_left()
         study = Study(self.nominal, self.nominal, self.runs, seed, self.step)
         each = _EACH if self.nominal.samples >= _LONG else 1
@@ -77,7 +77,7 @@ class SimulatedEstimates:
 
 @dataclass(frozen=True)
 class Simulator:
-    """Makes such estimates; see `SimulatedEstimates` for the attributes, `nominal` of any length."""
+    """Makes simulated estimates; see `SimulatedEstimates` for attributes, `nominal` of any length."""
 
     nominal: Experiment
     runs: int
@@ -96,7 +96,7 @@ class Simulator:
 
 @dataclass(frozen=True)
 class Confidence:
-    """alpha of r_u; where it was calibrated, how, the chi-squared one (`usual`) and what is kept."""
+    """Holds alpha of r_u; where calibrated also the way, the chi-squared one (`usual`) and the coverage."""
 
     alpha: float
     usual: float
@@ -112,7 +112,7 @@ class Confidence:
         usual: float,
         simulated: SimulatedEstimates | None = None,
     ) -> Confidence:
-        """The alpha of an experiment of this information (k, k), in the coordinates of the requirements."""
+        """Return alpha of an experiment of this information (k, k), in the requirements' coordinates."""
         errors = bounded_errors(requirements)
         if calibration is None or not errors:
             return cls(usual, usual)
@@ -125,7 +125,7 @@ class Confidence:
 
     @property
     def reported(self) -> Reported | None:
-        """The confidence as the outcome has it; None if nothing was calibrated."""
+        """Return the confidence as the outcome has it; None if nothing was calibrated."""
         if self.coverage is None or self.calibration is None:
             return None
         return replace(
@@ -158,15 +158,16 @@ def beyond_chance(coverage: Coverage, probability: float) -> int:
 
 
 def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
-    """The requirements on a model error to first order."""
+    """Return the requirements on a model error to first order."""
     return [requirement for requirement in requirements if isinstance(requirement, ModelError)]
 
 
 def settled_alpha(needed: Callable[[float], float | None], start: float) -> float:
     """Return the alpha whose design needs just that alpha, or raise `infeasible` or `confidence-not-settled`.
 
-    A design for a larger alpha is more accurate, and needs a smaller one: log(needed / alpha) falls, and the
-    secant method in log(alpha) finds its root. Where there is no design within the limits `needed` is None.
+    A design for a larger alpha is more accurate, and needs a smaller one. So log(needed / alpha) falls, and
+    the secant method in log(alpha) finds its root. Where there is no design within the limits `needed` is
+    None.
     """
     x, before, missing, refused = np.log(start), None, np.nan, False
     for _ in range(_MOST_ROUNDS):

@@ -1,4 +1,4 @@
-"""What all kinds of questions deliver: results that grow, their last check, and a study of them.
+"""Results that all kinds of questions deliver: how they grow, their last check, and a study of them.
 
 What is about to be written is reread, and evaluated by other means.
 """
@@ -33,10 +33,10 @@ APART = 1e-6
 
 @dataclass(frozen=True)
 class Delivered:
-    """What a design or an analysis delivers to be tried: a record (n, r), None if no excitation is needed.
+    """Holds a design or an analysis to be tried: a record (n, r), None if no excitation is needed.
 
-    `renewed` realises the spectrum anew in each run; `of_length` draws `bound` and `ellipses` for another
-    number of samples; `rivals` searches a number of records from several starts, if that finds other minima.
+    `renewed` realises the spectrum anew in each run. `of_length` draws `bound` and `ellipses` for another
+    number of samples. `rivals` searches a number of records from several starts, if that finds other minima.
     """
 
     results: Results
@@ -90,7 +90,7 @@ def with_study(
 
 
 def proof_status(gap: float, tolerance: float) -> str:
-    """Whether the relative gap that is proved is as small as asked."""
+    """Return the status of a proved relative gap: whether it is as small as asked."""
     if gap <= tolerance * (1.0 + _ROUNDING):
         return "optimal"
     return "almost_optimal" if gap <= ALMOST * tolerance else "gap_open"
@@ -104,7 +104,7 @@ def check_claims(wrong: Iterable[str], remedy: str) -> None:
 
 
 def of_bounds(claimed: Objective, apart: float = APART, size: float = 0.0) -> Iterator[str]:
-    """No value lies beyond a bound that is called proved, by this share of the value, or of a larger size."""
+    """Yield a sentence if the value lies beyond a proved bound by this share of it, or of a larger size."""
     value, largest = claimed.value, claimed.upper_bound is not None
     for name, bound in (
         ("upper_bound", claimed.upper_bound),
@@ -117,13 +117,13 @@ def of_bounds(claimed: Objective, apart: float = APART, size: float = 0.0) -> It
 
 
 def of_cost(found: float, claimed: float) -> Iterator[str]:
-    """The excitation costs what is claimed."""
+    """Yield a sentence unless the excitation costs as much as is claimed."""
     if not abs(found - claimed) <= APART * abs(found):
         yield f"the spectrum costs {found:.10g}, not {claimed:.10g}"
 
 
 def of_limit(limit: PowerLimit, power: float) -> Iterator[str]:
-    """The power keeps to its limit."""
+    """Yield a sentence if the power is beyond its limit."""
     excess = power - limit.bound if limit.upper else limit.bound - power
     if not excess <= APART * limit.bound:
         yield f"{limit.key} is {limit.bound:.6g}, but the spectrum has {power:.10g}"

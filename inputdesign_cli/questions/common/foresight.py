@@ -1,4 +1,4 @@
-"""Minima of the likelihood far apart may leave data of a design undecided: looked for before they are taken.
+"""Look for minima of the likelihood far apart, which may leave a design's data undecided, beforehand.
 
 The local covariance knows of one minimum. A dead time that few frequencies excite has others, whole periods
 away. A record of the design is simulated on the nominal plant and estimated with the search of `identify`.
@@ -35,7 +35,7 @@ _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
 
 @dataclass(frozen=True)
 class Foresight:
-    """How the data of an experiment are foreseen, by the nominal one in raw parameters, its prior included.
+    """Predicts an experiment's data from the nominal plant and prior, both in raw parameters.
 
     `entries` are errors that have r_u where none is bounded, and `earlier` counts along where data are
     assessed. `knowledge` of the parameters rules rivals out.
@@ -52,7 +52,7 @@ class Foresight:
     def foreseen(
         self, record: Array, requirements: Sequence[Requirement]
     ) -> tuple[Entry | None, list[Finding]]:
-        """Return the rivals that a record (n, r) would leave (None: not known), and what to do about them."""
+        """Return the rivals that fit a record (n, r) (None: not known), with findings on them."""
         reason = self._not_now(len(record))
         if reason:
             return None, [not_foreseen(reason)]
@@ -65,7 +65,7 @@ class Foresight:
         return entry, list(foreseen_rivals(self.units, estimate, found, self.advice))
 
     def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> Searched | None:
-        """Return how many of some records end elsewhere, and how many leave rivals; None if not known."""
+        """Return how many of `runs` simulations end elsewhere and how many leave rivals; None if unknown."""
         elsewhere, rivals = 0, 0
         for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
             tell(Counted("records searched from several starts", done, runs))
@@ -94,7 +94,7 @@ class Foresight:
         return beyond(model, estimate, unstated, plant.information(record))
 
     def _not_now(self, samples: int) -> str:
-        """Why nothing is looked for; empty where it is."""
+        """Return the reason to search for no rivals; empty if the search is to be done."""
         if not self.looks:
             return "solver.any_spectrum: false (or --fast)"
         nominal = self.nominal

@@ -1,4 +1,4 @@
-"""Why nothing meets the requirements within the limits, or no record was found that does, and what would."""
+"""Reasons why nothing meets the requirements within the limits, or no record was found, and the remedies."""
 
 from __future__ import annotations
 
@@ -39,11 +39,10 @@ _SHARE = 0.8
 
 @dataclass(frozen=True)
 class Reach:
-    """How far spectra reach: whether all of them have a bound, and whether it is attained.
+    """Describes the reach of spectra: whether all of them have a bound, and whether it is attained.
 
-    Where it is only approached, at ends of the `band` of all spectra, that stays off them by so little that
-    nothing is lost to the tolerance. `note` says what the reader of a result must know of it; None if
-    there is nothing to say.
+    Where it is only approached, at ends of the `band` of all spectra, the band stays off them by a margin
+    within the tolerance. `note` explains that to the reader of a result; None if there is nothing to explain.
     """
 
     bounded: bool = True
@@ -54,7 +53,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class StatedBound:
-    """A number of the spec that bounds an error: `factor` times the error is `value` times factor ** `power`.
+    """Holds a bound of the spec: `factor` times the error is `value` times factor ** `power`.
 
     A `fraction` is shown in per cent.
     """
@@ -66,7 +65,7 @@ class StatedBound:
     fraction: bool = False
 
     def loosened(self, factor: float) -> float:
-        """What the spec would have to say for an error `factor` times as large."""
+        """Return the number to state in the spec for an error `factor` times as large."""
         return self.value * factor**self.power
 
     def shown(self, value: float) -> str:
@@ -79,7 +78,7 @@ class StatedBound:
 
 @dataclass(frozen=True)
 class Bought:
-    """The best accuracy within limits of the spec: `nearest` solves the `problem`, of the goal "factor".
+    """Holds the best accuracy within limits: `nearest` solves the `problem`, of the goal "factor".
 
     The numbers `stated` in the spec are loosened alike; there are none if that has no words.
     """
@@ -92,12 +91,12 @@ class Bought:
 
     @property
     def factor(self) -> float:
-        """The least factor on all errors that are asked for with which they are met."""
+        """Return the least common factor on all errors asked for with which they can be met."""
         return float(np.sqrt(self.nearest.objective))
 
     @property
     def sentence(self) -> str:
-        """What the limits buy, and where that is worst."""
+        """Return the accuracy within the limits and where it is worst, as a sentence."""
         if self.stated:
             parts = [
                 f"{one.label} {one.shown(one.loosened(self.factor))} (asked: {one.shown(one.value)})"
@@ -114,7 +113,7 @@ class Bought:
 
     @property
     def details(self) -> dict[str, object]:
-        """Return this as data, with frequencies in the user's unit."""
+        """Return the best accuracy within the limits as data, with frequencies in the user's unit."""
         return {
             "factor": self.factor,
             "factor_bound": float(np.sqrt(max(self.nearest.certificate.bound, 1.0))),
@@ -136,7 +135,7 @@ class Bought:
 
     @property
     def shares(self) -> list[tuple[PowerLimit, float]]:
-        """Each limit of the spec with its share of the weight of the proof."""
+        """Return each limit of the spec with its share of the multipliers of the proof."""
         listed = self.problem.limits
         weights = self.nearest.certificate.limits * np.array([limit.bound for limit in listed])
         least = _TAKES_PART * max(weights.max(initial=0.0), 1e-300)
@@ -146,7 +145,7 @@ class Bought:
 
     @property
     def _binding(self) -> list[tuple[Asked, float | None]]:
-        """Where the requirements bind, the place of the largest multiplier first."""
+        """Return the requirements that bind and where, the largest multiplier first."""
         return [(self.problem.demands.asked[index], w) for index, w in self.nearest.active]
 
     def _entry(self, asked: Asked) -> str:
@@ -169,7 +168,7 @@ class Bought:
 
 
 def named(limit: PowerLimit) -> str:
-    """Return what a limit bounds, for a sentence: input 2 power, or power of the moves of input 2."""
+    """Return the quantity that a limit bounds, for a sentence: input 2 power, or power of the moves of it."""
     number = "" if limit.channel is None else f" {limit.channel + 1}"
     return f"power of the moves of input{number}" if limit.kind == "moves" else f"{limit.kind}{number} power"
 
@@ -177,7 +176,7 @@ def named(limit: PowerLimit) -> str:
 def explain(
     units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound]
 ) -> InfeasibleError:
-    """Say the proof that came with the failure, by the numbers of the spec that can be loosened."""
+    """Return the error with the proof of the failure, by numbers of the spec that can be loosened."""
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
     involved = [limit for limit, _ in bought.shares]
@@ -195,7 +194,8 @@ def explain(
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
         # Within the same limits information grows in proportion to the length.
         longer = int(np.ceil(question.experiment.samples * nearest.objective))
-        remedies.append(f"with {longer} samples a spectrum can, and a record with somewhat more")
+        enough = units.length(longer)
+        remedies.append(f"with {enough} a spectrum can, and a record with somewhat more")
     try:  # that it is infeasible is proved, whatever else is found out
         with time_for_hints():
             parts += _what_would_do(unreachable, question, involved)
@@ -213,7 +213,7 @@ def explain(
 def _what_would_do(
     unreachable: UnreachableError, question: Question, involved: Sequence[PowerLimit]
 ) -> list[str]:
-    """Return which limits are exhausted, and what each would have to be with the others kept."""
+    """Return sentences on the exhausted limits, and the value each would need with the others kept."""
     parts, alone = list[str](), False
     for limit in involved:
         factor = needed_factor(unreachable, [limit]) if limit.upper else None
@@ -234,7 +234,7 @@ def _what_would_do(
 
 
 def _together(unreachable: UnreachableError, question: Question) -> str:
-    """Return what all upper limits would have to be; the square root of the factor if they bound samples."""
+    """Return a sentence with the factor on all upper limits; its square root if they bound samples."""
     raised = [limit for limit in question.limits if limit.upper]
     densities = [density.key for density in question.densities if density.upper]
     # The optimum of the goal "factor" meets the accuracy if limits and densities are multiplied by it.
@@ -250,7 +250,7 @@ def _together(unreachable: UnreachableError, question: Question) -> str:
 
 
 def _within_reach_of_any(question: Question) -> bool:
-    """Whether some spectrum of another type meets what this type cannot (densities are left out)."""
+    """Return whether some spectrum of another type meets the requirements (without densities)."""
     if question.densities or question.basis.free:
         return False
     experiment = question.experiment
@@ -274,9 +274,9 @@ def contradictory(limits: Sequence[PowerLimit], why: str) -> InfeasibleError:
 def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -> float | None:
     """Return the least factor on these limits together that allows the accuracy; None if none does.
 
-    The multipliers of the limits are the slope of the square of the best ratio: Newton's method, in
-    logarithms, between values that are proved too small and values that are known to do. Information of noise
-    or of a prior does not grow with the powers: the square of the ratio is not the factor.
+    The multipliers of the limits are the slope of the square of the best ratio. Newton's method uses it, in
+    logarithms, between values proved too small and values known to do. Information of noise or of a prior
+    does not grow with the powers: the square of the ratio is not the factor.
     """
     stated = unreachable.problem.limits
     bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}

@@ -23,7 +23,7 @@ _OFF = 3.0
 
 @dataclass(frozen=True)
 class Knowledge:
-    """The parameters centre + columns z, (k,) and (k, m): z in the unit ball, or with `box` in [-1, 1]^m.
+    """Holds the region centre + columns z, (k,) and (k, m): z in the unit ball, with `box` in [-1, 1]^m.
 
     Of directions without a column nothing is known.
     """
@@ -33,11 +33,11 @@ class Knowledge:
     box: bool
 
     def coordinates(self, theta: Array) -> Array:
-        """Return z (m,) of parameters (k,)."""
+        """Return the coordinates z (m,) of parameters (k,)."""
         return np.asarray(np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0], dtype=float)
 
     def admits(self, theta: Array) -> bool:
-        """Whether parameters (k,) are possible."""
+        """Return whether parameters (k,) are possible."""
         z = self.coordinates(theta)
         size = np.max(np.abs(z), initial=0.0) if self.box else np.linalg.norm(z)
         return bool(size <= _ROOM)
@@ -45,7 +45,7 @@ class Knowledge:
 
 @dataclass(frozen=True)
 class Foreseen:
-    """The plants that a design was made for: a region of the parameters `of_plant` (indices)."""
+    """Holds the plants that a design was made for: a region of the parameters `of_plant` (indices)."""
 
     region: Knowledge
     of_plant: NDArray[np.int64]

@@ -34,7 +34,7 @@ _TAKES_PART = 1e-6
 
 @dataclass(frozen=True)
 class Delivery:
-    """How a record is handed over: (r,) what is added to each input, and files beside signal.csv.
+    """Describes the delivery of a record: (r,) levels added to each input, and files beside signal.csv.
 
     They are "mat", "npz", "h", "wav"; `full_scale` of the last is the largest value when None.
     """
@@ -47,12 +47,17 @@ class Delivery:
 
 @dataclass(frozen=True)
 class RecordRequest:
-    """What a spec asks of its record, of `samples` samples (None: as many as the experiment has).
+    """Describes the record that a spec asks for, of `samples` samples (None: as the experiment).
 
-    Bounds are on single samples, by `limit_keys`. The band is in rad per sample, the step between samples in
-    the unit of the experiment. A record that `meets` keeps the accuracy itself; else it has the power of the
-    design. Where the length is sought it is `most_samples` at most, and at most `longest` are computed at
-    all. `others` may stand in for a kind of signal that does not fit.
+    A record that `meets` keeps the accuracy itself; else it has the power of the design. Where the length is
+    sought it is `most_samples` at most, and at most `longest` are computed at all.
+
+    Args:
+        bounds: on the samples of the record, on the outputs that it causes, and on powers.
+        band: in rad per sample.
+        step: between samples, in the unit of the experiment.
+        limit_keys: the keys of the spec that limit single samples, for messages.
+        others: may stand in for a kind of signal that does not fit.
     """
 
     settings: SignalSettings
@@ -77,7 +82,7 @@ class RecordRequest:
 
     @property
     def searched(self) -> bool:
-        """Whether a record that misses the accuracy is not an answer, so that others are looked for."""
+        """Return whether other records are searched for, as one that misses the accuracy is no answer."""
         return self.bounds.hard and self.settings.level is None
 
     def feasible(self, experiment: int, least: int) -> bool:
@@ -88,7 +93,7 @@ class RecordRequest:
 
 @dataclass(frozen=True)
 class Made:
-    """A record with what it realises: the request that made it, and the design whose spectrum it has.
+    """Holds a record with its request and the design whose spectrum it has.
 
     `input_power` limits that design, where it is not the one that was asked for.
     """
@@ -105,8 +110,8 @@ def make_record(
 ) -> Record | None:
     """Return the best of several records of the designed spectrum, or the `first` that meets what is asked.
 
-    Best is the least power that meets the requirements of every scenario by the record itself, or the best
-    criterion of the plant where it is worst. None when no excitation is needed, or when the record would be
+    The best record meets the requirements of every scenario with the least power, or has the best criterion
+    at its worst plant. Return None when no excitation is needed. Return None, too, when the record would be
     too short (criteria per sample without `signal.samples`) or longer than any that is computed.
     """
     problem, settings = design.problem, request.settings
@@ -189,7 +194,7 @@ def _target(
     *,
     meets: bool,
 ) -> Target:
-    """Return what ranks records: the score at the plant, of these numbers, where it is worst."""
+    """Return the score that ranks records: at the worst of the plants with these numbers."""
     scenarios = design.problem.scenarios
     bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in scenarios]
 
@@ -202,12 +207,12 @@ def _target(
 
 
 def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:
-    """The numbers of the largest that are larger: what serves these serves most of the others."""
+    """Return the numbers of the few largest above `most`: a record for these serves most of the others."""
     return sorted((n for n, figure in figures.items() if figure > most), key=lambda n: -figures[n])[:FEW]
 
 
 def peak_at(request: RecordRequest, design: Design, record: Record) -> Callable[[Experiment], float] | None:
-    """The largest share of a limit on single samples that a record uses at a plant; None: it is the same."""
+    """Return the largest share of a sample limit that a record uses at a plant; None: same for all."""
     bounds, n = request.bounds, len(record.samples)
     if bounds.output is None and (design.problem.experiment.loop is None or not bounds.hard):
         return None
@@ -229,7 +234,7 @@ def ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Array
 def _power_share(
     plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
 ) -> float:
-    """The largest share of a limit on powers that a record uses at one plant, where the plant takes part."""
+    """Return the largest share of a power limit that a record uses at a plant, where it depends on it."""
     powers = {
         kind: plant.mean_squares(kind, record.samples)
         for kind, _, _ in limits
@@ -264,7 +269,7 @@ def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
 
 
 def redrawn(request: RecordRequest, design: Design, inputs: int, samples: int) -> Redrawn:
-    """Return what draws other records of the designed spectrum of this length, with uniform phases."""
+    """Return a generator of other records of the designed spectrum, of this length, with uniform phases."""
     settings, found = request.settings, design.result
     if settings.phases != "random":
         settings = replace(settings, phases="orthogonal")
@@ -291,12 +296,12 @@ def given_record(
 
 
 def designed_spectrum(request: RecordRequest, design: Design, inputs: int) -> DesignedSpectrum:
-    """The spectrum of a design, for values as far apart as asked."""
+    """Return the spectrum of a design, for values as far apart as asked."""
     return DesignedSpectrum.of(design.result.basis, design.result.x, inputs=inputs, step=request.step)
 
 
 def least_period(inputs: int) -> int:
-    """Values that a period must have: two, and with several inputs eight in the block of each."""
+    """Return the fewest values of a period: two, and with several inputs eight in the block of each."""
     return 2 if inputs == 1 else 8 * inputs
 
 
@@ -321,7 +326,7 @@ def _largest(
 
 
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    """Return what ranks records: a criterion, to be large, or the worst ratio of other requirements."""
+    """Return the score that ranks records: a criterion, negated, or the worst ratio of requirements."""
     criterion = criterion_of(requirements)
     if criterion is None:
         return worst_ratio(requirements)
@@ -329,6 +334,6 @@ def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
 
 
 def design_cost(design: Design, weights: Mapping[PowerKind, Weight]) -> float:
-    """What the powers of a design cost at these weights."""
+    """Return the cost of the powers of a design at these weights."""
     at, x = design.problem.on(design.result.basis), design.result.x
     return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))

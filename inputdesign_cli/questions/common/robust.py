@@ -1,6 +1,6 @@
-"""Designs for every plant that the true one might be: what was drawn, what the design keeps there.
+"""Designs for every plant that the true one might be: the drawn plants, and the accuracy at each.
 
-All that is said of plants that were not drawn is said under the distribution of the draws.
+All claims about plants that were not drawn hold under the distribution of the draws.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _TAKES_PART = 1e-6
 
 @dataclass(frozen=True)
 class Batch:
-    """Plants with parameters `thetas` (S, k), and how many were drawn until S were stable."""
+    """Holds plants with parameters `thetas` (S, k), and the number drawn until S were stable."""
 
     thetas: Array
     plants: tuple[Alternative, ...]
@@ -40,17 +40,17 @@ class Batch:
 
     @property
     def rejected(self) -> int:
-        """How many were unstable."""
+        """Return the number of plants that were unstable."""
         return self.drawn - len(self.plants)
 
     def only(self, kept: Sequence[int]) -> Batch:
-        """The plants with these numbers."""
+        """Return the batch of the plants with these numbers."""
         return replace(self, thetas=self.thetas[list(kept)], plants=tuple(self.plants[i] for i in kept))
 
 
 @dataclass(frozen=True)
 class Kept:
-    """How near a plant comes to missing what is asked: ratio over what is admitted, and where.
+    """Holds the largest ratio of an error at a plant to the admitted one, and its frequency.
 
     `cost` is that of the design at the plant, where that is looked at.
     """
@@ -62,7 +62,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class Searched:
-    """The worst plant that was found in a region, at `theta` (k,), and what it keeps.
+    """Holds the worst plant that was found in a region, at `theta` (k,), and its accuracy.
 
     `tried` plants were looked at in the last search; `added` were found before and are served by the design.
     """
@@ -76,7 +76,7 @@ class Searched:
 
 @dataclass(frozen=True)
 class Region(Knowledge):
-    """A region of plants: its `name` in words, and the plant at theta (k,), None if there is none."""
+    """Describes a region of plants: its `name` in words, and the plant at theta (k,), None without one."""
 
     name: str
     at: Callable[[Array], Alternative | None]
@@ -97,7 +97,7 @@ class Region(Knowledge):
 
 @dataclass(frozen=True)
 class Plants:
-    """The scenarios of a design: a batch beside the nominal plant, of which `discard` may be left out.
+    """Holds the scenarios of a design: a batch beside the nominal plant; `discard` may be left out.
 
     `afresh` draws others from the same distribution, `fresh` in all; None if plants were listed. `at` is the
     plant with parameters (k,), `unknowns` their number in the program. In the `region` the worst is
@@ -140,14 +140,14 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
 
 
 def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
-    """How near each scenario comes to missing what the design promises; the nominal one first."""
+    """Return the largest ratio of error to promised accuracy at each scenario; the nominal one first."""
     return _worst(problem, design, delivered(problem, design, samples))
 
 
 def _worst(
     problem: Problem, design: Design, informations: NDArray[np.float64], above: float = -np.inf
 ) -> list[Kept]:
-    """Return how near each scenario comes, with M_s (S, k, k); a share up to `above` may come out as 0."""
+    """Return the largest error ratio at each scenario, with M_s (S, k, k); one up to `above` may become 0."""
     worst = [Kept(0.0)] * len(problem.scenarios)
     for side in (False, True):
         # Where the best accuracy is sought, requirements may have the ratio that is reached.
@@ -178,14 +178,14 @@ def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.floa
 
 @dataclass(frozen=True)
 class Tried:
-    """A plant that the design was not made for: what it keeps, and what is asked there."""
+    """Holds the accuracy at a plant that the design was not made for, and the requirements there."""
 
     kept: Kept
     asked: tuple[Requirement, ...]
 
 
 def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Tried]:
-    """Return what plants keep that the design was not made for; a share up to `above` may come out as 0."""
+    """Return the accuracy at plants outside the design; a ratio up to `above` may come out as 0."""
     seconds_left()
     try:
         at = _at(design, samples, batch.plants)
@@ -217,7 +217,7 @@ def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.rand
 
 
 def _at(design: Design, samples: int, plants: Sequence[Alternative]) -> Problem:
-    """What is asked at plants that the design was not made for, each in coordinates of its own."""
+    """Return the requirements at plants outside the design, each in coordinates of its own."""
     on = design.problem.on(design.result.basis)
     power = max(on.power("excitation").at(design.result.x), np.finfo(float).tiny)
     of_length = [replace(plant.experiment, samples=samples) for plant in plants]

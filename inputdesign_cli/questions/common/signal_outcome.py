@@ -1,4 +1,4 @@
-"""The record as it is applied: what the outcome says of it, its tables, the outputs it causes, its files."""
+"""The record as it is applied: its entry of the outcome, its tables, the outputs it causes, its files."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def signal_of(
     designed: Array | None = None,
     spectrum: DesignedSpectrum | None = None,
 ) -> Signal:
-    """Return what the outcome says of a record: powers and peaks by channel, and what it achieves.
+    """Return the entry of the outcome for a record: powers and peaks by channel, and its accuracy.
 
-    The value of a criterion is for an experiment of its own length that goes on as the record does, so that
-    it compares with the design. Other requirements have their worst ratio.
+    The value of a criterion is for an experiment of the design's length that goes on as the record does.
+    Other requirements have their worst ratio.
     """
     samples, made = record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)
@@ -142,7 +142,7 @@ def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
 
 
 def _limits(request: RecordRequest, units: Units, record: Record) -> dict[str, tuple[float, float]]:
-    """Between which values each channel of the record is to stay, where that signal is limited."""
+    """Return the least and largest value of each channel of the record, where that signal is limited."""
     most, around = request.bounds.amplitude, request.delivery.operating_points
     if most is None or units.closed_loop or record.method == "given":
         return {}
@@ -174,7 +174,7 @@ def applied(delivery: Delivery, record: Record) -> Array:
 def other_files(
     request: RecordRequest, units: Units, record: Record, columns: dict[str, Array]
 ) -> dict[str, bytes]:
-    """signal.mat, .npz and .h (time, u1 or r1, .., sample_time); signal.wav (32-bit float up to 1)."""
+    """Return signal.mat, .npz and .h (time, u1 or r1, .., sample_time); signal.wav (32-bit float up to 1)."""
     delivery, files = request.delivery, {}
     for ending, made in WRITERS.items():
         if ending in delivery.also:
@@ -190,14 +190,14 @@ def other_files(
 
 
 def _full_scale(delivery: Delivery, record: Record) -> float:
-    """What full scale stands for in signal.wav, in all channels: the largest range or the largest value."""
+    """Return the value at full scale in signal.wav, of all channels: the largest range or value."""
     if delivery.full_scale is not None and record.method != "given":
         return delivery.full_scale
     return float(np.abs(applied(delivery, record)).max())
 
 
 def _spectrum_error(lines: Lines, samples: Array) -> float:
-    """The largest error of the record's correlations, lags 0 to 50, compared with the design.
+    """Return the largest error of the record's correlations, lags 0 to 50, against the design.
 
     Correlations of inputs i and j are relative to the roots of their powers; the total power does not count.
     """

@@ -44,7 +44,7 @@ _FADED = 3.0
 
 
 def error_bands(units: Units, predicted: PredictedError, errors: Array, name: str) -> plots.ErrorBandCurves:
-    """Quantiles of the errors (runs, n) over frequency, of every entry that the prediction is about."""
+    """Return quantiles of the errors (runs, n) over frequency, of every entry with a prediction."""
     frequency = predicted.w / units.frequency
     r_u = predicted.r_u if name == "design" else None
 
@@ -65,7 +65,7 @@ def error_bands(units: Units, predicted: PredictedError, errors: Array, name: st
 
 
 def cloud(trials: Trials, covariance: Array | None) -> plots.CloudCurves | None:
-    """The estimates in some planes; None without a covariance (k, k) in theory, or for a single parameter."""
+    """Return the estimates in some planes; None without a covariance (k, k), or for a single parameter."""
     size = len(trials.names)
     if covariance is None or size < 2:
         return None
@@ -80,7 +80,7 @@ def cloud(trials: Trials, covariance: Array | None) -> plots.CloudCurves | None:
 
 
 def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, plots.SignalCurves]:
-    """r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
+    """Return the signals r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
     slowest = float(np.abs(loop.closed_poles).max(initial=0.0))
     tail = min(int(np.ceil(_FADED / (1.0 - slowest))), len(excitation))
     r = np.concatenate([excitation, np.zeros((tail, units.inputs))])
@@ -107,7 +107,7 @@ def tried_input(
     cost: Mapping[PowerKind, Weight],
     modelled: Tried | None,
 ) -> TriedInput:
-    """Return what one excitation gave: errors, compared with what is `predicted`, on the design model too."""
+    """Return the errors with one excitation against those `predicted`, on the design model too."""
     trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
     frequency = predicted.w / units.frequency
     entry = TriedInput(
@@ -159,14 +159,14 @@ def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesi
 
 
 def covariance_in_theory(information: Array) -> Array:
-    """Return M^-1 (k, k) by way of unit diagonal."""
+    """Return the covariance M^-1 (k, k), inverted after scaling to unit diagonal."""
     scale = np.sqrt(np.diag(information))
     return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
 
 
 @dataclass(frozen=True)
 class TrueSystem:
-    """The plant and the noise that the runs meet, and the loop around them.
+    """Holds the plant and the noise that the runs meet, and the loop around them.
 
     With `relative_noise` the standard deviation of the noise is that share of the weakest output's.
     """
@@ -176,7 +176,7 @@ class TrueSystem:
     relative_noise: float | None = None
 
     def experiment(self, nominal: Experiment, output_power: Sequence[float]) -> Experiment:
-        """The nominal experiment on this system; `output_power` (p,) is that of the design."""
+        """Return the nominal experiment on this system; `output_power` (p,) is that of the design."""
         model = self.model
         if self.relative_noise is not None:
             variance = self.relative_noise**2 * min(output_power)
@@ -187,7 +187,7 @@ class TrueSystem:
 
 @dataclass(frozen=True)
 class Simulation:
-    """How an experiment is tried: on the nominal one in raw parameters, or on the `truth`.
+    """Describes the trial of an experiment: on the nominal one in raw parameters, or on the `truth`.
 
     With `renewed` each run realises the spectrum anew. At equal power flat signals of the kinds in `compare`
     are tried, too. For `entries` see `ModelQuestion`.
@@ -273,7 +273,7 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
 
 
 def _excitations(plan: Simulation, delivered: Delivered, record: Array) -> list[Excitation]:
-    """The design, what is compared at equal power, and white noise of the power that it would need."""
+    """Return the design, signals of equal power, and white noise of the power that it would need."""
     outcome, step, samples = delivered.results.outcome, plan.units.step, len(record)
     assert outcome.power is not None
     power = float(np.sum(outcome.power.excitation or 0.0))
@@ -302,7 +302,7 @@ def _flat(plan: Simulation, kind: str, name: str, power: float, samples: int) ->
 def _predicted(
     plan: Simulation, foretold: Mapping[str, plots.Curves], alpha: float, information: Array
 ) -> PredictedError:
-    """What the curve `bound` says; where there is none, the r_u that the `information` gives."""
+    """Return the prediction of the curve `bound`; without one, r_u from the `information`."""
     bound = foretold.get("bound")
     if not isinstance(bound, plots.BoundCurves):
         _, bound = Informed(plan.units, plan.entries, information, stated=False).bound()

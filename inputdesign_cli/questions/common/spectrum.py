@@ -25,7 +25,7 @@ _ROUNDING = 1e-9
 
 
 def axis(lo: float, hi: float, extra: Array) -> Array:
-    """Frequencies that look smooth on a logarithmic axis, with the `extra` ones among them."""
+    """Return frequencies that look smooth on a logarithmic axis, with the `extra` ones among them."""
     start = lo if lo > _ZERO * hi else _DECADES * hi
     inside = extra[(extra >= start) & (extra <= hi)]
     smooth = [np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2)]
@@ -35,7 +35,7 @@ def axis(lo: float, hi: float, extra: Array) -> Array:
 
 
 def distinct(w: Array, highest: float) -> Array:
-    """One frequency for each cluster within 0.3 %: the exchange visits an optimum several times.
+    """Return one frequency for each cluster within 0.3 %: the exchange visits an optimum repeatedly.
 
     Below a millionth of the `highest` of the band, the first stands for all.
     """
@@ -49,7 +49,7 @@ def _apart(w: Array, relative: float, absolute: float) -> Array:
 
 
 def hermitian_columns(values: NDArray, symbol: str) -> dict[str, Array]:
-    """Columns phi_11, phi_12_re, phi_12_im, phi_22, .. of values (n, r, r); phi of one input."""
+    """Return columns phi_11, phi_12_re, phi_12_im, phi_22, .. of values (n, r, r); phi of one input."""
     if values.shape[1] == 1:
         return {symbol: values[:, 0, 0].real}
     columns = {}
@@ -136,6 +136,6 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
 
 
 def described_spectrum(units: Units, basis: Basis, x: Array) -> Spectrum:
-    """Return what the outcome says of a designed spectrum."""
+    """Return the entry of the outcome for a designed spectrum."""
     details = dict(basis.described(x, units.frequency))
     return Spectrum(str(details.pop("type")), details)

@@ -1,4 +1,4 @@
-"""The road of a designed and of a given spectrum: a record with what it relies on, and its trial."""
+"""Steps of a designed and of a given spectrum: a record with its assumptions, and its trial."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _FADED = float(np.log(100.0))
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumTask(ABC):
-    """A question about the spectrum of an experiment, with its record and its trial.
+    """Asks about the spectrum of an experiment, with its record and its trial.
 
     Without a requirement on them `unstated` are the errors that have r_u; `ellipses` are None for a choice.
     """
@@ -58,14 +58,14 @@ class SpectrumTask(ABC):
         return self.delivered().results
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Return this with the experiment tried many times on the true system; see `common.simulation`."""
+        """Return the answer with many simulated experiments on the true system; see `common.simulation`."""
         delivered = self.delivered()
         if delivered.record is None:
             seconds_left()  # or else its time is the reason
         return simulate(self.simulation, delivered, executor)
 
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
-        """Return the errors that are asked about, or r_u of all entries of G, and whether they are."""
+        """Return the model errors asked about, or r_u of all entries of G, and whether any is asked about."""
         stated = model_errors(asked)
         return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
 
@@ -78,7 +78,7 @@ class SpectrumTask(ABC):
         requirements: Sequence[Requirement],
         findings: Iterable[Finding],
     ) -> Results:
-        """Return the results with a record, what an unknown start changes, and the minima that data leave.
+        """Return the results with a record, the effect of an unknown start, and the rival minima.
 
         A design is of spectra, which have no start; the record may live on its start from rest.
         """
@@ -108,7 +108,7 @@ class SpectrumTask(ABC):
         *,
         flat: bool = True,
     ) -> Delivered:
-        """Return what a trial of a record (n, r) takes; the curves show its information."""
+        """Return the design with a record (n, r) for a trial; the curves show its information."""
         of_length = partial(informed.of_length, experiment, self.ellipses, flat=flat)
         search = None if self.foresight is None else partial(self.foresight.tried, record, requirements)
         return Delivered(results, record, renewed, alpha, of_length, search)
@@ -117,7 +117,7 @@ class SpectrumTask(ABC):
 def growth_by_start(
     experiment: Experiment, record: Array, step: float, requirements: Sequence[Requirement]
 ) -> float:
-    """Return how many times as large errors are if the start of a record (n, r) and its levels are unknown.
+    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown.
 
     What samples after the start has faded show, about their means, decides where it is enough.
     """

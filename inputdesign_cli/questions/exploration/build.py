@@ -1,4 +1,4 @@
-"""A model that was found in a log -> a complete spec, commented, and what `identify` makes of it."""
+"""A model that was found in a log -> a complete spec, commented, and the task of `identify` on it."""
 
 from __future__ import annotations
 
@@ -136,13 +136,13 @@ def _inside(noise: Mapping[str, Any], samples: int) -> tuple[dict[str, Any], lis
 
 
 def build_explored(text: str) -> Identification:
-    """Return what `identify` runs on, of a spec that was written for a log."""
+    """Return the identification task of a spec that was written for a log."""
     return build_identification(parse_spec(text, "spec.yaml"))
 
 
 @contextmanager
 def naming_model(model: Spec) -> Iterator[None]:
-    """Let errors of time name the file of the model, which is what counts otherwise than the data."""
+    """Let errors about time name the file of the model, whose time differs from that of the data."""
     try:
         yield
     except DataError as error:
@@ -161,7 +161,7 @@ def naming_model(model: Spec) -> Iterator[None]:
 
 
 def model_to_judge(spec: Spec) -> Model:
-    """The model of a spec that is to be judged by data.
+    """Return the model of a spec that is to be judged by data.
 
     Raises:
         SpecError: it is neither of polynomials nor of transfer functions that are sampled.

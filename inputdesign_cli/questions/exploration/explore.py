@@ -1,4 +1,4 @@
-"""Find a model in a log, say what speaks for and against it, and write a spec for the next experiment."""
+"""Find a model in a log, list the evidence for and against it, and write a spec for the next experiment."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _MOST_SHIFTS = 2
 
 @dataclass(frozen=True)
 class Exploration:
-    """The results, why no model deserves trust (nothing where one does), and what tests say against it."""
+    """Holds the results, reasons against trust in any model (empty if one has it), and failed tests."""
 
     results: Results
     reasons: tuple[str, ...] = ()
@@ -152,7 +152,7 @@ def _beside(
     lines: MeasuredLines,
     silent: dict[str, SilentLines],
 ) -> Results:
-    """Return the results with the frequency response of the data alone, and what is said of it."""
+    """Return the results with the frequency response of the data alone, and the findings on it."""
     outcome: Outcome = explored.outcome.saying((*response_note(lines), *silent_lines_answer(silent)))
     assert outcome.exploration is not None  # results of an exploration
     section = replace(

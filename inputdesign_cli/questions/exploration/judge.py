@@ -30,7 +30,7 @@ _SEE = "see whether the model is of this plant, and gain, delay, units and colum
 
 
 def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
-    """Return how a given model does on other data.
+    """Return the fit and the tests of a given model on other data.
 
     Raises:
         DataError: the data cannot be used, or an output never changes.
@@ -68,7 +68,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
 
 
 def _reasons(found: Fits, data: Record) -> Iterator[str]:
-    """Yield why a model is not of these data: its simulation explains nothing, or too little of an output.
+    """Yield reasons why a model is not of these data: its simulation explains nothing, or too little.
 
     A poor fit alone is no fault of the model, since the noise may be strong, unless past inputs explain the
     rest.
@@ -86,7 +86,7 @@ def _reasons(found: Fits, data: Record) -> Iterator[str]:
             test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
             if not test.probability >= _SURELY:
                 yield (
-                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain what it "
-                    f"leaves (probability {chance(test.probability)}): the model is not of the plant of "
+                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain the "
+                    f"rest (probability {chance(test.probability)}): the model is not of the plant of "
                     "these data, or this acts otherwise here"
                 )

@@ -25,7 +25,7 @@ from inputdesign_cli.records import Record
 
 
 def validation_of(found: Fits, reasons: tuple[str, ...] | None = None) -> Validation:
-    """Return `validation`: numbers for one output, else lists."""
+    """Return the entry `validation` of the result: numbers for one output, else lists."""
     simulation, prediction = (
         tuple(float(x) if np.isfinite(x) else None for x in values)
         for values in (found.simulation, found.prediction)
@@ -40,7 +40,7 @@ def _single(values: tuple[float | None, ...]) -> Fit:
 def exploration_of(
     log: Record, found: Found, loops: Sequence[tuple[int, float]], reasons: tuple[str, ...]
 ) -> Exploration:
-    """Return `exploration`."""
+    """Return the entry `exploration` of the result."""
     return Exploration(
         channels=dict(log.names),
         sample_time=log.step,
@@ -88,7 +88,7 @@ def _structure(candidate: Candidate) -> Structure:
 
 
 def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> Iterator[str]:
-    """Yield what a user should know of the record and of how the model was chosen."""
+    """Yield remarks on the record and on the choice of the model."""
     outputs, inputs = found.model.outputs, found.model.inputs
     yield from (_chosen(log, found, i) for i in range(outputs))
     for i, (slope, wanders) in enumerate(zip(found.slopes, found.wanders, strict=True)):
@@ -133,7 +133,7 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
 
 
 def _chosen(log: Record, found: Found, i: int) -> str:
-    """Return which structure was taken for an output, and how it compares."""
+    """Return the structure that was chosen for an output, beside the others."""
     chosen, taken, ranges = found.outputs[i], found.taken[i], found.ranges[i]
     orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
     orders += f"; times in {log.time_unit}" if taken.orders.physical else ""
@@ -158,7 +158,7 @@ def _between(low: int, high: int | None) -> str:
 
 
 def structure_curves(found: Found) -> dict[str, Curves]:
-    """Return structures.png, one an output."""
+    """Return the curves of structures.png, one for each output."""
     curves: dict[str, Curves] = {}
     for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
         single, fits = len(found.outputs) == 1, dict[str, tuple[Array, Array]]()

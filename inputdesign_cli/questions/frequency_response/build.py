@@ -29,6 +29,8 @@ from inputdesign_cli.specification.models.sizes import most
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
+# Periods up to so many times as long are tried for a hint, and how many of them.
+_LONGEST, _TRIED = 1e3, 400
 _SIGNAL = (
     *("hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "scale", "order"),
     *("samples", "start"),
@@ -51,7 +53,7 @@ def stated_response(spec: Spec) -> FrequencyResponse:
 
 
 def build_periods(spec: Spec) -> Periods:
-    """Return how the record repeats; raise `bad-period` unless whole periods fit into the experiment."""
+    """Return the repetition of the record; raise `bad-period` unless whole periods fit into it."""
     stated, blocks, samples = stated_response(spec), spec.plant.inputs, spec.experiment.samples
     skip, shortest = stated.transient, spec.designs and spec.goal == "shortest_experiment"
     if stated.period is not None:
@@ -137,10 +139,9 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
     candidates = stated.lines
     if group is not None and candidates is not None:
         candidates += (candidates - 1) // (group - 1)
+    band, odd = (lo * step, hi * step), group is not None
     try:
-        found = harmonic_grid.harmonics_between(
-            period, (lo * step, hi * step), candidates, odd=group is not None
-        )
+        found = harmonic_grid.harmonics_between(period, band, candidates, odd=odd)
     except harmonic_grid.TooFewHarmonicsError as error:
         kind = "odd harmonics" if group is not None else "harmonics"
         asked = "at least one is" if candidates is None else f"{candidates} are"
@@ -149,13 +150,26 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
             "too-few-lines",
             f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
             f"asked for{left_out}",
-            hint="take a longer period (more samples, or fewer periods), fewer lines, or a higher end of the "
-            "band",
+            hint="take a longer period (more samples, or fewer periods"
+            f"{_longer(spec, period, band, candidates, odd=odd)}), fewer lines, or a higher end of the band",
             key=f"{KEY}.lines" if candidates is not None else f"{KEY}.band",
         ) from None
     if group is None:
         return found
     return harmonic_grid.thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
+
+
+def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
+    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
+    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
+        try:
+            harmonic_grid.harmonics_between(longer, band, lines, odd=odd)
+        except harmonic_grid.TooFewHarmonicsError:
+            continue
+        whole = longer * max(spec.experiment.samples // period, 1)
+        lasts = whole * spec.sample_time
+        return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
+    return ""
 
 
 def build_response_task(spec: Spec) -> ResponseTask:
@@ -197,7 +211,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
 
 
 def build_measurement(spec: Spec) -> Measurement:
-    """Return how data measure a frequency response: at the lines of the spec, or where they excite it."""
+    """Return the measurement of a frequency response by data: at the spec's lines, or the excited ones."""
     asked = spec.accuracy.frequency_response is not None
     return Measurement(
         header=build_header(spec),
@@ -282,7 +296,7 @@ def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
 
 
 def _check_supported(spec: Spec) -> None:
-    """Refuse what is not done for a frequency response, rather than ignore it."""
+    """Refuse keys that are not supported for a frequency response, rather than ignore them."""
     others = {*spec.accuracy.requirements, *spec.accuracy.goals} - {"frequency_response"}
     if not spec.plant.sampled:
         what = "measure lines of a plant that is not sampled"

@@ -60,7 +60,7 @@ _SURE = 0.95
 
 @dataclass(frozen=True)
 class Judged:
-    """The deviations (L, p, r) of data by the noise of the spec (`expected`) and of the data (`found`).
+    """Holds the deviations (L, p, r) of data by the noise of the spec (`expected`) and of the data (`found`).
 
     The true ratios are between `least` and `largest` (L,) with 95 %. Of the `asked` lines these are excited.
     Of the power of the inputs the share `differing` differs from period to period; `noise` (L, p) is averaged
@@ -87,22 +87,22 @@ class Judged:
 
     @cached_property
     def ratios(self) -> Array:
-        """The largest deviation (L,) of an entry by the noise of the data, over r_adm."""
+        """Return the largest deviation (L,) of an entry by the noise of the data, over r_adm."""
         return self.lines.ratios(self.found)
 
     @property
     def worst(self) -> int:
-        """The line of the largest ratio."""
+        """Return the line of the largest ratio."""
         return int(np.argmax(self.ratios))
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Limits of the largest ratio, with 95 %."""
+        """Return the 95 % limits of the largest ratio."""
         return float(self.least.max()), float(self.largest.max())
 
     @property
     def missed(self) -> bool:
-        """Whether noise alone misses what is admitted, which may be a share of |G|, beyond chance."""
+        """Return whether noise alone exceeds the admitted error beyond chance (it may be a share of |G|)."""
         bent = self.distorted.shares if self.distorted is not None and self.distorted.matters else 0.0
         sure = self.least / (1.0 + (self.lines.share or 0.0) * (self.moved + bent))
         return not self.scattered and bool(np.any(sure > 1.0))
@@ -115,7 +115,7 @@ class Judged:
 
     @property
     def periods_needed(self) -> int | None:
-        """The periods (of each block) that would have to count; None if more are no remedy."""
+        """Return the periods (of each block) that would have to count; None if more are no remedy."""
         samples = self.times * self.counted
         # Of inputs that do not repeat the mean of the periods falls as the noise does.
         if self.differing > responses.UNLIKE or samples > most("signal.samples"):
@@ -124,7 +124,7 @@ class Judged:
 
     @property
     def remedy(self) -> str:
-        """How many periods would do, or what to do where more of them would not."""
+        """Return the number of periods that would do, or the remedy where more would not, in words."""
         if self.periods_needed is not None:
             blocks = "" if self.periods.blocks == 1 else f" in each of {self.periods.blocks} blocks"
             return f"about {self.periods_needed} periods that count{blocks} would do"
@@ -134,7 +134,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Measured:
-    """A response with the data that count for it; with lines of a spec also how it compares."""
+    """Holds a response with the data that count for it; with lines of a spec also the comparison."""
 
     data: Record
     response: FrequencyResponse
@@ -239,7 +239,7 @@ def _assessment(
 
 @dataclass(frozen=True)
 class Counted:
-    """Data that count, how they repeat, the number of records of equal length, and what is left out."""
+    """Holds data that count, their periods, the number of records of equal length, and the data left out."""
 
     data: Record
     periods: Periods
@@ -248,7 +248,7 @@ class Counted:
 
     @property
     def kept(self) -> int:
-        """Periods of one phase that count, in all records."""
+        """Return the number of periods of one phase that count, in all records."""
         return self.repeats * self.periods.kept(self.data.lengths[0])
 
     def response(self, harmonics: NDArray[np.int_]) -> PeriodicResponse | None:
@@ -318,7 +318,7 @@ def _check(each: int, together: int, stated: Periods, name: str) -> None:
 
 @dataclass(frozen=True)
 class Measurement:
-    """How a response is measured: at the lines of `terms`, or without them where data excite.
+    """Describes the measurement of a response: at the lines of `terms`, or without them where data excite.
 
     The nominal `model` is drawn, too; signals vary about the `operating_point`, by channel.
     """
@@ -470,7 +470,7 @@ def judge_lines(
 
 
 def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
-    """Return what the outputs have at lines of the design that are not excited, odd and even."""
+    """Return the outputs at lines of the design that are not excited, by kind: odd and even."""
     found = {}
     for kind, harmonics in (("odd", terms.grid.odd), ("even", terms.grid.even)):
         parts = np.split(counted.data.y, counted.repeats)

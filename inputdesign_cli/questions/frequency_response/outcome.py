@@ -50,7 +50,7 @@ _CHANCE = 0.05
 
 @dataclass(frozen=True)
 class ResponseTerms:
-    """The lines and their accuracy, limits and cost.
+    """Holds the lines and their accuracy, limits and cost.
 
     The experiment has the samples that count (one where the shortest is asked for), `asked` are stated in the
     spec. Of noise that is `tabulated` there is no model.
@@ -75,7 +75,7 @@ class ResponseTerms:
         return self.grid.frequencies / self.header.units.frequency
 
     def gains(self, kind: PowerKind) -> Array:
-        """Return what a unit of power of each line adds to each power, (L, channels, r)."""
+        """Return the gains of a unit of power of each line to each power, (L, channels, r)."""
         return np.asarray(np.abs(self.experiment.response(kind, self.grid.frequencies)) ** 2)
 
     def problem(self, samples: int) -> ResponseProblem:
@@ -102,7 +102,7 @@ class ResponseTerms:
 
 @dataclass(frozen=True)
 class Planned:
-    """The experiment to be applied: powers (L, r), samples that count, the record, its deviations (L, p, r).
+    """Holds the experiment: powers (L, r), samples that count, the record, its deviations (L, p, r).
 
     The largest `shift` of G by the start is in these deviations.
     """
@@ -117,7 +117,7 @@ class Planned:
 
     @property
     def length(self) -> int:
-        """The number of samples of the record, transient included."""
+        """Return the number of samples of the record, transient included."""
         return len(self.record.samples)
 
     @property
@@ -158,7 +158,7 @@ def deviation_curves(
 
 
 def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, float]) -> out.Outcome:
-    """Return what result.json says of a design or of given lines."""
+    """Return the content of result.json for a design or given lines."""
     units, lines, designed = terms.header.units, terms.lines, terms.goal != "given"
     ratios = lines.ratios(lines.deviations(plan.powers, plan.counted))
     worst, (power, cost) = int(np.argmax(ratios)), terms.powers(plan.powers)
@@ -293,7 +293,7 @@ def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> Non
 
 
 def _of_lines(terms: ResponseTerms, written: out.Outcome) -> Iterator[str]:
-    """Say which claims the written powers contradict, one sentence each."""
+    """Yield a sentence on each claim that the written powers contradict."""
     spectrum, claimed = written.spectrum, written.frequency_response
     assert spectrum is not None
     assert claimed is not None
@@ -328,7 +328,7 @@ def _of_lines(terms: ResponseTerms, written: out.Outcome) -> Iterator[str]:
 
 
 def _of_record(terms: ResponseTerms, plan: Planned, written: out.Outcome, record: Array) -> Iterator[str]:
-    """Say which claims the samples contradict: errors are noise over the transforms of the inputs."""
+    """Yield a sentence on each claim that the samples contradict: errors are noise over input transforms."""
     signal = written.signal
     assert signal is not None
     u = record - (0.0 if signal.operating_point is None else np.array(signal.operating_point))

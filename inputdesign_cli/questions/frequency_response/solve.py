@@ -43,7 +43,7 @@ _STREAM = 0x5EED
 
 @dataclass(frozen=True)
 class ResponseTask:
-    """A design of lines, or the analysis of given ones, and its study.
+    """Designs lines, or analyses given ones, and studies them.
 
     Attributes:
         given: (L, r) powers that are not designed.
@@ -55,7 +55,7 @@ class ResponseTask:
     simulation: Simulation
 
     def solve(self) -> Results:
-        """Return the design, or what given lines buy, with its signal and its curves."""
+        """Return the design, or the accuracy of given lines, with its signal and its curves."""
         return self._solved()[1]
 
     def simulate(self, executor: Executor | None = None) -> Results:

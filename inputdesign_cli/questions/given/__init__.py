@@ -1,1 +1,1 @@
-"""The accuracy that a given excitation buys."""
+"""The accuracy that a given excitation gives."""

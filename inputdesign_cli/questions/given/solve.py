@@ -1,4 +1,4 @@
-"""A given excitation: what accuracy it buys. Nothing is optimised."""
+"""A given excitation and its accuracy. Nothing is optimised."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _TABLE_SHARE, _TABLE_ERROR = 0.5, 1e-4
 
 @dataclass(frozen=True)
 class GivenExcitation:
-    """An excitation by kind, its powers by channel, and M (k, k) in the coordinates of an experiment.
+    """Holds an excitation by kind, its powers by channel, and M (k, k) in an experiment's coordinates.
 
     A recorded signal has `samples` (n, r), the others a `basis` with coefficients `x`. Sinusoids `in_phase`
     over several inputs have power matrices of rank one, in every period.
@@ -69,7 +69,7 @@ class GivenExcitation:
 
     @property
     def scale(self) -> float:
-        """The power of the white excitation that coordinates are whitened by."""
+        """Return the power of the white excitation that coordinates are whitened by."""
         return max(sum(self.power["excitation"]), 1e-300)
 
     @classmethod
@@ -82,7 +82,7 @@ class GivenExcitation:
         *,
         in_phase: InPhase | None = None,
     ) -> GivenExcitation:
-        """An excitation that is known by its spectrum."""
+        """Return an excitation that is known by its spectrum."""
 
         def power(of: PowerKind, channel: int) -> float:
             unit = basis.integrals(
@@ -99,7 +99,7 @@ class GivenExcitation:
         return cls(kind, found, information, basis, x, in_phase)
 
     def described(self, units: Units) -> Spectrum:
-        """Return what the outcome says of it."""
+        """Return the entry of the outcome for this excitation."""
         details: dict[str, object] = {"given": self.kind}
         if isinstance(self.basis, LinesBasis) and self.x is not None:
             frequencies, powers = self.basis.lines(self.x)
@@ -113,14 +113,14 @@ class GivenExcitation:
 
     @classmethod
     def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
-        """White excitation of this total power, flat over the band and even over the channels."""
+        """Return white excitation of this total power, flat over the band and even over channels."""
         share = np.full(experiment.inputs, power / experiment.inputs)
         return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GivenTask(SpectrumTask):
-    """The analysis of an excitation: requirements are checked, a criterion is computed.
+    """Analyses an excitation: requirements are checked, a criterion is computed.
 
     `calibration` and `simulator` size `alpha` anew, see `Confidence`; `plants` are others than the nominal
     one.
@@ -183,7 +183,7 @@ class GivenTask(SpectrumTask):
     def _informed(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[Informed, White]:
-        """Return what curves show of the excitation, and white excitation at the same cost."""
+        """Return the accuracy curves of the excitation, and white excitation at the same cost."""
         cost = weighted_sum(self.cost, self.excitation.power)
         level = cost / weighted_sum(self.cost, GivenExcitation.even(self.experiment, 1.0).power)
         white = GivenExcitation.even(self.experiment, level).information(experiment)
@@ -201,7 +201,7 @@ class GivenTask(SpectrumTask):
         requirements: Sequence[Requirement],
         confidence: Confidence,
     ) -> Results:
-        """Return what the excitation buys, with its tables and curves."""
+        """Return the accuracy that the excitation gives, with its tables and curves."""
         units, excitation = informed.units, self.excitation
         beyond, of_table = self._beyond(experiment, requirements, informed.information)
         met = beyond <= max(_ROUNDING, of_table)
@@ -245,7 +245,7 @@ class GivenTask(SpectrumTask):
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[float, float]:
-        """Return how far the largest ratio is above one, and its error by a table if that decides."""
+        """Return the excess of the largest ratio over one, and its error by a table if that decides."""
 
         def largest(M: Array) -> float:
             return max((worst(r.violations(M)).ratio for r in requirements), default=0.0)
@@ -258,7 +258,7 @@ class GivenTask(SpectrumTask):
         return ratio - 1.0, min(ratio - raised, _TABLE_ERROR)
 
     def _record(self, experiment: Experiment, ratio: Callable[[Array], float]) -> Record | None:
-        """The signal as given, or one record of the given spectrum; None for one too short."""
+        """Return the signal as given, or a record of the given spectrum; None if too short."""
         excitation, request = self.excitation, self.record
         if excitation.samples is not None:
             return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
@@ -270,7 +270,7 @@ class GivenTask(SpectrumTask):
         return Record(record, "multisine", ratio_at(plant, ratio, record))
 
     def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
-        """Estimates of such experiments, for an exact confidence."""
+        """Return estimates of such experiments, for an exact confidence."""
         if self.simulator is None:
             return None
         if self.excitation.samples is not None:
@@ -280,7 +280,7 @@ class GivenTask(SpectrumTask):
         return None if samples is None or renewed is None else self.simulator.of(renewed, samples)
 
     def _renewed(self, samples: int) -> Excitation | None:
-        """What realises the spectrum anew; None for a record that was given."""
+        """Return the source of new records of the spectrum; None for a record that was given."""
         excitation, request = self.excitation, self.record
         if excitation.basis is None or excitation.x is None:
             return None

@@ -1,4 +1,4 @@
-"""The last check of a design: what is about to be written, reread, and evaluated by other means.
+"""The last check of a design: the output, reread, is evaluated by other means before it is written.
 
 The spectrum is that of `result.json` as text, not that of the solver. Its information comes from a rule of
 its own: four Gauss points on intervals of the grid on which peaks are sought.
@@ -43,7 +43,7 @@ _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 
 @dataclass(frozen=True)
 class _WrittenSpectrum:
-    """The spectrum of `result.json`: lines with powers, or a density by its type."""
+    """Holds the spectrum of `result.json`: lines with powers, or a density by its type."""
 
     type: str
     frequencies: Array | None = None
@@ -57,7 +57,7 @@ class _WrittenSpectrum:
 
 @dataclass(frozen=True)
 class _Written:
-    """What is compared of `result.json`."""
+    """Holds the entries of `result.json` that are compared."""
 
     status: str
     objective: Objective
@@ -109,14 +109,14 @@ def _disagreements(done: Designed, written: _Written, apart: float, *, on_grid: 
 
 @dataclass(frozen=True)
 class _Reread:
-    """The written spectrum at one plant."""
+    """Evaluates the written spectrum at one plant."""
 
     done: Designed
     written: _WrittenSpectrum
     scenario: Scenario
 
     def missed(self, goal: Goal) -> Iterator[str]:
-        """The requirements that are promised and not met."""
+        """Yield a sentence on each requirement that is promised and not met."""
         for requirement in self.scenario.side if goal == "factor" else self.scenario.requirements:
             worst = self._worst(requirement)
             if not worst <= 1.0 + APART:
@@ -124,18 +124,18 @@ class _Reread:
 
     @property
     def worst_of_all(self) -> float:
-        """The worst ratio of all requirements."""
+        """Return the worst ratio of all requirements."""
         return max(self._worst(requirement) for requirement in self.scenario.requirements)
 
     @property
     def criterion(self) -> float:
-        """The value of the criterion that is the goal."""
+        """Return the value of the criterion that is the goal."""
         first = criterion_of(self.scenario.requirements)
         assert first is not None
         return first.value(first.level(self._information))
 
     def _worst(self, requirement: Requirement) -> float:
-        """The largest ratio over the band, with its ends, also between the points of its grid."""
+        """Return the largest ratio over the band and its ends, also between the points of its grid."""
         try:
             np.linalg.cholesky(self._information)
         except np.linalg.LinAlgError:
@@ -180,7 +180,7 @@ class _Reread:
         return total
 
     def power(self, kind: PowerKind, channel: int | None) -> float:
-        """The power of u, y or x: of all channels, or of one."""
+        """Return the power of u, y or x: of all channels, or of one."""
         rows = slice(None) if channel is None else slice(channel, channel + 1)
         return sum(
             float(np.sum(np.abs(self._experiment.response(kind, w)[:, rows] @ root) ** 2))
@@ -189,7 +189,7 @@ class _Reread:
 
     @cached_property
     def _excitation(self) -> list[tuple[Array, ComplexArray]]:
-        """Frequencies (n,) and roots (n, r, r) of the power at each; their powers add up."""
+        """Return frequencies (n,) and roots (n, r, r) of the power at each; their powers add up."""
         entry, unit = self.written, self.done.header.units.frequency
         r = self._experiment.inputs
         if entry.frequencies is not None and entry.powers is not None:
@@ -241,7 +241,7 @@ def _rule(grid: Array, steps: int) -> Iterator[tuple[Array, Array]]:
 
 
 def _root(powers: ComplexArray) -> ComplexArray:
-    """R (n, r, r) with R R^* the powers, their rounding below zero cut off."""
+    """Return the root R (n, r, r) of powers R R^*, with their rounding below zero cut off."""
     if powers.shape[1] == 1:
         return np.sqrt(np.maximum(powers.real, 0.0)).astype(complex)
     values, vectors = np.linalg.eigh(powers)
@@ -249,6 +249,6 @@ def _root(powers: ComplexArray) -> ComplexArray:
 
 
 def _outer(F: ComplexArray) -> NDArray[np.float64]:
-    """Re sum of F_l F_m^* over frequencies and channels: (n, k, p, r) -> (k, k)."""
+    """Return the real part of the sum of F_l F_m^* over frequencies and channels: (n, k, p, r) -> (k, k)."""
     flat = np.moveaxis(F, 1, 0).reshape(F.shape[1], -1)
     return np.asarray((flat @ flat.conj().T).real)

@@ -36,7 +36,7 @@ _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "sho
 
 
 def build_convex(spec: Spec) -> ConvexTask:
-    """The task of a design for requirements and criteria that are convex in the information matrix."""
+    """Build the design task for requirements and criteria that are convex in the information matrix."""
     check_supported(spec)
     experiment = build_experiment(spec)
     requirements, side = build_asked(spec, experiment)
@@ -98,7 +98,7 @@ def build_convex(spec: Spec) -> ConvexTask:
 
 
 def _approaching(question: Question, band: tuple[float, float]) -> Question:
-    """The question with every spectrum, and a free one, on this band."""
+    """Return the question with every spectrum, and a free one, on this band."""
     if not question.basis.free:
         return replace(question, anywhere=band)
     experiment = replace(question.experiment, band=band)
@@ -177,7 +177,7 @@ def _grid_method(spec: Spec) -> GridMethod | None:
 
 
 def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
-    """`factor_columns`: a factor of few columns is for criteria under upper power limits."""
+    """Return `factor_columns`, which is for criteria under upper power limits; None if not stated."""
     spectrum = spec.spectrum
     if spectrum is None or spectrum.type != "polynomial" or spectrum.factor_columns is None:
         return None

@@ -1,4 +1,4 @@
-"""Designs and records that keep an exact confidence: alpha is calibrated to what simulated estimates do."""
+"""Designs and records that keep an exact confidence: alpha is calibrated to simulated estimates."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Known = Callable[[Record | None], Array | None]
 
 @dataclass(frozen=True)
 class ExactConfidence:
-    """The confidence that is asked, with the `usual` chi-squared alpha; asymptotic without a `simulator`."""
+    """Holds the confidence asked, with the `usual` chi-squared alpha; asymptotic without `simulator`."""
 
     calibration: Calibration
     usual: float
@@ -123,7 +123,7 @@ class ExactConfidence:
         return calibration.alpha(errors, information)
 
     def of_record(self, done: Designed, record: Record, information: Array) -> Coverage:
-        """Return how many fresh estimates keep the bounds with a record of this information (k, k)."""
+        """Return the share of fresh estimates within the bounds, for a record of information (k, k)."""
         return self._coverage(done, information, self._of_samples(record))
 
     def _coverage(self, done: Designed, information: Array, simulated: SimulatedEstimates | None) -> Coverage:

@@ -32,7 +32,7 @@ _BINDS = 1e-6
 
 @dataclass(frozen=True)
 class Answer:
-    """A design, what is proved of it in a word, and what the solver did."""
+    """Holds a design, the status of its proof, and the work of the solver."""
 
     design: Design
     status: str
@@ -41,7 +41,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Designed:
-    """An answer with its question and the experiment of the delivered length.
+    """Holds an answer with its question and the experiment of the delivered length.
 
     `kept` are the numbers of the `plants` that the design is for; others of them are left out.
     """
@@ -57,32 +57,32 @@ class Designed:
 
     @property
     def design(self) -> Design:
-        """The design of the answer."""
+        """Return the design of the answer."""
         return self.answer.design
 
     @cached_property
     def problem(self) -> Problem:
-        """The problem on the basis of the answer, which may have grown."""
+        """Return the problem on the basis of the answer, which may have grown."""
         return self.design.problem.on(self.design.result.basis)
 
     @property
     def excites(self) -> bool:
-        """Whether any excitation is needed."""
+        """Return whether any excitation is needed."""
         return bool(self.design.result.x.any())
 
     @property
     def asked(self) -> tuple[Requirement, ...]:
-        """What the design must meet."""
+        """Return the requirements that the design must meet."""
         return (*self.design.problem.requirements, *self.design.problem.side)
 
     @cached_property
     def information(self) -> Array:
-        """M (k, k) of the delivered spectrum over the delivered number of samples."""
+        """Return the information (k, k) of the delivered spectrum over the delivered number of samples."""
         return np.asarray(delivered(self.problem, self.design, self.experiment.samples)[0])
 
 
 def design_outcome(done: Designed) -> Outcome:
-    """Return what is said of a design, but for its record and its time."""
+    """Return the outcome of a design without its record and its time."""
     found, problem, answer = done.design.result, done.design.problem, done.answer
     cost = paid_for(problem.paid, costs_of(done, found.basis, found.x))
     outcome = Outcome(
@@ -174,12 +174,12 @@ def powers_by_kind(
 
 
 def powers(problem: Problem, basis: Basis, x: Array) -> out.Powers:
-    """Return the same at the plant of the spec."""
+    """Return the mean squares by kind at the plant of the spec."""
     return out.Powers.of(powers_by_kind(problem, basis, x))
 
 
 def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
-    """Return what a spectrum costs at each plant that is paid for."""
+    """Return the cost of a spectrum at each plant that is paid for."""
     problem = done.design.problem
     return [weighted_sum(done.cost, powers_by_kind(problem, basis, x, at)) for at in problem.paying]
 
@@ -273,7 +273,7 @@ def _density_limits(done: Designed) -> Iterator[LimitUse]:
 
 
 def _findings(done: Designed) -> list[Finding]:
-    """Return what a user should know before trusting a number."""
+    """Return the findings that a user should know before trusting a number."""
     found, problem = done.design.result, done.problem
     if not done.excites:
         return [designs.nothing_needed(done.experiment, at_every_plant=bool(done.kept))]

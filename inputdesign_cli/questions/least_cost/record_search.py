@@ -84,13 +84,13 @@ def reach(record: Record, before: float = np.inf) -> float:
 
 
 def pilot_length(samples: int, block: int) -> int:
-    """Return the length of the short record that predicts the ratio of one of `samples` samples."""
+    """Return the length of the pilot record that predicts the ratio of a record of `samples` samples."""
     return -(-max(samples // _PILOT, _FEWEST) // block) * block
 
 
 @dataclass
 class ShortestRecord:
-    """Search the shortest record by trying lengths, multiples of `block` up to `longest`, in several `ways`.
+    """Searches the shortest record by trying lengths, multiples of `block` up to `longest`, in `ways`.
 
     Of a long record only the most promising way is tried at a length. `before` is the ratio without a record.
     """
@@ -109,7 +109,7 @@ class ShortestRecord:
     _hopeless: float = _HOPELESS
 
     def search(self, misses: Sequence[Record], low: int | None = None) -> Made | None:
-        """Return the shortest record that meets the accuracy, to one per cent; out of time that so far.
+        """Return the shortest record that meets the accuracy, to one per cent, or so far when time ends.
 
         The `misses` missed; longer records than `low` are looked for. It raises `OutOfTimeError` before one
         is found.
@@ -206,7 +206,7 @@ class ShortestRecord:
         return reach(record, self.before)
 
     def _rounded(self, length: float) -> int:
-        """The next length of whole blocks; of a long record one with a fast transform if it is near."""
+        """Return the next length of whole blocks; if long, one with a fast transform if it is near."""
         whole = int(np.ceil(length / self.block)) * self.block
         unit = self.block * self.inputs
         fast = unit * int(scipy.fft.next_fast_len(int(np.ceil(length / unit))))
@@ -257,7 +257,7 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
 def _others(
     request: RecordRequest, question: Question, design: Design
 ) -> Iterator[tuple[RecordRequest, Design, float | None]]:
-    """What else there is, with the limit on the input power: the nearest to what was asked first."""
+    """Yield other designs with their limit on the input power: the nearest to the one asked for first."""
     spectra: list[tuple[Design, float | None]] = []
     for power, spectrum in _of_less_power(question, design):
         spectra.append((spectrum, power))
@@ -268,7 +268,7 @@ def _others(
 
 
 def _of_less_power(question: Question, design: Design) -> Iterator[tuple[float, Design]]:
-    """Designs for the same question under ever tighter limits on the input power."""
+    """Yield designs for the same question under ever tighter limits on the input power."""
     if question.goal != "cost" or set(question.cost) == {"input"}:
         return
     own = design_cost(design, {"input": 1.0})
@@ -296,7 +296,7 @@ def _words(request: RecordRequest) -> str:
 
 
 def _kinds(request: RecordRequest) -> list[RecordRequest]:
-    """Other kinds of signals that may stand in."""
+    """Return other kinds of signals that may stand in."""
     return [replace(request, settings=settings) for settings in request.others]
 
 
@@ -347,7 +347,7 @@ def _refusal(
 
 
 def _ways(request: RecordRequest, question: Question, design: Design) -> list[Way]:
-    """Return what is tried: kinds of signals with the designed, then with the cheapest spectrum."""
+    """Return the ways to try: kinds of signals with the designed, then with the cheapest spectrum."""
 
     @cache
     def cheapest(samples: int) -> Design | None:

@@ -1,8 +1,8 @@
-"""What a design keeps at the plants that were drawn, at others like them, and at the worst that are found.
+"""The accuracy of a design at the plants that were drawn, at others like them, and at the worst found.
 
-The worst plant of a region is looked for by ascent from several starts, as [frank-wolfe-1956] does: from a
-point towards the farthest one of the region in the direction of the gradient. It is added to the design until
-none is found to be missed; that there is no worse one is not proved.
+The worst plant of a region is sought by ascent from several starts, as in [frank-wolfe-1956]. A step leads
+towards the farthest point of the region in the direction of the gradient. The worst plant is added to the
+design until none is found to be missed; that there is no worse one is not proved.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> tuple[
     tried, worst = 0, list[tuple[Array, Alternative, Kept]]()
 
     def share(z: Array) -> float:
-        """How near the plant at z comes to being missed, 0 where there is none."""
+        """Return the largest ratio to the admitted error of the plant at z, 0 where there is none."""
         nonlocal tried, worst
         seconds_left()
         theta = region.theta(z)
@@ -85,14 +85,14 @@ def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> tuple[
         return kept.share
 
     def slope(z: Array, axis: int, here: float) -> float:
-        """The derivative along an axis, by a difference within the region; 0 where there is no plant."""
+        """Return the derivative along an axis, by a difference within the region; 0 without a plant."""
         step = np.zeros(z.size)
         step[axis] = -_DIFFERENCE if z[axis] > 0.0 else _DIFFERENCE
         there = share(z + step)
         return (there - here) / step[axis] if there > 0.0 and np.isfinite(there) else 0.0
 
     def ascend(z: Array) -> None:
-        """Steps as long as they lead to a worse plant."""
+        """Take steps as long as they lead to a worse plant."""
         found = share(z)
         for _ in range(_STEPS):
             ahead = np.array([slope(z, axis, found) for axis in range(z.size)])
@@ -142,7 +142,7 @@ def with_worst_plants(
 
 @dataclass(frozen=True)
 class Floor:
-    """How a plant stands to its own r_adm, where the floor, a `share` of that of the spec, may count.
+    """Compares a plant's own r_adm with the floor, a `share` of that of the spec, which may count.
 
     It is `raised` at some frequency, or `lost`: its own r_adm vanishes. Then `peak` is that of |S|, if any.
     """
@@ -154,7 +154,7 @@ class Floor:
 
     @classmethod
     def at(cls, requirements: Sequence[Requirement]) -> Floor:
-        """Return how a plant stands to its own r_adm, by what is required there."""
+        """Return the relation of a plant's own r_adm to the floor, from the requirements there."""
         errors = model_errors(requirements)
         floors = [(floor, error.grid) for error in errors if (floor := error.admissible.floored) is not None]
         lost = any(floor.lost(grid) for floor, grid in floors)
@@ -166,7 +166,7 @@ class Floor:
 
 
 def floor_use(plants: Plants, kept: Sequence[int], floors: Sequence[Floor]) -> parts.FloorUse | None:
-    """Return which of the plants that count are held to the floor; None if each has an r_adm of its own."""
+    """Return the numbers of plants that are held to the floor; None if each has an r_adm of its own."""
     raised = [place for place, one in enumerate(floors) if one.raised]
     if not raised:
         return None
@@ -180,7 +180,7 @@ def floor_use(plants: Plants, kept: Sequence[int], floors: Sequence[Floor]) -> p
 
 @dataclass(frozen=True)
 class RobustResult:
-    """`robust` of the outcome, with its tables and curves by the names of their files, and findings."""
+    """Holds `robust` of the outcome, with tables and curves by the names of their files, and findings."""
 
     entry: parts.Robust
     tables: dict[str, Table]
@@ -193,7 +193,7 @@ Peak = Callable[[Experiment], float]
 
 
 def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> RobustResult:
-    """Return what a design keeps at its plants; `peak` is None if limits do not depend on the plant."""
+    """Return the accuracy of a design at its plants; `peak` is None if limits do not depend on them."""
     kept, problem, samples = done.kept, done.problem, done.experiment.samples
     at_each = kept_by(problem, done.design, samples)
     numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
@@ -232,7 +232,7 @@ def plants_kept(
     binding: Sequence[int],
     floors: Sequence[Floor],
 ) -> RobustResult:
-    """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
+    """Return the source of the plants, the number that counts, the worst of them, and scenarios.csv.
 
     The plant of the spec comes first in `at_each`; `binding` are places there.
     """
@@ -306,7 +306,7 @@ def fresh_plants(
     peak: Peak | None = None,
     promised: float | None = None,
 ) -> tuple[parts.FreshPlants | None, list[Finding]]:
-    """Return how many of other plants from the same distribution are missed, as far as there is time.
+    """Return the share of other plants from the same distribution that are missed, as time allows.
 
     In `try_on` a share up to the number may come out as 0; `promised` is a cost at every plant.
     """
@@ -347,7 +347,7 @@ def fresh_plants(
 
 
 def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.DrawnEstimates | None:
-    """Return how near estimates from data of the plants that bind come to missing the best accuracy."""
+    """Return the ratios to the best accuracy at estimates from data of the plants that bind."""
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
         return None
@@ -391,14 +391,14 @@ def fan_curves(
 
 @dataclass(frozen=True)
 class AtPlants:
-    """An excitation of this `power` over these `samples`; `information` gives M in any coordinates."""
+    """Holds an excitation of this `power` over these `samples`; `information` gives M in any coordinates."""
 
     information: Callable[[Experiment], Array]
     power: float
     samples: int
 
     def on(self, plant: Alternative) -> Tried:
-        """Return how near a plant comes to being missed: infinitely if its parameters are undetermined."""
+        """Return the largest error ratio at a plant: infinite if its parameters are undetermined."""
         seconds_left()
         own = replace(plant.experiment, samples=self.samples)
         asked = tuple(make(own) for make in (*plant.requirements, *plant.side))
@@ -412,7 +412,7 @@ class AtPlants:
             return Tried(Kept(np.inf), asked)
 
     def on_each(self, batch: Batch, above: float = 0.0) -> list[Tried]:
-        """Return this for every plant of a batch, to the last digit also up to `above`."""
+        """Return the largest error ratio at every plant of a batch, to the last digit also up to `above`."""
         return [self.on(plant) for plant in batch.plants]
 
 
@@ -423,7 +423,7 @@ def kept_of(requirements: Sequence[Requirement], information: Array) -> Kept:
 
 
 def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, units: Units) -> RobustResult:
-    """Return what the excitation keeps at the plants of `uncertainty`, the worst left out as far as allowed.
+    """Return the accuracy at the plants of `uncertainty`, the worst left out as far as allowed.
 
     The plant of the spec has parameters `centre` (k,) and keeps `nominal`. It raises `SpecError` (`not-
     exciting`).

@@ -46,7 +46,7 @@ from inputdesign_cli.signal.selection import Record
 
 @dataclass(frozen=True, kw_only=True)
 class ConvexTask(SpectrumTask):
-    """A convex design: what is asked, what is done with its record, what is reported."""
+    """Holds a convex design: the requirements, the use of its record, and the report."""
 
     asked: Sought
 
@@ -93,7 +93,7 @@ class ConvexTask(SpectrumTask):
         )
 
     def _outcome(self, done: Designed) -> Outcome:
-        """Return the outcome of the design with what was left out of its proof."""
+        """Return the outcome of the design, with findings on parts that its proof lacks."""
         outcome, columns, reach = design_outcome(done), self.asked.columns, self.asked.reach
         if columns is not None and outcome.spectrum is not None:
             details = {**outcome.spectrum.details, "factor_columns": columns.columns}
@@ -113,7 +113,7 @@ class ConvexTask(SpectrumTask):
         return outcome.saying(found)
 
     def _audit(self, done: Designed, outcome: Outcome) -> None:
-        """Evaluate what is about to be written by other means, see `audit`."""
+        """Check the results that are about to be written by other means, see `audit`."""
         reach = self.asked.reach
         loose = 0.0 if reach.attained else self.asked.tolerance
         try:
@@ -138,7 +138,7 @@ class ConvexTask(SpectrumTask):
             return Made(None, request, done.design, findings=(missing,))
 
     def _informed(self, done: Designed) -> Informed:
-        """Return what curves show of the design: r_u of every entry if no model error is bounded."""
+        """Return the accuracy curves of the design: r_u of every entry if no model error is bounded."""
         design = done.design
         errors, stated = self.errors(done.experiment, done.asked)
         white = design.white.informations[0] / (design.white.s if design.problem.goal == "factor" else 1.0)

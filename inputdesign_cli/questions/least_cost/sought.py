@@ -1,4 +1,4 @@
-"""The design that is sought: what it must meet, and how it is found."""
+"""The design that is sought: its requirements, and the method that finds it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _LONGEST = 20_000  # samples of records that are bounded one by one
 
 @dataclass(frozen=True)
 class GridMethod:
-    """The papers' own program: the number of frequencies of its grid, and how positivity is written."""
+    """Describes the papers' own program: the number of frequencies of its grid, the form of positivity."""
 
     lines: int
     positivity: Literal["gram", "kyp"]
@@ -67,7 +67,7 @@ class GridMethod:
         return Answer(replace(baseline, problem=problem, result=on_grid), "optimal_on_grid", solver)
 
     def frequencies(self, lo: float, hi: float) -> Array:
-        """Return (lines,): the ends of the band, and frequencies evenly spread in log w between them."""
+        """Return the ends of the band, and frequencies evenly spread in log w between them, as (lines,)."""
         if lo > 0.0:
             return np.geomspace(lo, hi, self.lines)
         return np.append(0.0, hi * np.geomspace(1.0, _ABOVE_ZERO, self.lines - 1)[::-1])
@@ -75,7 +75,7 @@ class GridMethod:
 
 @dataclass(frozen=True)
 class FewColumns:
-    """`spectrum.factor_columns`, as in [mohan-spectral]: a number, and the seed of the random starts."""
+    """Holds `spectrum.factor_columns`, as in [mohan-spectral]: a number, and the seed of random starts."""
 
     columns: int
     seed: int
@@ -114,7 +114,7 @@ class FewColumns:
 
 @dataclass(frozen=True)
 class Sought:
-    """What is asked of a design, and how it is found.
+    """Describes the requirements on a design, and the method that finds it.
 
     The experiment of the question has one sample if the length is sought. `exact` calibrates `alpha`;
     `plants` are those beside the plant of the spec. `tolerance` is the relative gap that is proved, and

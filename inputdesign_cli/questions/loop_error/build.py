@@ -123,7 +123,7 @@ def _in_delays(A: Array, B: Array, C: Array, D: Array, *, lag: int) -> tuple[Row
 
 
 class AddedLaw(Protocol):
-    """A section of `control` that another package adds (`specification.plugins`)."""
+    """Describes a section of `control` that another package adds (`specification.plugins`)."""
 
     def build(self, spec: Spec, plant: MatrixPlant) -> ControlLaw:
         """Return the control law for a plant."""
@@ -247,7 +247,7 @@ _SIGNAL_KEYS = ("hold", "lines", "amplitudes", "offset", "ramp", "bits", "quanti
 
 
 def _check_supported(spec: Spec) -> None:
-    """Refuse what is not done for a closed-loop error, rather than ignore it."""
+    """Refuse keys that are not supported for a closed-loop error, rather than ignore them."""
     limits = "limit powers from above, amplitude of inputs, rate or band"
     mins = [f"limits.{kind}_power.min" for kind in POWER_KINDS]
     remedies = {

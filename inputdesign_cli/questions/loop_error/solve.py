@@ -57,7 +57,7 @@ KEY = "accuracy.closed_loop_error"
 def design_outcome(
     task: LoopErrorTask, design: LoopErrorDesign, signal: out.Signal, timing: dict[str, float]
 ) -> out.Outcome:
-    """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
+    """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
     samples, white = task.samples, design.white
     lo, hi = (edge / task.header.units.sample_time for edge in design.problem.band)
     informations = {"design": design.information, "white": white.information}
@@ -150,7 +150,7 @@ def spectrum_results(
 
 
 def theory_of(theory: LossTheory) -> TheoreticalLoss:
-    """Return N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
+    """Return the error N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
     return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
 
 
@@ -200,7 +200,7 @@ def loss_results(
     inputs: Mapping[str, Lines],
     samples: int,
 ) -> tuple[dict[str, TriedInput], Improvement | None, dict[str, Curves]]:
-    """Return what each input gave, the improvement over white noise, and the histogram where runs count."""
+    """Return the loss with each input, the improvement over white noise, and the histogram of many runs."""
     theory, entries = {}, {}
     for name, lines in inputs.items():
         information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
@@ -234,7 +234,7 @@ def _moments(values: Array) -> LossMoments:
 
 @dataclass(frozen=True)
 class LoopErrorSignalSettings:
-    """How the record is made: `filtered` from white noise, or a multisine of equal `periods`.
+    """Describes the making of the record: `filtered` white noise, or a multisine of equal `periods`.
 
     A rational filter has `order` states for each input; None: a filter of taps.
     """
@@ -296,7 +296,7 @@ def white_lines(design: LoopErrorDesign, samples: int) -> Lines:
 def _by_filter(
     design: LoopErrorDesign, settings: LoopErrorSignalSettings
 ) -> tuple[Callable[[np.random.Generator], Array], float | None, dict[str, object]]:
-    """Return how a record is drawn, the residual of its spectral factor, and what else is reported of it."""
+    """Return the generator of a record, the residual of its spectral factor, and other entries on it."""
     samples, factor = settings.samples, matrix_factor(design.density)
     if settings.order is None:
         details: dict[str, object] = {"floor": factor.floor, "taps": int(factor.taps.shape[0])}
@@ -317,7 +317,7 @@ def _by_filter(
 
 @dataclass(frozen=True)
 class LossTrial:
-    """The Monte Carlo study: `problem` with the true plant, and whether white noise is tried as well."""
+    """Holds the Monte Carlo study: `problem` with the true plant, and whether white noise is tried too."""
 
     problem: LoopErrorProblem
     runs: int
@@ -327,9 +327,9 @@ class LossTrial:
 
 @dataclass(frozen=True)
 class LoopErrorTask:
-    """A design for the closed-loop error, and its study.
+    """Designs for the closed-loop error, and studies the design.
 
-    The `law` of control is called as in the spec, `grid` are the points of spectrum.csv, and the `covariance`
+    The `law` of control is called as in the spec, and `grid` are the points of spectrum.csv. The `covariance`
     is that of a high model order, or exact for the model structure.
     """
 

@@ -105,7 +105,7 @@ def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
 
 
 def _check_supported(spec: Spec) -> None:
-    """Refuse what is not done for regressions, rather than ignore it."""
+    """Refuse keys that are not supported for regressions, rather than ignore them."""
     _refuse_coloured(spec.noise, "noise")
     if "cost" in spec.model_fields_set:
         raise _refuse("cost", what="weigh powers", hint="remove it: what counts is the energy, trace R")

@@ -46,7 +46,7 @@ KEY = "accuracy.mean_squared_error"
 
 @dataclass(frozen=True)
 class MomentsDesign:
-    """R with its proof: no R of the structure goes beyond the `bound`, within `tolerance` it is optimal.
+    """Holds R with its proof: no R of the structure is beyond `bound`; within `tolerance` it is optimal.
 
     Of one input `rho` are the autocorrelations (n,).
     """
@@ -60,14 +60,14 @@ class MomentsDesign:
 
     @property
     def energy(self) -> float:
-        """trace R."""
+        """Return the energy, trace R."""
         return float(np.trace(self.R))
 
 
 def moments_outcome(
     task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
 ) -> out.Outcome:
-    """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
+    """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
     regression, split, target, n = task.regression, design.split, task.target, task.regression.n
     unit, white = regression.error(np.eye(n)), None
     if target is not None:
@@ -136,7 +136,7 @@ def error_curves(task: RegressionTask, design: MomentsDesign) -> ErrorCurves:
 
 
 def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Estimates) -> TriedInput:
-    """Return means with their standard errors, and the theory of these samples."""
+    """Return the mean estimate and error with their standard errors, and the theory for these samples."""
     squared = found.error**2
     runs = squared.size
     G, m = Phi.T @ Phi, regression.m
@@ -157,7 +157,7 @@ def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Es
 
 @dataclass(frozen=True)
 class RegressorRecord:
-    """Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their description.
+    """Holds Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their form.
 
     `lines` of one periodic input are its frequencies (L,) in rad/sample and mean squares (L,).
     """
@@ -215,7 +215,7 @@ def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class RegressionTrial:
-    """The study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
+    """Holds the study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
 
     theta: Array
     runs: int
@@ -227,7 +227,7 @@ class RegressionTrial:
 
 @dataclass(frozen=True)
 class RegressionTask:
-    """The least energy for a `target` error, or the least error for an `energy`, trace R, and its study.
+    """Minimises the energy, trace R, for a `target` error, or the error for an `energy`, and studies it.
 
     Toeplitz moments belong to delayed copies of one input, and are proved to a relative gap of `tolerance`.
     The record has a number of equal `periods` (None: free), and a past by `start`.

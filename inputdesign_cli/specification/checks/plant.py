@@ -17,7 +17,7 @@ from inputdesign_cli.specification.models.wording import count
 
 
 def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnostic]:
-    """A of the plant at `path` is stable, integrators aside, unless a controller acts on it."""
+    """Check that A of the plant at `path` is stable, integrators aside, unless a controller acts on it."""
     if spec.closed_loop or plant.kind != "polynomial":
         return
     for found in check_each(plant.A, check_no_growth, *path, "A"):
@@ -37,7 +37,7 @@ SAMPLED = "add sample: zoh to the plant"
 
 
 def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagnostic]:
-    """The noise at `path` fits the outputs of the plant and the time that it lives in."""
+    """Check that the noise at `path` fits the outputs of the plant and its discrete or continuous time."""
     outputs = spec.plant.outputs
     has = f"but the plant has {count(outputs, 'output')}"
     white = "the noise of a regression is white" if spec.plant.kind == "regression" else ""
@@ -60,7 +60,7 @@ def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagn
 
 
 def names_differ(spec: Spec) -> Iterator[PathDiagnostic]:
-    """No parameter of the plant is called as a coefficient of the noise is."""
+    """Check that no parameter of the plant has the name of a coefficient of the noise."""
     if spec.plant.kind == "regression":
         return
     for name in spec.plant.parameters or ():
@@ -71,7 +71,7 @@ def names_differ(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def spectrum_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Moments are for regressions, a FIR spectrum for discrete time."""
+    """Check that moments belong to a regression, and a FIR spectrum to discrete time."""
     spectrum = spec.spectrum
     if spectrum is None or spectrum.type == "given":
         return
@@ -89,7 +89,7 @@ def spectrum_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def weights_fit(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A filter in q^-1 has no meaning for a plant that is not sampled."""
+    """Check that no filter is in q^-1 if the plant is not sampled."""
     if spec.plant.sampled:
         return
     for path in _WEIGHTS:
@@ -100,13 +100,13 @@ def weights_fit(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def true_noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """The noise of the simulation has as many channels as the plant has outputs."""
+    """Check that the noise of the simulation has as many channels as the plant has outputs."""
     if spec.simulation is not None and spec.simulation.noise is not None:
         yield from check_noise(spec, spec.simulation.noise, "simulation", "noise")
 
 
 def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """The true system has the channels of the nominal one, and is described in the same time."""
+    """Check that the true system has the channels of the nominal one and is described in the same time."""
     true = spec.simulation.plant if spec.simulation is not None else None
     path, plant = ("simulation", "plant"), spec.plant
     if true is None:
@@ -142,7 +142,7 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def regression_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A regression is designed for mean-squared error, and that error is one of regressions."""
+    """Check that a regression is designed for mean-squared error, and only a regression."""
     error, plant = spec.accuracy.mean_squared_error, spec.plant
     path = ("accuracy", "mean_squared_error")
     if plant.kind != "regression":
@@ -172,7 +172,7 @@ _LOOP = ("accuracy", "loop")
 
 
 def controllers_fit(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Controllers work in discrete time, with a row per input and a column per output of the plant."""
+    """Check that controllers are in discrete time, with a row per plant input and a column per output."""
     for path in (("experiment", "controller"), (*_SENSITIVITY, "controller"), (*_LOOP, "controller")):
         controller = cast(Controller | None, spec.at(*path))
         if controller is not None and spec.plant.kind != "regression":
@@ -183,7 +183,7 @@ def controllers_fit(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A bound on a sensitivity needs a loop."""
+    """Check that a bound on a sensitivity comes with a control loop."""
     tuned = spec.at(*_LOOP, "tuning") is not None
     for path, where in ((_SENSITIVITY, "there"), (_LOOP, "or tuning: {simc: {}} there")):
         stated, own = spec.at(*path), spec.at(*path, "controller")
@@ -224,7 +224,7 @@ def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[Pa
 
 
 def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """The controller inverts the plant, so that plant and desired loop are square and of one size."""
+    """Check that plant and desired loop are square and of one size: the controller inverts the plant."""
     error, plant = spec.accuracy.closed_loop_error, spec.plant
     if error is None or plant.kind == "regression":
         return

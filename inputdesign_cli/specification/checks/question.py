@@ -45,7 +45,7 @@ _BANDS = (
 
 
 def channels(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A list per channel is as long as there are inputs or outputs."""
+    """Check that a list per channel is as long as there are inputs or outputs."""
     if spec.plant.kind == "regression":
         return
     given = spec.given.rows if spec.given is not None and spec.given.type == "multisine" else None
@@ -60,7 +60,7 @@ def channels(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def named_channels(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Names and units belong to channels that the plant has."""
+    """Check that names and units belong to channels that the plant has."""
     sizes = ("u", spec.plant.inputs), ("y", spec.plant.outputs)
     there = [f"{letter}{i + 1}" for letter, count in sizes for i in range(count)]
     for name in spec.channels or ():
@@ -71,7 +71,7 @@ def named_channels(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def delays(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Dead times end within the record, and are not too many samples."""
+    """Check that dead times end within the record and are not too many samples."""
     plant = spec.plant
     path: Path
     if plant.kind == "state_space":
@@ -84,16 +84,15 @@ def delays(spec: Spec) -> Iterator[PathDiagnostic]:
     whole = spec.experiment.samples * spec.sample_time
     if "samples" in spec.experiment.model_fields_set and longest >= whole:
         message = f"{{key}} is {show(longest)} {spec.time_unit}, and the experiment lasts {show(whole)}"
-        yield PathDiagnostic(
-            "delay-beyond-record", message, "take more samples, or look at the time_unit", path
-        )
+        hint = "take more samples, or look at the time_unit"
+        yield PathDiagnostic("delay-beyond-record", message, hint, path)
     elif plant.sampled and longest > _LONGEST_DELAY * spec.sample_time:
         message = f"{{key}} is more than {_LONGEST_DELAY} samples: {show(longest)} {spec.time_unit}"
         yield PathDiagnostic("too-large", message, "sample more slowly", path)
 
 
 def bands(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Bands end at pi/sample_time."""
+    """Check that bands end at pi/sample_time."""
     for path in _BANDS:
         band = spec.at(*path)
         if isinstance(band, tuple) and band[1] > spec.nyquist * (1 + ROUNDING):
@@ -101,7 +100,7 @@ def bands(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def frequencies(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Given frequencies lie below pi/sample_time and within limits.band."""
+    """Check that given frequencies lie below pi/sample_time and within limits.band."""
     path = ("spectrum", "frequencies") if spec.given is None else ("spectrum", "given", "frequencies")
     listed = spec.at(*path)
     if not isinstance(listed, tuple):
@@ -126,7 +125,7 @@ def _beyond(spec: Spec, frequency: float, path: Path) -> PathDiagnostic:
 
 
 def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A design needs a requirement or a criterion; an analysis of a given excitation does not."""
+    """Check that a design has a requirement or a criterion; an analysis of a given excitation needs none."""
     accuracy = spec.accuracy
     if spec.designs and not accuracy.requirements and not accuracy.goals:
         message = "nothing is asked of the model: accuracy holds neither a requirement nor a criterion"
@@ -142,7 +141,7 @@ def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
-    """At most one goal, and an objective that has what it needs."""
+    """Check that there is at most one goal, and that the keys of the objective are complete."""
     accuracy, objective = spec.accuracy, spec.objective
     for extra in accuracy.goals[1:]:
         message = f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment"
@@ -162,7 +161,7 @@ def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Without a limit on power the best experiment has no end, and the shortest is one sample."""
+    """Check that some limit bounds the power; otherwise the best experiment would not exist."""
     asked = (*spec.accuracy.goals, *spec.accuracy.requirements)
     if not spec.designs or spec.limits.bounds_power:
         return
@@ -181,7 +180,7 @@ def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def lengths_agree(spec: Spec) -> Iterator[PathDiagnostic]:
-    """The experiment is no longer than it may be."""
+    """Check that the experiment is not longer than its limit."""
     most = spec.limits.samples
     if most is not None and spec.goal != "shortest_experiment" and spec.experiment.samples > most:
         samples = spec.experiment.samples
@@ -221,12 +220,12 @@ OF_DESIGNS = (something_asked, limits_present)
 
 
 def related(path: Path, broken: Iterable[Path]) -> bool:
-    """Whether the path is one of the broken ones, contains one, or lies inside one."""
+    """Return whether the path is one of the broken ones, contains one, or lies inside one."""
     return any(path[: len(b)] == b or b[: len(path)] == path for b in broken)
 
 
 def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagnostic]:
-    """Return the diagnostics of all checks of a spec none of whose keys is `broken`.
+    """Return the diagnostics of all checks whose keys are not `broken`.
 
     With `design` the question of a design must be complete.
     """

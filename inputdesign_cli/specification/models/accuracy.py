@@ -40,14 +40,14 @@ class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
     controller: Controller | None = optional("C of the loop to be kept (default: experiment.controller).")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """W is given as a whole."""
+        """Check that W has a numerator if it has a denominator."""
         if self.denominator is not None and self.numerator is None:
             message = "{key} stands without a numerator"
             yield PathDiagnostic("missing-key", message, 'add "numerator: [..]"', ("denominator",))
 
     @property
     def weight(self) -> DiscreteTransfer | None:
-        """W as a transfer function; None when the peak is given."""
+        """Return W as a transfer function; None when the peak is given."""
         if self.numerator is None:
             return None
         return DiscreteTransfer(numerator=self.numerator, denominator=self.denominator or (1.0,))
@@ -68,7 +68,7 @@ class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """There are enough draws and runs to estimate the probability."""
+        """Check that there are enough draws and runs to estimate the probability."""
         rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
         least = math.ceil(_LEAST_TELLING / rare - 1e-9)
         for key, count, none in (("draws", self.draws, ""), ("runs", self.runs, ", or 0 for none")):
@@ -100,7 +100,7 @@ class ModelError(
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Norm and region go with the bound and its probability."""
+        """Check that norm and region go with the bound and its probability."""
         if self.sensitivity is not None and self.norm == "entry":
             message = "{key} is entry, but a sensitivity depends on all entries of the error together"
             yield PathDiagnostic("conflicting-keys", message, "remove norm, or write frobenius", ("norm",))
@@ -112,13 +112,13 @@ class ModelError(
 
     @property
     def calibrated(self) -> Confidence | None:
-        """The exact confidence, where one is asked for."""
+        """Return the exact confidence, where one is asked for."""
         stated = self.confidence
         return stated if stated is not None and stated.exact is not None else None
 
     @property
     def probability(self) -> float | None:
-        """The confidence, 0.95 when neither it nor alpha is given; None when alpha is given."""
+        """Return the confidence, 0.95 when neither it nor alpha is given; None when alpha is given."""
         if self.alpha is not None:
             return None
         stated = self.confidence
@@ -132,7 +132,7 @@ class InformationTarget(Section):
     parameters: fields.Names | None = optional("Names that order its rows (default: of the model).")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every row has a name."""
+        """Check that every row has a name."""
         yield from check_names(self.parameters, len(self.matrix), "matrix")
 
 
@@ -145,7 +145,7 @@ class Application(Section):
     confidence: fields.Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every row has a name."""
+        """Check that every row has a name."""
         yield from check_names(self.parameters, len(self.hessian), "hessian")
 
 
@@ -198,12 +198,10 @@ class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("fr
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A number of lines has a band."""
+        """Check that a number of lines has a band."""
         if self.lines is not None and self.band is None:
-            message = "{key} is the number of lines in a band, and there is none"
-            yield PathDiagnostic(
-                "unsuitable-key", message, "add band: [low, high], or remove lines", ("lines",)
-            )
+            message, hint = "{key} is of a band, and there is none", "add band: [low, high], or remove lines"
+            yield PathDiagnostic("unsuitable-key", message, hint, ("lines",))
 
 
 class Accuracy(Section, not_both=(("model_error", "loop"),)):
@@ -231,7 +229,7 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
 
     @property
     def error(self) -> ModelError | None:
-        """The bound on the model error, stated or derived from the margin of the loop."""
+        """Return the bound on the model error, stated or derived from the margin of the loop."""
         if self.loop is None:
             return self.model_error
         confidence = None if self.loop.confidence is None else Confidence(ellipsoid=self.loop.confidence)
@@ -243,13 +241,13 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
 
     @property
     def requirements(self) -> tuple[str, ...]:
-        """The keys of the requirements that are given, in the order of the contract."""
+        """Return the keys of the requirements that are given, in the order of the contract."""
         names = (key for key in type(self).model_fields if key not in _NO_REQUIREMENTS)
         bounded = self.at("mean_squared_error", "target") is not None
         return self.stated(*names, *(("mean_squared_error",) if bounded else ()))
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """The keys that ask for the best that limits allow."""
+        """Return the keys that ask for the best that limits allow."""
         goals = self.stated("criterion", "closed_loop_error", "mean_squared_error")
         return tuple(goal for goal in goals if goal not in self.requirements)

@@ -41,7 +41,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """It is of first or second order, and all quantities have the shape of the gain."""
+        """Check that the model is of first or second order and all quantities have the shape of the gain."""
         second = ("damping", "natural_frequency")
         missing = tuple(key for key in second if not self.stated(key))
         if missing and not self.stated("time_constant"):
@@ -56,7 +56,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
 
     def check_present(self, terms: named.CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Some gain is present."""
+        """Check that some gain is present."""
         yield from transfer.check_gain(terms.numerator, "continuous", "gain")
 
     def grid(self, name: str) -> Grid:
@@ -68,17 +68,17 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
 
     @property
     def numerator_matrix(self) -> fields.PolynomialMatrix:
-        """The numerators as rows of columns, descending in s."""
+        """Return the numerators as rows of columns, descending in s."""
         return self._numbers("numerator")
 
     @property
     def denominator_matrix(self) -> fields.PolynomialMatrix:
-        """The denominators in the same form."""
+        """Return the denominators as rows of columns, descending in s."""
         return self._numbers("denominator")
 
     @property
     def delays(self) -> Grid:
-        """Dead times as rows of columns; 0 where there is none."""
+        """Return dead times as rows of columns; 0 where there is none."""
         return self.grid("dead_time")
 
     def own_parameters(self) -> tuple[named.NamedParameter, ...]:
@@ -112,7 +112,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         return self._composed(of)
 
     def _composed(self, of: Callable[[str, int, int], Expression]) -> named.CoefficientTerms:
-        """The coefficients, descending in s, from an expression for each entry of each quantity."""
+        """Return the coefficients, descending in s, from an expression for each entry of each quantity."""
         one, two, none = (Expression(number) for number in ("1.0", "2.0", "0.0"))
 
         def entry(i: int, j: int) -> tuple[named.Terms, named.Terms, Expression]:
@@ -130,7 +130,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         )
 
     def _numbers(self, part: Literal["numerator", "denominator"]) -> fields.PolynomialMatrix:
-        """The numerators or the denominators at the values of the quantities."""
+        """Return the numerators or the denominators at the values of the quantities."""
         terms = self._composed(lambda name, i, j: Expression(repr(self.grid(name)[i][j])))
         rows = getattr(terms, part)
         return tuple(
@@ -154,7 +154,7 @@ class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a tran
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
+        """Check that the shapes agree and that poles lie in the left half plane or at zero."""
         yield from transfer.check_shapes(self.numerator, self.denominator)
         yield from transfer.check_each(self.denominator, fields.check_no_growth_in_s, "denominator")
         sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
@@ -163,7 +163,7 @@ class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a tran
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
 
     def check_present(self, terms: named.CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Some coefficient of the numerators is present, and every entry is proper."""
+        """Check that some coefficient of the numerators is present, and that every entry is proper."""
         path = ("continuous", "numerator")
         yield from transfer.check_gain(terms.numerator, *path)
         yield from transfer.check_each_proper(
@@ -172,17 +172,17 @@ class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a tran
 
     @property
     def common(self) -> bool:
-        """Whether all entries share one denominator."""
+        """Return whether all entries share one denominator."""
         return fields.depth(self.denominator) != 3
 
     @property
     def common_delay(self) -> bool:
-        """Whether all entries share one dead time."""
+        """Return whether all entries share one dead time."""
         return not isinstance(self.delay, tuple)
 
     @property
     def delays(self) -> tuple[tuple[float, ...], ...]:
-        """Dead times as rows of columns; 0 where there is none."""
+        """Return dead times as rows of columns; 0 where there is none."""
         if isinstance(self.delay, tuple):
             return self.delay
         return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)

@@ -62,11 +62,11 @@ class NoiseShape(Section):
 
     @property
     def coefficients(self) -> tuple[str, ...]:
-        """The names of the coefficients of C and D."""
+        """Return the names of the coefficients of C and D."""
         return tuple(name for letter in "CD" for names in self._named(letter) for name in names)
 
     def _named(self, letter: str) -> list[tuple[str, ...]]:
-        """The names of the coefficients of each polynomial C, or D."""
+        """Return the names of the coefficients of each polynomial C, or D."""
         return [
             tuple(f"{letter.lower()}{k}{f'[{at[0] + 1}]' if at else ''}" for k in range(1, len(polynomial)))
             for at, polynomial in with_paths(self.C if letter == "C" else self.D)
@@ -74,16 +74,16 @@ class NoiseShape(Section):
 
     @property
     def held(self) -> tuple[bool, ...]:
-        """Whether all coefficients are known, for each D."""
+        """Return for each D whether all its coefficients are known."""
         return tuple(bool(names) and set(names) <= set(self.known or ()) for names in self._named("D"))
 
     @property
     def drifts(self) -> tuple[bool, ...]:
-        """Whether the noise integrates: one value for all outputs, or one per output."""
+        """Return whether the noise integrates: one value for all outputs, or one per output."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """D is stable where it is estimated, and does not grow where it is known."""
+        """Check that D is stable where it is estimated, and does not grow where it is known."""
         for (place, polynomial), held in zip(with_paths(self.D), self.held, strict=True):
             shrunk = tuple(c * _INSIDE**k for k, c in enumerate(polynomial)) if held else polynomial
             if found := fields.check_delay_stable(shrunk):
@@ -116,7 +116,7 @@ class Prior(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every row of a matrix has a name; a file names its parameters itself."""
+        """Check that every row of a matrix has a name; a file names its parameters itself."""
         if isinstance(self.information, tuple):
             yield from check_names(self.names, len(self.information), "information")
         elif self.parameters is not None:
@@ -126,17 +126,17 @@ class Prior(Section):
 
     @property
     def names(self) -> tuple[str, ...] | None:
-        """The names of the parameters, row by row, if they are stated."""
+        """Return the names of the parameters, row by row, if they are stated."""
         return None if self.parameters is None else tuple(self.parameters)
 
     @property
     def values(self) -> Mapping[str, float] | None:
-        """The values of the parameters by name, if they are stated."""
+        """Return the values of the parameters by name, if they are stated."""
         return self.parameters if isinstance(self.parameters, Mapping) else None
 
     @property
     def names_a_model(self) -> bool:
-        """Whether the information comes from a model file."""
+        """Return whether the information comes from a model file."""
         return isinstance(self.information, str) and self.information.endswith((".yaml", ".yml"))
 
 
@@ -147,7 +147,7 @@ class Estimated(Section):
     covariance: fields.CovarianceMatrix = Field(description="Their covariance, in the same order.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every row of the matrix has a name."""
+        """Check that every row of the matrix has a name."""
         yield from check_names(tuple(self.parameters), len(self.covariance), "covariance")
 
 
@@ -178,14 +178,14 @@ class Cost(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Something has a price."""
+        """Check that some power has a price."""
         if not any(np.any(w) for w in (self.input_power, self.output_power, self.excitation_power)):
             message = "all weights of {key} are zero: every experiment would be free"
             yield PathDiagnostic("no-cost", message, "write input_power: 1")
 
 
 def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> Iterator[PathDiagnostic]:
-    """Parameter names are distinct, and there is one for each row of the matrix."""
+    """Check that parameter names are distinct, and that there is one for each row of the matrix."""
     if names is None:
         return
     for repeated in sorted({n for n in names if names.count(n) > 1})[:1]:
@@ -197,7 +197,7 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
 
 
 def _one_line(text: str) -> str:
-    """A text that may stand in the header of a table."""
+    """Return a text if it may stand in the header of a table; refuse it otherwise."""
     if any(c in '",;\t\r\n' for c in text) or len(text) > 40:
         message = "{key} must be one line of at most 40 characters without commas and quotes"
         raise fail("bad-name", message, "shorten it: it stands in headers of tables")

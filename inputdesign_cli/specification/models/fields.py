@@ -31,20 +31,20 @@ def product(factors: Iterable[Polynomial]) -> Polynomial:
 
 
 def check_not_zero(polynomial: Polynomial) -> PathDiagnostic | None:
-    """Some coefficient differs from zero."""
+    """Check that some coefficient differs from zero."""
     message, hint = "all coefficients of {key} are zero", "write at least one that is not"
     return None if any(polynomial) else PathDiagnostic("zero-polynomial", message, hint)
 
 
 def check_leading(polynomial: Polynomial) -> PathDiagnostic | None:
-    """The first coefficient differs from zero."""
+    """Check that the first coefficient differs from zero."""
     message, hint = "{key} must not start with 0", "remove the leading zeros"
     wrong = PathDiagnostic("zero-leading-coefficient", message, hint)
     return check_not_zero(polynomial) or (wrong if polynomial[0] == 0.0 else None)
 
 
 def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
-    """In q^-1, ascending: the first coefficient is exactly 1."""
+    """Check that the first coefficient is exactly 1, in ascending powers of q^-1."""
     lead = polynomial[0]
     if lead == 1.0:
         return None
@@ -62,7 +62,7 @@ def _listed(coefficients: Sequence[float]) -> str:
 
 
 def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
-    """In q^-1, ascending: all roots in z lie strictly inside the unit circle."""
+    """Check that all roots in z lie strictly inside the unit circle, for ascending powers of q^-1."""
 
     def refuse(worst: complex) -> PathDiagnostic | None:
         if abs(worst) < 1.0 - _ROUNDING:
@@ -70,13 +70,15 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
         place = f"radius {abs(worst):.6g} at {abs(float(np.angle(worst))):.4g} rad/sample"
         message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
         hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
+        if 0.0 in polynomial[1:-1] and all(float(c).is_integer() for c in polynomial):
+            hint += "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
         return PathDiagnostic("unstable-polynomial", message, hint)
 
     return _check_roots(polynomial, np.abs, refuse)
 
 
 def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:
-    """In q^-1, ascending: all roots lie inside the unit circle, but for integrators at z = 1."""
+    """Check that all roots in z lie in the unit circle, integrators at z = 1 aside (ascending in q^-1)."""
     rest = np.asarray(polynomial, dtype=float)
     while rest.size > 1 and abs(np.sum(rest)) <= _ROUNDING * np.sum(np.abs(rest)):
         rest = np.cumsum(rest)[:-1]  # divided by 1 - q^-1
@@ -84,13 +86,13 @@ def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:
 
 
 def check_no_growth_in_s(polynomial: Polynomial) -> PathDiagnostic | None:
-    """In s, descending: all roots lie in the open left half plane, but for integrators at s = 0."""
+    """Check that all roots lie in the open left half plane, integrators at s = 0 aside (descending in s)."""
     last = max((i for i, c in enumerate(polynomial) if c), default=0)
     return check_left_half_plane(polynomial[: last + 1])
 
 
 def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
-    """In s, descending: all roots lie in the open left half plane."""
+    """Check that all roots lie in the open left half plane, for descending powers of s."""
 
     def refuse(worst: complex) -> PathDiagnostic | None:
         if worst.real < 0:
@@ -109,7 +111,7 @@ def _check_roots(
     badness: Callable[[np.ndarray], np.ndarray],
     refuse: Callable[[complex], PathDiagnostic | None],
 ) -> PathDiagnostic | None:
-    """What is wrong with the worst root, if there is one."""
+    """Return the diagnostic of the worst root, if it is refused or cannot be computed."""
     try:
         with np.errstate(all="ignore"):
             roots = np.roots(np.asarray(polynomial, dtype=float))
@@ -128,14 +130,14 @@ Nested = TypeVar("Nested", bound=tuple)
 
 
 def depth(value: object) -> int:
-    """Return how deeply lists are nested: 0 for a number, 1 for a list of numbers."""
+    """Return the depth of nested lists: 0 for a number, 1 for a list of numbers."""
     if not isinstance(value, list | tuple):
         return 0
     return 1 + max((depth(v) for v in value), default=0)
 
 
 def as_whole(value: object) -> object:
-    """Return 500.0 as 500, and everything else unchanged."""
+    """Return a whole float as an integer (500.0 as 500), and everything else unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -147,7 +149,7 @@ def as_text(value: object) -> object:
 
 
 def rising(values: tuple[float, ...]) -> tuple[float, ...]:
-    """Frequencies or harmonics increase."""
+    """Check that frequencies or harmonics increase."""
     for before, after in pairwise(values):
         if not before < after:
             message = f"{{key}} must increase: {show(after)} follows {show(before)}"
@@ -156,14 +158,14 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def two_frequencies(value: object) -> object:
-    """A band has two ends."""
+    """Check that a band has two ends."""
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise fail("bad-band", "{key} must be two frequencies, [low, high]", "write [0.01, 3.0]")
     return value
 
 
 def ascending(band: tuple[float, float]) -> tuple[float, float]:
-    """A band is not empty."""
+    """Check that a band is not empty."""
     if not band[0] < band[1]:
         message = f"{{key}} must ascend: {show(band[0])} is not below {show(band[1])}"
         raise fail("bad-band", message, "write [low, high]")
@@ -171,7 +173,7 @@ def ascending(band: tuple[float, float]) -> tuple[float, float]:
 
 
 def same_columns(rows: Nested) -> Nested:
-    """The rows of a matrix of polynomials are equally long."""
+    """Check that the rows of a matrix of polynomials are equally long."""
     if len({len(row) for row in rows}) > 1:
         message = "the rows of {key} must have the same number of columns"
         hint = "one row per output, one column per input; write [0] where an input has no effect"
@@ -180,7 +182,7 @@ def same_columns(rows: Nested) -> Nested:
 
 
 def product_exists(denominator: Nested) -> Nested:
-    """The factors of a denominator can be multiplied out; one polynomial or a matrix of them passes."""
+    """Check that the factors of a denominator can be multiplied out; other nestings pass."""
     if depth(denominator) != 2:
         return denominator
     multiplied = product(denominator)
@@ -192,7 +194,7 @@ def product_exists(denominator: Nested) -> Nested:
 
 
 def symmetric(rows: Matrix) -> Matrix:
-    """A matrix is square and symmetric."""
+    """Check that a matrix is square and symmetric."""
     if any(len(row) != len(rows) for row in rows):
         raise fail("wrong-shape", f"{{key}} must be square: {len(rows)} rows of {len(rows)} entries")
     values = np.array(rows)
@@ -203,7 +205,7 @@ def symmetric(rows: Matrix) -> Matrix:
 
 
 def semidefinite(rows: Matrix) -> Matrix:
-    """A symmetric matrix has no negative eigenvalue beyond rounding."""
+    """Check that a symmetric matrix has no negative eigenvalue beyond rounding."""
     values = np.array(rows)
     scale = float(np.max(np.abs(values)))
     if scale > 0.0 and np.linalg.eigvalsh(values / scale)[0] < -1e-9:
@@ -213,7 +215,7 @@ def semidefinite(rows: Matrix) -> Matrix:
 
 
 def positive_definite(rows: Matrix) -> Matrix:
-    """A covariance matrix is positive definite; tested on correlations, so that units do not matter."""
+    """Check that a covariance matrix is positive definite, by correlations: units do not matter."""
     values = np.array(rows)
     with np.errstate(all="ignore"):
         deviations = np.sqrt(np.diag(values))
@@ -230,7 +232,7 @@ T = TypeVar("T")
 
 
 def holds(check: Callable[[Polynomial], PathDiagnostic | None]) -> AfterValidator:
-    """The validator that raises what a check of a polynomial finds."""
+    """Return the validator that raises the diagnostic of a check of a polynomial."""
 
     def checked(polynomial: Polynomial) -> Polynomial:
         if found := check(polynomial):
@@ -241,7 +243,7 @@ def holds(check: Callable[[Polynomial], PathDiagnostic | None]) -> AfterValidato
 
 
 def nested(levels: int, what: str, hint: str) -> BeforeValidator:
-    """The validator that refuses lists which are not nested `levels` deep."""
+    """Return the validator that refuses lists which are not nested `levels` deep."""
 
     def check(value: object) -> object:
         if depth(value) != levels:

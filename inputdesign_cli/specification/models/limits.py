@@ -30,7 +30,7 @@ class PowerLimit(Section, some_of=(("max", "min"),)):
     min: fields.PerChannel[fields.NonNegative] | None = optional("Smallest power, likewise.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The lower bound is below the upper one."""
+        """Check that the lower bound is below the upper one."""
         if self.max is not None and self.min is not None and np.shape(self.max) == np.shape(self.min):
             yield from _ordered(bool(np.any(np.array(self.min) > np.array(self.max))))
 
@@ -64,7 +64,7 @@ class SpectrumLimit(Section, some_of=(("max", "min"),)):
     min: Curve | None = optional("Smallest density, in the same forms.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The lower bound is below the upper one."""
+        """Check that the lower bound is below the upper one."""
         if isinstance(self.max, float) and isinstance(self.min, float):
             yield from _ordered(self.max < self.min)
 
@@ -103,7 +103,7 @@ class Limits(Section):
 
     @property
     def bounds_power(self) -> bool:
-        """Whether some limit bounds the power of the excitation, so that the best experiment exists."""
+        """Return whether some limit bounds the power of the excitation: the best experiment exists."""
         powers = (self.input_power, self.output_power, self.excitation_power, self.spectrum)
         return bool(self.stated("amplitude", "energy")) or any(
             p is not None and p.max is not None for p in powers

@@ -31,7 +31,7 @@ class Pid(Section):
     sample: Rule = Field(default="tustin", description=_RULE)
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Its gain is not zero, and the rule of sampling admits its derivative."""
+        """Check that the gain is not zero and the rule of sampling admits the derivative."""
         if self.Kp == 0.0:
             message = "{key} is zero: the controller does nothing"
             yield PathDiagnostic("out-of-range", message, "remove the controller", ("Kp",))
@@ -42,7 +42,7 @@ class Pid(Section):
 
     @property
     def filter_time(self) -> float:
-        """Tf, by default Td / 10."""
+        """Return the filter time Tf, by default Td / 10."""
         return self.Td / 10.0 if self.Tf is None else self.Tf
 
 
@@ -102,7 +102,7 @@ class LoopsController(Section, family="controller", phrase="a list of single loo
     loops: fields.Several[SingleLoop] = Field(description="One controller for each loop.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """No loop is listed twice."""
+        """Check that no loop is listed twice."""
         places = [(one.output, one.input) for one in self.loops]
         for n, place in enumerate(places):
             if place in places[:n]:
@@ -140,7 +140,7 @@ class Control(Section):
     ) = optional("true: minimum-variance control.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """There is one law, and its transfer functions are stable."""
+        """Check that there is one law, and that its transfer functions are stable."""
         yield from self.exactly_one(*type(self).model_fields)
         if self.model_reference is not None:
             yield from transfer.check_stable(self.model_reference, "model_reference")
@@ -155,7 +155,7 @@ class Reference(Section):
     filter: transfer.Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The filter is stable."""
+        """Check that the filter is stable."""
         if self.filter is not None:
             yield from transfer.check_stable(self.filter, "filter")
 
@@ -223,7 +223,7 @@ class LoopMargin(
 
     @property
     def peak(self) -> float:
-        """The largest |S|; 1 + L keeps a distance of 1/|S| from 0, which bounds gain and phase margins."""
+        """Return the largest |S|; 1 + L keeps a distance of 1/|S| from 0, which bounds both margins."""
         if self.max_sensitivity_db is not None:
             return float(10 ** (self.max_sensitivity_db / 20))
         if self.phase_margin is not None:

@@ -82,7 +82,7 @@ def _number(value: Plain) -> float:
 
 
 def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
-    """Names of parameters can stand in expressions."""
+    """Check that names of parameters can stand in expressions."""
     for name in parameters:
         if not is_name(name):
             message = f"{clip(name)} is no name of a parameter"
@@ -95,7 +95,7 @@ def worth(
 ) -> Plain:
     """Return a nested value with numbers in place of texts.
 
-    What is wrong with texts is added to `found`, and the parameters that they name to `used`.
+    Errors in texts are added to `found`, and the parameters that they name to `used`.
     """
     if isinstance(value, list | tuple):
         return [worth(part, parameters, (*path, i), found, used) for i, part in enumerate(value)]

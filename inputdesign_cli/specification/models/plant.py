@@ -67,27 +67,27 @@ class NamedPlant(Section):
 
     @property
     def written(self) -> dict[str, Plain]:
-        """The section as it was written, with its expressions."""
+        """Return the section as it was written, with its expressions."""
         return self._written
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The numbers of outputs and inputs."""
+        """Return the numbers of outputs and inputs."""
         raise NotImplementedError
 
     @property
     def outputs(self) -> int:
-        """The number of outputs."""
+        """Return the number of outputs."""
         return self.shape[0]
 
     @property
     def inputs(self) -> int:
-        """The number of inputs."""
+        """Return the number of inputs."""
         return self.shape[1]
 
     @property
     def named_parameters(self) -> tuple[named.NamedParameter, ...]:
-        """The named parameters; empty if the coefficients are the parameters."""
+        """Return the named parameters; empty if the coefficients are the parameters."""
         stated = self.parameters or {}
         return tuple(named.NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
 
@@ -125,7 +125,7 @@ class StateSpace(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The matrices fit each other."""
+        """Check that the matrices fit each other."""
         n, r, p = len(self.A), len(self.B[0]), len(self.C)
         sizes: tuple[tuple[str, fields.Matrix | None, tuple[int, int], str], ...] = (
             ("A", self.A, (n, n), "states by states"),
@@ -163,7 +163,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A and F have the shape of B, of which some coefficient is present."""
+        """Check that A and F have the shape of B, of which some coefficient is present."""
         yield from transfer.check_per_output(self.A, self.outputs, "A")
         if self.F is not None and transfer.shape_words(self.F) != transfer.shape_words(self.B):
             message = "{key} must have the shape of B: " + transfer.shape_words(self.B)
@@ -172,17 +172,17 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
 
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
-        """The power of the first coefficient of B that is present, entry by entry; the length if none is."""
+        """Return the power of the first present coefficient of B, entry by entry; the length if none is."""
         rows = transfer.as_matrix(named.expressed(self.written.get("B", self.B)))
         return tuple(tuple(named.leading(entry) for entry in row) for row in rows)
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The numbers of outputs and inputs."""
+        """Return the numbers of outputs and inputs."""
         return transfer.size_of(self.B)
 
     def coefficients(self, letter: str, output: int, input: int) -> named.Terms:
-        """A, B or F of an entry as expressions in the named parameters."""
+        """Return A, B or F of an entry as expressions in the named parameters."""
         written = named.expressed(self.written[letter.upper()])
         if letter == "a":
             return written[output] if fields.depth(written) == 2 else written
@@ -190,12 +190,12 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
 
     @property
     def B_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (the paper's symbol)
-        """B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
+        """Return B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
         return transfer.as_matrix(self.B)
 
     @property
     def F_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (likewise)
-        """F in the same form; absent polynomials are 1."""
+        """Return F as rows of columns of coefficients; absent polynomials are 1."""
         ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
         return ones if self.F is None else transfer.as_matrix(self.F)
 
@@ -213,35 +213,35 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The numbers of outputs and inputs."""
+        """Return the numbers of outputs and inputs."""
         return transfer.size_of(self.continuous.numerator_matrix)
 
     @property
     def sampled(self) -> bool:
-        """Whether the design runs in discrete time."""
+        """Return whether the design runs in discrete time."""
         return self.sample is not None
 
     @property
     def named_parameters(self) -> tuple[named.NamedParameter, ...]:
-        """The stated parameters, or the quantities of a process model."""
+        """Return the stated parameters, or the quantities of a process model."""
         if self.parameters is None and self.continuous.kind == "process":
             return self.continuous.own_parameters()
         return super().named_parameters
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some coefficient of a numerator is present, and every entry is proper."""
+        """Check that some coefficient of a numerator is present, and that every entry is proper."""
         yield from self.continuous.check_present(self.stated_terms)
 
     @cached_property
     def terms(self) -> named.CoefficientTerms:
-        """The coefficients as expressions in the named parameters."""
+        """Return the coefficients as expressions in the named parameters."""
         if self.parameters is None and self.continuous.kind == "process":
             return self.continuous.terms()
         return self.stated_terms
 
     @cached_property
     def stated_terms(self) -> named.CoefficientTerms:
-        """The stated coefficients, as expressions in named parameters if there are any."""
+        """Return the stated coefficients, as expressions in named parameters if there are any."""
         return self.continuous.terms(self.written["continuous"])
 
 
@@ -256,7 +256,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     sample: Literal["zoh"] | None = optional("zoh: matrices in continuous time are sampled.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some parameter is named; sampling and dead time go with the time of the matrices."""
+        """Check that some parameter is named, and that sampling and dead time go with `time`."""
         if self.parameters is None:
             message = "{key} needs parameters: numbers in its matrices are not estimated"
             hint = "write parameters: {k: 2.0}, and k in the matrices"
@@ -275,11 +275,11 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The numbers of outputs and inputs."""
+        """Return the numbers of outputs and inputs."""
         return len(self.state_space.C), len(self.state_space.B[0])
 
     def term(self, letter: str, row: int, column: int) -> Expression:
-        """An entry of a matrix, or the dead time, as an expression in the named parameters."""
+        """Return an entry of a matrix, or the dead time, as an expression in the named parameters."""
         written = self.written["state_space"]
         value = written.get("delay", 0.0) if letter == "delay" else written[letter][row][column]
         return named.expressed(value)
@@ -307,7 +307,7 @@ class RegressionPlant(Section, family="plant", phrase="a regression"):
 
     @property
     def inputs(self) -> int:
-        """Every regressor counts as an input."""
+        """Return the number of regressors: every regressor counts as an input."""
         return self.regression.estimated + self.regression.neglected
 
 

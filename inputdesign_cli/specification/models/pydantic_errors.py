@@ -38,28 +38,28 @@ class Declared:
 
     @property
     def wording(self) -> Wording:
-        """The outermost wording, or an empty one."""
+        """Return the outermost wording, or an empty one."""
         return next((m for m in reversed(self.metadata) if isinstance(m, Wording)), Wording(""))
 
     @property
     def alternatives(self) -> dict[str, Declared]:
-        """The types of a union by their tags, which are empty for what carries none."""
+        """Return the types of a union by their tags; a type without a tag has an empty one."""
         parts = [declared(part) for part in typing.get_args(self.type)] if _is_union(self.type) else []
         return {part.tag: part for part in parts}
 
     @property
     def tag(self) -> str:
-        """The tag that distinguishes it from the other alternatives of a union."""
+        """Return the tag that distinguishes this type from the other alternatives of a union."""
         own = TAG + self.section.phrase if self.section else ""
         return next((m.tag for m in self.metadata if isinstance(m, Tag)), own)
 
     @property
     def section(self) -> type[Section] | None:
-        """The type itself if it is a mapping of the spec."""
+        """Return the type itself if it is a mapping of the spec."""
         return self.type if isinstance(self.type, type) and issubclass(self.type, Section) else None
 
     def at(self, step: str | int) -> Declared:
-        """The type one step down: at a key, at an index, or behind the tag of an alternative."""
+        """Return the type one step down: at a key, at an index, or behind the tag of an alternative."""
         if isinstance(step, str) and step.startswith(TAG):
             return self.alternatives.get(step, Declared(object))
         if self.section is not None:
@@ -119,7 +119,7 @@ def translate(error: ValidationError, data: Plain, root: type[Section]) -> list[
     """Return the diagnostics of a pydantic error.
 
     Args:
-        error: What `root.model_validate(data)` raised.
+        error: The error that `root.model_validate(data)` raised.
         data: Plain data, as a file holds them.
         root: The model that the data were read by.
 
@@ -177,7 +177,7 @@ def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> li
 def _wrong_value(
     kind: str, value: Plain, context: dict[str, Plain], declared: Declared
 ) -> tuple[str, str, str]:
-    """Code, message and hint for a value that is not what its key wants."""
+    """Return code, message and hint for a value that is not of the type of its key."""
     hint = declared.wording.hint
     usual, advice = _DEFAULTS.get(kind, ("something else", ""))
     what = declared.wording.what or usual
@@ -223,7 +223,7 @@ def _no_number(value: Plain, what: str, hint: str) -> tuple[str, str, str]:
 
 
 def _unknown_type(path: Path, types: list[str], value: dict[str, Plain]) -> PathDiagnostic:
-    """A mapping whose `type` is missing or names none of the alternatives."""
+    """Return the diagnostic of a mapping whose `type` is missing or names none of the alternatives."""
     if "type" in value:
         return PathDiagnostic("unknown-word", *unknown_word(value["type"], types), (*path, "type"))
     hint = f"write type: {types[0]}; the types are {', '.join(types)}"

@@ -106,7 +106,7 @@ class Signal(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every setting belongs to the type of signal."""
+        """Check that every setting belongs to the type of signal."""
         for key in self.stated(*_ONLY_FOR):
             types = _ONLY_FOR[key]
             if self.type is not None and self.type not in types:
@@ -164,6 +164,16 @@ def _pair(value: object) -> object:
 Pair = Annotated[
     tuple[fields.Name, fields.Name], BeforeValidator(_pair), Wording("a list of two parameter names")
 ]
+
+
+class Figures(Section):
+    """The form of the figures of a run."""
+
+    width: Literal["column", "page"] = Field(
+        default="page",
+        description="column: 89 mm with smaller text, as in a paper; page: 178 mm (default page).",
+    )
+    format: Literal["png", "pdf", "svg"] = Field(default="png", description="Of the files (default png).")
 
 
 class Report(Section):

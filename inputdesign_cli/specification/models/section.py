@@ -124,7 +124,7 @@ class Section(BaseModel):
         return Tag(TAG + cls.phrase).__get_pydantic_core_schema__(source, handler)
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Return what is wrong with the section as a whole; each of its values is valid."""
+        """Yield the diagnostics of the section as a whole; each of its values is valid."""
         return iter(())
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {}
@@ -144,18 +144,18 @@ class Section(BaseModel):
         return inner
 
     def exactly_one(self, *keys: str) -> Iterator[PathDiagnostic]:
-        """Exactly one of the keys is given."""
+        """Check that exactly one of the keys is given."""
         yield from self.at_least_one(*keys)
         yield from self.at_most_one(*keys)
 
     def at_least_one(self, *keys: str) -> Iterator[PathDiagnostic]:
-        """One or more of the keys are given."""
+        """Check that one or more of the keys are given."""
         if not self.stated(*keys):
             needs = f"{{key}} needs one of {choices(keys)}"
             yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
 
     def at_most_one(self, *keys: str) -> Iterator[PathDiagnostic]:
-        """No two of the keys are given."""
+        """Check that no two of the keys are given."""
         given = self.stated(*keys)
         for extra in given[1:]:
             message = f"{{key}} stands beside {given[0]}; give only one of {choices(keys)}"
@@ -164,10 +164,8 @@ class Section(BaseModel):
     @model_validator(mode="after")
     def _checked(self) -> Self:
         found = [*self.check()]
-        for rule, groups in zip(
-            (self.exactly_one, self.at_least_one, self.at_most_one), self.groups, strict=True
-        ):
-            found += [one for keys in groups for one in rule(*keys)]
+        rules = zip((self.exactly_one, self.at_least_one, self.at_most_one), self.groups, strict=True)
+        found += [one for rule, groups in rules for keys in groups for one in rule(*keys)]
         if found:
             raise carry(*found)
         return self

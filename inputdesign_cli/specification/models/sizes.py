@@ -24,7 +24,7 @@ class Size:
     why: str
 
     def check(self, value: Plain) -> Plain:
-        """The value itself. It raises `PydanticCustomError` (`too-large`)."""
+        """Return the value itself, or raise `PydanticCustomError` (`too-large`)."""
         listed = isinstance(value, list | tuple | dict)
         size = len(value) if listed else value
         if isinstance(size, int | float) and not isinstance(size, bool) and self.most < size < 2**1024:

@@ -24,7 +24,7 @@ from inputdesign_cli.specification.models.experiment import (
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
-from inputdesign_cli.specification.models.realisation import Report, Signal, Simulation, Solver
+from inputdesign_cli.specification.models.realisation import Figures, Report, Signal, Simulation, Solver
 from inputdesign_cli.specification.models.section import Section, optional
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
@@ -89,6 +89,7 @@ class Spec(Section):
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")
     simulation: Simulation | None = optional("Monte Carlo study on the true system.")
     report: Report = Field(default=Report(), description="What the figures show.")
+    figures: Figures = Field(default=Figures(), description="Width and format of the figures of a run.")
     sweep: Sweep | None = optional("What `idesign sweep` varies.")
 
     phrase: ClassVar[str] = "a spec"
@@ -107,7 +108,7 @@ class Spec(Section):
 
         Args:
             data: arrays of numpy will do for lists.
-            folder: what the paths in the spec are relative to (default: the current folder).
+            folder: the folder that paths in the spec are relative to (default: the current folder).
             design: whether it must ask for a design, or for an analysis, that can be answered.
 
         Raises:
@@ -132,7 +133,7 @@ class Spec(Section):
 
         Args:
             changes: values by key; None removes a key.
-            file: what diagnostics about the new values name as their file.
+            file: the name of their file in diagnostics about the new values.
             design: as for `from_dict` (default: as this spec).
         """
         for key in changes:
@@ -144,40 +145,40 @@ class Spec(Section):
 
     @property
     def goal(self) -> Objective:
-        """The objective, or the one that follows from the rest when it is not given."""
+        """Return the objective, or the one that follows from the rest when it is not given."""
         if self.objective is not None:
             return self.objective
         return "best_accuracy" if self.accuracy.goals else "least_cost"
 
     @property
     def closed_loop(self) -> bool:
-        """Whether the experiment runs under a controller."""
+        """Return whether the experiment runs under a controller."""
         return self.experiment.controller is not None
 
     @property
     def asks_for_design(self) -> bool:
-        """Whether it was read as one that asks for a design or an analysis; else it is for `identify`."""
+        """Return whether the spec was read for a design or an analysis; otherwise it is for `identify`."""
         return self._design
 
     @property
     def given(self) -> Given | None:
-        """The excitation that is given, if none is to be designed."""
+        """Return the excitation that is given, if none is to be designed."""
         spectrum = self.spectrum
         return spectrum.given if spectrum is not None and spectrum.type == "given" else None
 
     @property
     def designs(self) -> bool:
-        """Whether an excitation is to be designed (not given)."""
+        """Return whether an excitation is to be designed (not given)."""
         return self.given is None
 
     @property
     def signal_samples(self) -> int:
-        """The length of the signal: signal.samples, or else experiment.samples."""
+        """Return the length of the signal: signal.samples, or else experiment.samples."""
         return self.signal.samples or self.experiment.samples
 
     @property
     def nyquist(self) -> float:
-        """The largest frequency: pi/sample_time in rad per time unit; infinite in continuous time."""
+        """Return the largest frequency: pi/sample_time in rad per time unit; infinite in continuous time."""
         return math.pi / self.sample_time if self.plant.sampled else math.inf
 
     def clip_band(self, band: tuple[float, float] | None) -> tuple[float, float]:
@@ -190,7 +191,7 @@ class Spec(Section):
 
     @property
     def sha256(self) -> str:
-        """The hash of the contents, overrides applied; comments, layout and order do not count."""
+        """Return the hash of the contents, overrides applied; comments, layout and order do not count."""
         return fingerprint(self.content)
 
     def to_yaml(self) -> str:
@@ -222,5 +223,5 @@ class Spec(Section):
 
     @property
     def content(self) -> dict[str, object]:
-        """The contents as the user wrote them, overrides applied, as plain data."""
+        """Return the contents as the user wrote them, overrides applied, as plain data."""
         return self._source.data or self.model_dump(mode="json", exclude_none=True, exclude_unset=True)

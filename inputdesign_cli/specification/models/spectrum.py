@@ -122,12 +122,12 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
 
     @property
     def rows(self) -> tuple[tuple[float, ...], ...]:
-        """The amplitudes of each input; with several inputs a single list holds for all of them."""
+        """Return the amplitudes of each input; with several inputs a single list holds for all of them."""
         listed = self.amplitudes if fields.depth(self.amplitudes) == 2 else (self.amplitudes,)
         return cast(tuple[tuple[float, ...], ...], listed)
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every frequency has an amplitude."""
+        """Check that every frequency has an amplitude."""
         wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
         if wrong is not None:
             held, lists = count(len(wrong), "amplitude"), fields.depth(self.amplitudes) == 2

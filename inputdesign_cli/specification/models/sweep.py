@@ -42,7 +42,7 @@ def range_values(text: str) -> tuple[str, ...] | None:
 
 
 def _plain(value: Decimal) -> str:
-    """A decimal without an exponent where it is short, and without trailing zeros."""
+    """Return a decimal without an exponent where it is short, and without trailing zeros."""
     normal = value.normalize()
     exponent = normal.as_tuple().exponent
     if isinstance(exponent, int) and -12 <= exponent <= 6:

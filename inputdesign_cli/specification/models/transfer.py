@@ -21,7 +21,7 @@ def as_matrix(value: tuple) -> Plain:
 
 
 def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
-    """Denominators for each entry have the shape of the numerator."""
+    """Check that denominators for each entry have the shape of the numerator."""
     if fields.depth(denominator) == 3 and size_of(denominator) != size_of(as_matrix(numerator)):
         message = "{key} must have the shape of the numerator: " + shape_words(numerator)
         hint = "or write one polynomial, a denominator common to all entries"
@@ -53,7 +53,7 @@ def with_paths(value: tuple) -> list[tuple[tuple[int, ...], fields.Polynomial]]:
 
 
 def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDiagnostic]:
-    """A list of polynomials at `path` has one for each output."""
+    """Check that a list of polynomials at `path` has one for each output."""
     if fields.depth(value) == 2 and len(value) != outputs:
         message = f"{{key}} holds {count(len(value), 'polynomial')} for {count(outputs, 'output')}"
         hint = "write one polynomial for all outputs, or a list with one per output"
@@ -61,7 +61,7 @@ def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDia
 
 
 def check_gain(entries: TermMatrix, *path: str) -> Iterator[PathDiagnostic]:
-    """Some coefficient at `path` is present."""
+    """Check that some coefficient at `path` is present."""
     if not any(one.present for row in entries for p in row for one in p):
         message = "all coefficients of {key} are zero: the input has no effect"
         yield PathDiagnostic("zero-polynomial", message, path=path)
@@ -82,7 +82,7 @@ def shape_words(value: tuple) -> str:
 
 
 def check_proper(numerator: Terms, degree: int, *path: str | int) -> Iterator[PathDiagnostic]:
-    """In s, descending: the degree of the numerator is at most that of the denominator, `degree`."""
+    """Check that the numerator has at most the degree of the denominator, `degree` (descending in s)."""
     above = len(numerator) - leading(numerator) - 1
     if above > degree:
         message = f"{{key}} has degree {above} in s, more than its denominator ({degree}): it is not proper"
@@ -100,7 +100,7 @@ class Ratio(Section):
 
     @property
     def denominator_factors(self) -> tuple[fields.Polynomial, ...]:
-        """The factors of the denominator as written."""
+        """Return the factors of the denominator as written."""
         return cast(
             fields.PolynomialList,
             self.denominator if fields.depth(self.denominator) == 2 else (self.denominator,),
@@ -108,7 +108,7 @@ class Ratio(Section):
 
     @property
     def denominator_polynomial(self) -> fields.Polynomial:
-        """The product of the factors."""
+        """Return the denominator as the product of its factors."""
         return fields.product(self.denominator_factors)
 
 
@@ -122,7 +122,7 @@ class ContinuousRatio(Ratio):
     """A proper transfer function in s: coefficients in descending powers of s."""
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """It is proper."""
+        """Check that the transfer function is proper."""
         yield from check_proper(expressed(self.numerator), len(self.denominator_polynomial) - 1, "numerator")
 
 
@@ -144,18 +144,18 @@ class TransferMatrix(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some coefficient is not zero, and numerator and denominator have one shape."""
+        """Check that some coefficient is not zero, and that numerator and denominator have one shape."""
         yield from check_gain(expressed(self.numerator_matrix), "numerator")
         yield from check_shapes(self.numerator, self.denominator)
 
     @property
     def numerator_matrix(self) -> fields.PolynomialMatrix:
-        """The numerators as rows (outputs) of columns (inputs)."""
+        """Return the numerators as rows (outputs) of columns (inputs)."""
         return as_matrix(self.numerator)
 
     @property
     def denominator_matrix(self) -> fields.PolynomialMatrix:
-        """The denominators in the same form, factors multiplied out."""
+        """Return the denominators as rows of columns, factors multiplied out."""
         return denominators_of(self.numerator, self.denominator)
 
 
@@ -173,7 +173,7 @@ class DiscreteMatrix(TransferMatrix, family="transfer", phrase="a transfer matri
 def check_each_proper(
     above: TermMatrix, below: fields.PolynomialMatrix, levels: int, *path: str
 ) -> Iterator[PathDiagnostic]:
-    """Every entry of a matrix in s is proper; `levels` is the nesting of its numerator as written."""
+    """Check that every entry of a matrix in s is proper; `levels` is the nesting of the written numerator."""
     for i, row in enumerate(above):
         for j, entry in enumerate(row):
             where = (i, j) if levels == 3 else ()
@@ -186,7 +186,7 @@ class ContinuousTarget(TransferMatrix):
     numerator: fields.RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Numerator and denominator have one shape, the poles lie on the left, every entry is proper."""
+        """Check that shapes agree, the poles lie in the left half plane, and every entry is proper."""
         if shapes := list(super().check()):
             yield from shapes
             return
@@ -205,7 +205,7 @@ class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-
 
 
 def transfer_kind(value: dict[str, Plain]) -> str:
-    """Whether a mapping of the file is in q^-1 or in s."""
+    """Return the tag of a mapping of the file: in q^-1 or in s."""
     return ContinuousTransfer.phrase if "continuous" in value else DiscreteTransfer.phrase
 
 
@@ -239,7 +239,7 @@ Target = Annotated[
 
 
 def check_stable(transfer: Target, *path: str) -> Iterator[PathDiagnostic]:
-    """The poles of the transfer function at `path` are stable; a matrix in s has its own check."""
+    """Check that the poles of the transfer function at `path` are stable; a matrix in s has its own check."""
     if transfer.kind == "continuous":
         inside = (*path, "continuous", "denominator")
         yield from check_each(transfer.continuous.denominator, fields.check_left_half_plane, *inside)

@@ -87,7 +87,7 @@ class Uncertainty(Section, not_both=(SOURCES,)):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The uncertainty is stated once, with names for the rows of a matrix."""
+        """Check that the uncertainty is stated once, with names for the rows of a matrix."""
         listed = isinstance(self.scenarios, tuple)
         drawn = [key for key in (*SOURCES, *_OF_DRAWS) if key in self.model_fields_set]
         for extra in drawn if listed else ():

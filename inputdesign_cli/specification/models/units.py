@@ -45,5 +45,5 @@ def without_unit(text: str, time_unit: str | None) -> str:
 
 
 def _seconds(unit: str) -> float | None:
-    """How long a unit of time is; None if it is not known."""
+    """Return the length of a unit of time in seconds; None if it is not known."""
     return SECONDS.get(unit) or SECONDS.get(synonym(unit.lower(), SECONDS) or "")

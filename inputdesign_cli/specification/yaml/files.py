@@ -43,7 +43,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
 
 
 def is_outside(path: Path, folder: Path) -> bool:
-    """Whether a file lies outside a folder, links followed."""
+    """Return whether a file lies outside a folder, links followed."""
     try:
         return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
     except ValueError:

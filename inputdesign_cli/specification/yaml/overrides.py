@@ -106,7 +106,7 @@ def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
 
 
 def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError:
-    """What is wrong with an override, at a column of its text."""
+    """Return the error of an override, at a column of its text."""
     location = Location(f"--set {override}", 1, column, override.partition("\n")[0])
     return SpecError.because("bad-override", message, hint, location=location)
 
@@ -117,7 +117,7 @@ def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
     Args:
         tree: changed in place.
         changes: values by key, as in `{"experiment.samples": 600}`.
-        file: what diagnostics about the new values name as their file.
+        file: the name of their file in diagnostics about the new values.
 
     Raises:
         SpecError: `bad-override`, a key leads nowhere.
@@ -144,7 +144,7 @@ def _apply(tree: Tree, override: str) -> None:
 
 
 def _resolve(data: Plain, key: str, override: str) -> Path:
-    """The path of a dotted key, with digits turned into indices where the tree has a list.
+    """Return the path of a dotted key, with digits turned into indices where the tree has a list.
 
     Raises `SpecError`: `bad-override`.
     """

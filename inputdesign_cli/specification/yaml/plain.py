@@ -32,7 +32,7 @@ def plain(value: object, where: str = "", depth: int = 0) -> Plain:
     Args:
         value: of any type.
         where: its key.
-        depth: how many mappings and lists are around it.
+        depth: the number of mappings and lists around it.
 
     Raises:
         SpecError: `bad-argument` for values that no file could hold.
@@ -79,7 +79,7 @@ def to_yaml(data: dict[str, Plain]) -> str:
 
 
 def fingerprint(data: dict[str, Plain]) -> str:
-    """SHA-256 of the data as canonical JSON: order of keys and `1` against `1.0` make no difference."""
+    """Return the SHA-256 of the data as canonical JSON: order of keys and `1` or `1.0` make no difference."""
     text = json.dumps(_canonical(data), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 

@@ -68,13 +68,13 @@ class Tree:
 
 
 def read(text: str, file: str, *, source: int = 0, before: str = "", at: Path = ()) -> Tree:
-    """Read one YAML document; what is wrong with single keys stands in the diagnostics of the tree.
+    """Read one YAML document; the tree has the diagnostics of single keys.
 
     Args:
         text: YAML.
-        file: The name that the text goes by in diagnostics.
+        file: The name of the text in diagnostics.
         source: The number that its marks carry (see `Places`).
-        before: What stands before the text on its first line (an override's value stands behind `key=`).
+        before: The text before it on its first line (an override's value stands behind `key=`).
         at: The path of the text's root, if it is a part of a larger tree.
 
     Raises:
@@ -111,7 +111,7 @@ class _Document:
     count: int = 0
 
     def mark(self, node: Plain) -> Mark:
-        """Where a node or event begins in the text as the user wrote it."""
+        """Return the place where a node or event begins in the text as the user wrote it."""
         line, column = node.start_mark.line + 1, node.start_mark.column + 1
         return Mark(self.source, line, column + (self.shift if line == 1 else 0))
 

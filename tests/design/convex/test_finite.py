@@ -100,6 +100,7 @@ def matrix_of(vector, order):
     return found
 
 
+@pytest.mark.first(16)
 @pytest.mark.parametrize("goal", ["cost", "factor"])
 @pytest.mark.parametrize("kind", ["nonnegative", "psd"])
 @pytest.mark.parametrize("name", CUTS)

@@ -34,6 +34,7 @@ def grid_program(A, metrics, limits, weights):
     return cp.Problem(cp.Minimize(value), constraints).solve(solver=cp.CLARABEL)
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_gap_closes_and_the_certificate_holds(n, seed):

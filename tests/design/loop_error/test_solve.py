@@ -211,7 +211,7 @@ def test_simulate_on_a_true_system_of_its_own(spec):
 @pytest.mark.parametrize(
     ("words", "overrides"),
     [
-        ("compares the design with white", ["simulation.compare=[prbs]"]),
+        ("compared with white inputs", ["simulation.compare=[prbs]"]),
         ("model-reference and internal-model", [f"{CONTROL}={{minimum_variance: true}}"]),
         ("least squares", ["noise.C=[1, 0.5]"]),
         ("relative_std", ["simulation.noise={relative_std: 0.1}"]),

@@ -48,6 +48,7 @@ def test_example_4_and_figure_2(alpha):
     assert 0.0 <= gap(found, found.energy) <= 1.1e-6
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("alpha", [1.0, 1.2, 3.0])
 def test_example_4_is_infeasible_from_alpha_one(alpha):
     with pytest.raises(OutOfReachError) as error:
