@@ -35,7 +35,7 @@ COMMON = (
 )
 # A sentence of a hint, and what it asks for.
 ADVICE = {
-    r"with (\d+) samples a spectrum can": ["experiment.samples={}"],
+    r"with experiment\.samples: (\d+) a spectrum can": ["experiment.samples={}"],
     r"a spectrum can keep errors (\S+) times": ["accuracy.model_error.relative={}"],
     r"needs input power >= (\S+), limit": ["limits.input_power={}"],
     r"needs output power >= (\S+), limit": ["limits.output_power={}"],
