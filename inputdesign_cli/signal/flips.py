@@ -238,7 +238,12 @@ class FlipSearch:
                 best = point
         return np.repeat(best.values, self._hold, axis=0), best.ratio
 
-    def _keeps(self, values: Array) -> bool:
+    def ratio(self, values: Array) -> float:
+        """Return the worst ratio of values (n, r) at all plants; infinite if they excite too little."""
+        return self._at(values).ratio
+
+    def keeps(self, values: Array) -> bool:
+        """Return whether values (n, r) keep to the limits beside their levels."""
         return self._allowed is None or self._allowed(np.repeat(values, self._hold, axis=0))
 
     def _at(self, values: Array) -> _Point:
@@ -298,7 +303,7 @@ class FlipSearch:
             values = point.values.copy()
             values.ravel()[order] = wanted.ravel()[order]
             point = self._at(values)
-            if point.ratio < best.ratio and self._keeps(values):
+            if point.ratio < best.ratio and self.keeps(values):
                 best = point
         return best
 
@@ -361,7 +366,7 @@ class FlipSearch:
             values = point.values.copy()
             for channel, first, steps in changes:
                 values[first : first + len(steps), channel] += steps
-            if self._keeps(values):
+            if self.keeps(values):
                 return _Point(values, psis, informations, self._worst(informations))
         return None
 

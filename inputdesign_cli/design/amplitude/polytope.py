@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
+from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
@@ -86,6 +87,8 @@ class LagPolytope:
 
     def density_of(self, form: Array, w: Array) -> NDArray:
         """Return the density (n, r, r) whose mean over a spectrum is the form (m, r, r) of its lags."""
+        if form.shape[1] == 1:  # a sum of cosines, by the recurrence of Clenshaw
+            return chebval(np.cos(self.hold * w), weighted(form)[:, 0, 0])[:, None, None]
         turns = np.exp(-1j * self.hold * np.multiply.outer(w, np.arange(len(form))))
         half = np.tensordot(turns[:, 1:], form[1:], axes=1)
         return form[0] + half + half.conj().swapaxes(1, 2)

@@ -37,8 +37,8 @@ from inputdesign_cli.spectrum import Functional, weighted_mean
 # the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
 # what only it prices would then set the scale: the largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
-# More for power gives a price that all but vanishes somewhere a finite unit: these shares are tried.
-_FORM_SHARES = (1e-5, 1e-4, 1e-3)
+# A price that all but vanishes somewhere has a finite unit only with more for power: these are tried.
+_FORM_SHARES = (1e-6, 1e-5, 1e-4, 1e-3)
 _LIFT = 1e-12
 _TINY = np.finfo(float).tiny
 
@@ -49,8 +49,8 @@ class Certificate:
 
     `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
     on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
-    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of which the
-    largest is paid. `form` (m, r, r) is the part of the price that limits on the amplitude have, a form of the
+    the inequality is tightest (see `spectrum.Pricing`). `costs` weigh the costs of which the
+    largest is paid. `form` (m, r, r) is the price of the amplitude, a form of the
     lags of the excitation; signals within the amplitude take at most `form_share` of it.
     """
 
@@ -82,11 +82,10 @@ def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certifi
     for cut in proof.cuts:
         weights[cut.scenario] += cut.weight
     value = problem.value(weights)
-    found = _certified(problem, proof, weights, value, rows, _LEAST_SHARES[0])
-    if problem.goal == "cost":
-        return found
     formed = problem.polytope is not None
-    for share in (*_LEAST_SHARES[1:], *(_FORM_SHARES if formed else ())):
+    first, *others = _FORM_SHARES if formed else _LEAST_SHARES
+    found = _certified(problem, proof, weights, value, rows, first)
+    for share in others if problem.goal != "cost" else ():
         other = _certified(problem, proof, weights, value, rows, share)
         if other.bound > found.bound:
             found = other

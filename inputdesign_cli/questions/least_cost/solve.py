@@ -31,7 +31,14 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions.common.bound import Informed, equal_white
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
-from inputdesign_cli.questions.common.record import Made, designed_spectrum, peak_at, redrawn, worst_ratio
+from inputdesign_cli.questions.common.record import (
+    Made,
+    design_cost,
+    designed_spectrum,
+    peak_at,
+    redrawn,
+    worst_ratio,
+)
 from inputdesign_cli.questions.common.searched_record import distance_to_best
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
@@ -228,8 +235,10 @@ class ConvexTask(SpectrumTask):
         )
         if exact is not None and known is not None:
             signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
-        if known is not None and design is done.design:
-            signal = replace(signal, distance_to_best=distance_to_best(done.design, known))
+        if known is not None:
+            cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)
+            distance = distance_to_best(done.design, record, known, cost)
+            signal = replace(signal, distance_to_best=distance)
         if made.input_power is None:
             return signal
         return replace(signal, spectrum_of={"input_power": made.input_power})
