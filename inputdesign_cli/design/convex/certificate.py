@@ -38,7 +38,7 @@ from inputdesign_cli.spectrum import Functional, weighted_mean
 # what only it prices would then set the scale: the largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
 # A price that all but vanishes somewhere has a finite unit only with more for power: these are tried.
-_FORM_SHARES = (1e-6, 1e-5, 1e-4, 1e-3)
+_FORM_SHARES = (1e-4, 1e-3)
 _LIFT = 1e-12
 _TINY = np.finfo(float).tiny
 

@@ -50,6 +50,8 @@ from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.questions.least_cost.sought import Sought
 from inputdesign_cli.signal.selection import Record
 
+_NEAR = 0.05  # of the best record there is: nothing is worth a note
+
 
 @dataclass(frozen=True, kw_only=True)
 class ConvexTask(SpectrumTask):
@@ -213,9 +215,9 @@ class ConvexTask(SpectrumTask):
             *length_of_record(record, asked, block, shares),
         ]
         if known is not None:
-            # The distance to the best record says more, where it is known.
             spectral = problem.goal == "factor" and problem.demands.criterion is None
-            if spectral and signal.distance_to_best is None:
+            near = signal.distance_to_best is not None and signal.distance_to_best <= _NEAR
+            if spectral and not near:  # a record that is near the best there is needs no other
                 designed = float(np.sqrt(done.design.result.objective))
                 findings += less_accurate(record.worst_ratio, designed)
             names = list(dict.fromkeys(requirement.name for requirement in problem.side))

@@ -69,7 +69,7 @@ class Signal(Section):
     )
     periods: Samples | None = optional("Number of equal periods.")
     hold: Samples | None = optional("Samples for which each value is held.")
-    tolerance: fields.Tolerance = Field(
+    tolerance: fields.Fraction = Field(
         default=0.02,
         description="A search for the best record within limits.amplitude ends this near to its bound "
         "(default 0.02).",
