@@ -58,7 +58,7 @@ def test_no_cycle_has_a_larger_mean(seed: int) -> None:
 
 @pytest.mark.parametrize(("c1", "c2"), [(0.3, -0.2), (-0.8, 0.1), (0.5, -0.9), (0.9, 0.9)])
 def test_gauge_of_three_lags_is_the_known_polytope(c1: float, c2: float) -> None:
-    """Signs have 1 + c_2 >= 2 |c_1|, |c_2| <= 1: the correlation polytope of three signs [ziegler-1997]."""
+    """Three signs have s_1 s_2 + s_2 s_3 + s_1 s_3 >= -1, so that 1 + c_2 >= 2 |c_1|; and |c_2| <= 1."""
     polytope = LagPolytope(Windows.within(np.array([2.0]), 3))
     multiple, face = polytope.gauge(4.0 * np.array([1.0, c1, c2]).reshape(3, 1, 1))
     # The least c_0 / a^2 with c_0 + c_2 >= 2 |c_1| and c_0 >= |c_2|, c_0 >= 1.
