@@ -136,7 +136,8 @@ class OverFrequency(Requirement):
 
     def ratios(self, information: Array, frequencies: Array) -> Array:
         """Return the ratio (n,) at given frequencies."""
-        return self.measure(turned(self.rows(frequencies), inverse_factor(information).T), frequencies)
+        rows = self._last.rows_at(frequencies, self.rows)
+        return self.measure(turned(rows, inverse_factor(information).T), frequencies)
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """Return local maxima of the ratio over the band, polished between the grid points."""

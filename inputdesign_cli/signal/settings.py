@@ -64,6 +64,8 @@ class SignalSettings:
         lines: harmonics of a period that are used.
         periods: the number of equal periods in the record.
         hold: each value stands for this many samples.
+        tolerance, seconds: a search for the best record ends this near to the bound over all records, or
+            after this time.
         ramp: samples over which the record fades in and out.
         bits: register of a pseudo-random sequence.
         number: levels of steps.
@@ -77,6 +79,8 @@ class SignalSettings:
     lines: Selection = None
     periods: int = 1
     hold: int = 1
+    tolerance: float = 0.02
+    seconds: float = 10.0
     ramp: int = 0
     bits: int | None = None
     number: int | None = None

@@ -54,6 +54,8 @@ def least_scale(problem: Problem, z: Array) -> float:
     ]
     breaches = problem.density_breaches(z, 1.0, above=-np.inf) if problem.densities else []
     used += [breach.ratio for breach in breaches if problem.densities[breach.place.limit].upper]
+    if problem.polytope is not None:
+        used.append(problem.amplitude_facet(z)[0])
     return max(used, default=0.0)
 
 
@@ -134,6 +136,8 @@ def excess(problem: Problem, candidate: Candidate) -> float:
         share = functional.at(z) / level if level > 0 else 2.0
         ratios.append(share if limit.upper else 2.0 - share)
     ratios += [breach.ratio for breach in problem.density_breaches(z, s, above=-np.inf)]
+    if problem.polytope is not None:
+        ratios.append(problem.amplitude_facet(z)[0] / problem.bound_factor(True, s))
     return max(ratios, default=0.0) - 1.0
 
 

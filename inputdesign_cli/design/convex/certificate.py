@@ -30,12 +30,16 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.gradients import weighty_ones
 from inputdesign_cli.design.convex.master import Proof, Row
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum import Functional, weighted_mean
 
 # Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs
 # the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
 # what only it prices would then set the scale: the largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
+# A price that all but vanishes somewhere has a finite unit only with more for power: these are tried.
+_FORM_SHARES = (1e-4, 1e-3)
+_LIFT = 1e-12
 _TINY = np.finfo(float).tiny
 
 
@@ -45,8 +49,9 @@ class Certificate:
 
     `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
     on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
-    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of which the
-    largest is paid.
+    the inequality is tightest (see `spectrum.Pricing`). `costs` weigh the costs of which the
+    largest is paid. `form` (m, r, r) is the price of the amplitude, a form of the
+    lags of the excitation; signals within the amplitude take at most `form_share` of it.
     """
 
     bound: float
@@ -56,6 +61,8 @@ class Certificate:
     price: Functional | None = None
     value: Functional | None = None
     costs: Array = field(default_factory=lambda: np.ones(1))
+    form: NDArray[np.float64] | None = None
+    form_share: float = 0.0
 
     @property
     def shares(self) -> Array:
@@ -75,14 +82,15 @@ def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certifi
     for cut in proof.cuts:
         weights[cut.scenario] += cut.weight
     value = problem.value(weights)
-    found = _certified(problem, proof, weights, value, rows, _LEAST_SHARES[0])
-    if problem.goal == "cost":
-        return found
-    for share in _LEAST_SHARES[1:]:
+    formed = problem.polytope is not None
+    first, *others = _FORM_SHARES if formed else _LEAST_SHARES
+    found = _certified(problem, proof, weights, value, rows, first)
+    for share in others if problem.goal != "cost" else ():
         other = _certified(problem, proof, weights, value, rows, share)
-        if other.bound <= found.bound:
+        if other.bound > found.bound:
+            found = other
+        elif not formed:
             break
-        found = other
     return found
 
 
@@ -116,6 +124,12 @@ def _certified(
     # Of several costs each is that of a plant; their densities are looked at where they may change fast.
     paid = np.flatnonzero(proof.costs) if proof.costs.size > 1 else np.zeros(0, dtype=int)
     grid = problem.gradients.grid_of(sorted({*weighty_ones(weights), *paid.tolist()}))
+    lift = lifted = 0.0
+    if any(row.form is not None for row in rows):
+        grid = problem.with_form_grid(grid)
+        price, lift = _lifted(problem, price, grid)
+        lifted = lift * problem.amplitude_power
+        upper += lifted
     pricing = problem.basis.price(price, value, grid)
     gain = required - float(np.sum(weights * problem.fixed_information)) + fixed_lower
     t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
@@ -127,6 +141,7 @@ def _certified(
         bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
     if bound <= 0.0:
         t = 0.0
+    forms = [(row, w) for row, w in zip(rows, of_rows, strict=True) if row.form is not None]
     shares = np.zeros(len(problem.limits))
     for row, w in zip(rows, of_rows, strict=True):
         if row.limit is not None:
@@ -139,7 +154,32 @@ def _certified(
         price=price * unit,
         value=value * (t * unit),
         costs=proof.costs,
+        form=unit * _raised(sum(w * row.form for row, w in forms), lift) if forms else None,
+        form_share=unit * (lifted + sum(w * row.bound for row, w in forms)),
     )
+
+
+def _lifted(problem: Problem, price: Functional, grid: Array) -> tuple[Functional, float]:
+    """Return the price with so much for power that it is nowhere negative, and how much that is.
+
+    A form of the lags may fall below zero, where nothing would pay.
+    """
+
+    def below(w: Array) -> Array:
+        density = price.density(w)
+        return -density if density.ndim == 1 else -np.linalg.eigvalsh(density)[:, 0]
+
+    on_grid = below(grid)
+    size = float(np.abs(on_grid).max())
+    _, depths = local_maxima(below, grid, on_grid)
+    lift = max(float(np.max(depths, initial=0.0)), float(on_grid.max()), 0.0) + _LIFT * size
+    return price + problem.power("excitation") * lift, lift
+
+
+def _raised(form: NDArray[np.float64], lift: float) -> NDArray[np.float64]:
+    raised = form.copy()
+    raised[0] += lift * np.eye(form.shape[1])
+    return raised
 
 
 def _kept(rows: Sequence[Row], weights: Array, share: float) -> Array:

@@ -19,6 +19,7 @@ from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedErr
 from inputdesign_cli.design.convex.feasible import KEEPS, solve_limited
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.record_bound import RecordBound
 from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 
@@ -34,7 +35,7 @@ class Design:
     the inputs and meets the same requirements (or exhausts the same limits). `white_power` is its power;
     `white_within` says whether it keeps to the limits. `any_spectrum` solves the same problem over all
     spectra. Its certificate bounds every excitation (limits on the density left out). It is None if it was
-    not requested or if time ran out.
+    not requested or if time ran out. `any_record` bounds all records within an amplitude, where it is known.
     """
 
     problem: Problem
@@ -43,6 +44,7 @@ class Design:
     white_within: bool
     result: ExchangeResult
     any_spectrum: ExchangeResult | None
+    any_record: RecordBound | None = None
 
 
 class UnfinishedDesignError(OutOfTimeError):

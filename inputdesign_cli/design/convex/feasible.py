@@ -133,11 +133,12 @@ def solve_limited(
         UnfinishedError: with a design that keeps the limits.
         OutOfTimeError: none that does is known yet.
     """
-    floors, limited = problem.has_floors, bool(problem.limits or problem.densities)
+    floors = problem.has_floors
+    limited = bool(problem.limits or problem.densities or problem.polytope)
     free: ExchangeResult | None = None
     if problem.goal == "cost" and limited and not floors:
         # Limits that the cheapest design keeps anyway cost nothing.
-        unlimited = replace(problem, limits=(), densities=(), finer=problem)
+        unlimited = replace(problem, limits=(), densities=(), polytope=None, finer=problem)
         try:
             free = exchange(unlimited, start, tolerance=tolerance, known=known)
         except UnfinishedError as ended:
@@ -170,7 +171,7 @@ def _within_limits(
 def _known_within_limits(problem: Problem, start: Array, free: ExchangeResult) -> ExchangeResult | None:
     if _keeps_limits(problem, free):
         return _unweighted(problem, free)
-    even = scaled_up(replace(problem, limits=(), densities=(), finer=problem), start, 0.0, [])
+    even = scaled_up(replace(problem, limits=(), densities=(), polytope=None, finer=problem), start, 0.0, [])
     found = replace(
         free,
         basis=problem.basis,

@@ -46,6 +46,7 @@ class Row:
     upper: bool
     limit: int | None = None
     density: DensityPlace | None = None
+    form: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.amplitude.polytope import Facet, LagPolytope
+from inputdesign_cli.design.amplitude.windows import weighted
 from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.gradients import Gradients, weighty_ones
@@ -34,6 +36,7 @@ from inputdesign_cli.information import Experiment, PowerKind, joint_information
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
 
+_RIPPLE = 16  # points of the grid a lag
 Goal = Literal["cost", "factor", "samples"]
 
 
@@ -75,6 +78,7 @@ class Problem:
     floors_fixed: bool = False
     others: tuple[Scenario, ...] = field(default=(), repr=False)
     paid: Paid = "nominal"
+    polytope: LagPolytope | None = field(default=None, repr=False)
     finer: Problem | None = field(default=None, repr=False)
     seen: Demands | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
@@ -308,6 +312,48 @@ class Problem:
             w, _ = local_maxima(ratio, grid, ratio(grid), above=above)
             found += breaches_at(limit, index, self.basis.density(x, w) / factor, w, above=above)
         return found
+
+    def form(self, form: NDArray[np.float64]) -> Functional:
+        """Return a quadratic form (m, r, r) of the lags of the excitation as a functional of the spectrum."""
+        polytope = self.polytope
+        assert polytope is not None
+
+        def density(w: Array) -> Array:
+            return self.experiment.squeezed(polytope.density_of(form, w))
+
+        vector = np.tensordot(self._lag_maps, weighted(form), axes=3)
+        return Functional(vector, density)
+
+    @cached_property
+    def _lag_maps(self) -> NDArray[np.float64]:
+        """Return the autocovariances of each basis function, (size, m, r, r)."""
+        assert self.polytope is not None
+        found = self.basis.integrals(self.polytope.lag_densities, self.experiment.singularities)
+        inputs = self.experiment.inputs
+        return found.reshape(len(found), -1, inputs, inputs)
+
+    def with_form_grid(self, grid: Array) -> Array:
+        """Return the grid with frequencies that see every ripple of forms of the lags."""
+        assert self.polytope is not None
+        if self._form_grids.get(grid.size) is None:
+            ripples = np.linspace(grid[0], grid[-1], _RIPPLE * self.polytope.windows.length)
+            self._form_grids[grid.size] = np.union1d(grid, ripples)
+        return self._form_grids[grid.size]
+
+    @cached_property
+    def _form_grids(self) -> dict[int, Array]:
+        return {}
+
+    @property
+    def amplitude_power(self) -> float:
+        """Return the largest power of signals within the amplitude, of all channels together."""
+        assert self.polytope is not None
+        return float(np.max(np.sum(self.polytope.windows.letters**2, axis=1)))
+
+    def amplitude_facet(self, z: Array) -> tuple[float, Facet]:
+        """Return the gauge of the lags of a spectrum within the amplitude, and the facet that shows it."""
+        assert self.polytope is not None
+        return self.polytope.gauge(np.tensordot(z, self._lag_maps, axes=1))
 
     @cached_property
     def _fine_grid(self) -> Array:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, Violation
 from inputdesign_cli.arrays import Array
@@ -102,11 +103,16 @@ class State:
                 self.best = min(self.best, scaled_up(problem, z, s, places), key=lambda c: c.objective)
         self._add(_most_violated(problem, found, self.keys))
         self._add_rows(breaches)
+        if problem.polytope is not None:
+            facet = problem.amplitude_facet(z)[1]
+            if facet.share > problem.bound_factor(True, s):
+                problem.polytope.forms.append(facet.form)
+                self.rows.append(form_row(problem, facet.form))
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
             self._grow(problem.grown(basis))
         same = self.face is face and self.best is best and len(self.cuts) == cuts
-        if same and not (moves or breaches):
+        if same and not (moves or breaches or problem.polytope):
             return False  # the next round would solve the same program
         better = self.best.objective < 0.9 * before[0] or self.certificate.bound > 1.1 * before[1]
         return answer.converged or better
@@ -229,6 +235,8 @@ def first_state(problem: Problem, start: Array, interior: Array | None, known: S
         state._add(_most_violated(problem, close, state.keys))
     if problem.densities:
         state.rows += first_density_rows(problem)
+    if problem.polytope is not None:
+        state.rows += [form_row(problem, form) for form in problem.polytope.forms]
     return state
 
 
@@ -287,6 +295,11 @@ def density_row(problem: Problem, place: DensityPlace) -> Row:
     return Row(problem.density_at(place), level, limit.upper, density=place)
 
 
+def form_row(problem: Problem, form: NDArray[np.float64]) -> Row:
+    """Return the row of a form of the lags that signals within the amplitude do not take beyond one."""
+    return Row(problem.form(form), 1.0, True, form=form)
+
+
 def first_density_rows(problem: Problem) -> list[Row]:
     """Return rows to begin with: spread over the band, along each channel and pair of channels."""
     w = np.linspace(*problem.experiment.band, 2 * (problem.basis.degree + 1) + _MORE)
@@ -303,6 +316,8 @@ def on_basis(problem: Problem, row: Row) -> Row:
     """Return the row for the basis of `problem`."""
     if row.limit is not None:
         return replace(row, functional=problem.limit_functionals[row.limit])
+    if row.form is not None:
+        return form_row(problem, row.form)
     assert row.density is not None
     return density_row(problem, row.density)
 

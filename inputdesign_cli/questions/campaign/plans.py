@@ -216,6 +216,7 @@ class Planner:
 
     def _designed(self, model: Model | None, change: Change) -> _Found:
         task = self.designs.at(model, change)
+        task = replace(task, asked=replace(task.asked, windows=0))  # a part is not the whole record
         kind: PlanKind = "white" if change.white else "nominal" if task.asked.plants is None else "robust"
         return _Found(task, task.designed(), kind)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.signal.evaluation import MET, Target
+from inputdesign_cli.questions.common.searched_record import LevelSearch, searches
+from inputdesign_cli.signal.evaluation import MET, Target, least_level
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.limits import Bounds, limited_responses, peak_share
 from inputdesign_cli.signal.lines import DesignedSpectrum
@@ -120,12 +121,7 @@ def make_record(
     feasible = request.feasible(experiment_samples, least_period(experiment.inputs))
     if not design.result.x.any() or not feasible:
         return None
-    upper = tuple(
-        (limit.kind, limit.channel, limit.bound)
-        for limit in problem.limits
-        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single ones are limited
-    )
-    bounds = replace(request.bounds, powers=upper)
+    bounds = _with_powers(request.bounds, design)
     meets = problem.goal != "factor" and request.meets
     plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
@@ -154,12 +150,88 @@ def make_record(
         least = max(record.worst_ratio, MET) if meets else record.worst_ratio
         left = [n for n in range(len(plants)) if n not in numbers]
         missed = _worst_few({n: ratio_at(others[n], scores[n], record.samples) for n in left}, least)
-        beyond = _worst_few({n: _power_share(others[n], upper, record) for n in left if n not in missed}, MET)
+        beyond = _worst_few(
+            {n: _power_share(others[n], bounds.powers, record.samples) for n in left if n not in missed}, MET
+        )
         higher = beyond_peaks(record.samples, [n for n in others if n not in limiting])
         if not (missed or beyond or higher):
+            if problem.goal != "samples" and searches(design, settings):
+                return _searched(request, design, record)
             return record
         numbers += [*missed, *beyond]
         limiting += higher
+
+
+def _with_powers(bounds: Bounds, design: Design) -> Bounds:
+    """Return the bounds with the upper limits of a design on powers."""
+    upper = (
+        (limit.kind, limit.channel, limit.bound)
+        for limit in design.problem.limits
+        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single ones are limited
+    )
+    return replace(bounds, powers=tuple(upper))
+
+
+def level_search(request: RecordRequest, design: Design) -> LevelSearch:
+    """Return the search for records of a few levels within the limits of the request, at every plant."""
+    bounds, scenarios = _with_powers(request.bounds, design), design.problem.scenarios
+
+    def cost(samples: Array) -> float:
+        plant = plants(len(samples))[0]
+        each = ((np.asarray(weight), kind) for kind, weight in request.cost.items())
+        return float(sum(np.sum(weight * plant.mean_squares(kind, samples)) for weight, kind in each))
+
+    @cache
+    def plants(samples: int) -> list[FiniteRecord]:
+        each = (replace(scenario.experiment, samples=samples) for scenario in scenarios)
+        return [FiniteRecord(plant, samples, request.step) for plant in each]
+
+    def allowed(samples: Array) -> bool:
+        if max(bounds.shares(samples).values(), default=0.0) > MET:
+            return False
+        each = plants(len(samples))
+        powers = max(_power_share(plant, bounds.powers, samples) for plant in each)
+        return powers <= MET and max(peak_share(plant, bounds, samples) for plant in each) <= MET
+
+    others = bounds.output is not None or bounds.rate is not None
+    depends = any(design.problem.experiment.depends_on_plant(kind) for kind, _, _ in bounds.powers)
+    plain = not (others or depends or bounds.quantisers)
+    amplitude = bounds.amplitude if plain and _affords(bounds) else None
+    return LevelSearch(
+        design, request.settings, plants, cost, amplitude, allowed if others or depends else None
+    )
+
+
+def _affords(bounds: Bounds) -> bool:
+    """Return whether the limits on the power of the inputs admit all of the amplitude."""
+    squares = np.zeros(1) if bounds.amplitude is None else bounds.amplitude**2
+    return all(
+        (squares.sum() if channel is None else squares[channel]) <= most * MET
+        for _, channel, most in bounds.powers
+    )
+
+
+def _searched(request: RecordRequest, design: Design, record: Record) -> Record:
+    """Return the best record of a few levels that a search finds, at the level that it needs."""
+    search = level_search(request, design)
+    samples = search.best(record.samples)
+    found = of_samples(search, record, samples)
+    if design.problem.goal == "factor" or found.worst_ratio > MET:
+        return found if found.worst_ratio < record.worst_ratio else record
+    if not request.bounds.quantisers:
+        level = least_level(lambda level: of_samples(search, record, level * samples).worst_ratio, 1.0)
+        found = of_samples(search, record, min(level, 1.0) * samples)
+    extra = search.cost(found.samples) / design_cost(design, request.cost) - 1.0
+    cheaper = not record.met or extra < record.extra_power
+    return replace(found, extra_power=extra, met=True) if cheaper else record
+
+
+def of_samples(search: LevelSearch, record: Record, samples: Array) -> Record:
+    """Return a record with the samples (n, r) that a search has found, and their worst ratio."""
+    scores = [_score(scenario.requirements) for scenario in search.design.problem.scenarios]
+    each = zip(search.plants(len(samples)), scores, strict=True)
+    worst = max(ratio_at(plant, score, samples) for plant, score in each)
+    return replace(record, samples=samples, worst_ratio=worst)
 
 
 def _target(
@@ -208,11 +280,11 @@ def ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Array
 
 
 def _power_share(
-    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
+    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Array
 ) -> float:
     """Return the largest share of a power limit that a record uses at a plant, where it depends on it."""
     powers = {
-        kind: plant.mean_squares(kind, record.samples)
+        kind: plant.mean_squares(kind, record)
         for kind, _, _ in limits
         if plant.experiment.depends_on_plant(kind)
     }

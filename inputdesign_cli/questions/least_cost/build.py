@@ -86,6 +86,7 @@ def build_convex(spec: Spec) -> ConvexTask:
             reach,
             grid,
             _few_columns(spec, basis),
+            windows=solver.windows,
         ),
         header=build_header(spec),
         record=build_record_request(spec, experiment.size),

@@ -189,6 +189,7 @@ def _objective(design: Design) -> out.Objective:
     found, anything = design.result, design.any_spectrum
     value, bound = found.objective, found.certificate.bound
     any_bound = 0.0 if anything is None else anything.certificate.bound
+    of_records = None if design.any_record is None else design.any_record.bound
     proved, proved_of_any = (b > 0.0 or value == 0.0 for b in (bound, any_bound))
     criterion, goal = design.problem.demands.criterion, design.problem.goal
     if goal == "factor" and criterion is not None:
@@ -202,6 +203,7 @@ def _objective(design: Design) -> out.Objective:
             upper_bound=upper,
             relative_gap=None if upper is None else abs(upper - reached) / size,
             any_spectrum_bound=criterion.value(1.0 / max(any_bound, 1e-300)) if proved_of_any else None,
+            any_record_bound=None if of_records is None else criterion.value(1.0 / of_records),
         )
     if goal == "factor":
         value, bound, any_bound = (float(np.sqrt(v)) for v in (value, bound, any_bound))
@@ -211,6 +213,7 @@ def _objective(design: Design) -> out.Objective:
         lower_bound=bound,
         relative_gap=abs(value - bound) / value if value > 0 else 0.0,
         any_spectrum_bound=any_bound if proved_of_any else None,
+        any_record_bound=float(np.sqrt(of_records)) if of_records and goal == "factor" else of_records,
     )
 
 

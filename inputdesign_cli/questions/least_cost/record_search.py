@@ -18,7 +18,9 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.record_bound import RecordBound, bound_over_records
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.findings.designed_records import other_signal, other_spectrum
 from inputdesign_cli.questions.common.infeasible import no_record, refuse_too_short
@@ -27,9 +29,13 @@ from inputdesign_cli.questions.common.record import (
     RecordRequest,
     design_cost,
     least_period,
+    level_search,
     make_record,
+    of_samples,
     ratio_before,
 )
+from inputdesign_cli.questions.common.searched_record import searches
+from inputdesign_cli.signal.evaluation import MET
 from inputdesign_cli.signal.selection import LONG, Record
 
 # Lengths that are looked into: times the one that was asked for, or that many samples.
@@ -65,6 +71,8 @@ _TOLERANCE = 1e-5
 _ENOUGH = 3
 # No record of a length is made if its pilot needs more than this multiple of that length.
 _FAR_FROM = 1.03
+# The longest windows of the bound that proves that no record can.
+_WINDOWS = 12
 _WORDS = {
     "filtered_noise": "noise",
     "multisine": "a multisine",
@@ -217,11 +225,22 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
     """Return the record of the design; where none is found that meets the accuracy, one that does.
 
     Tried are spectra of less input power, and other kinds of signals; for a shortest experiment longer
-    records. A kind that the spec states is not replaced: the error names the one that would do.
+    records. A kind that the spec states is not replaced: the error names the one that would do. A shortest
+    record of a few levels is shortened by a search.
 
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
     """
+    made = _first_fitting(request, question, design, samples)
+    sought = question.goal == "samples" and request.samples is None
+    if not sought or made.record is None or not searches(design, made.request.settings):
+        return made
+    search = level_search(made.request, design)
+    return replace(made, record=of_samples(search, made.record, search.shortest(made.record.samples)))
+
+
+def _first_fitting(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:
+    """Return the record of the design, of another spectrum, of another kind, or a longer one."""
     sought = question.goal == "samples" and request.samples is None
     if sought:
         # A spectrum may take fewer samples than any record has.
@@ -251,7 +270,9 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
     if sought:
         return _longer(request, question, design, misses, len(record.samples), tried, remedy)
     before = ratio_before(design, request.step)
-    raise _refusal(request, record, min(reach(one, before) for one in misses), tried, remedy)
+    proof = _impossible(request, question, len(record.samples))
+    needed = min(reach(one, before) for one in misses)
+    raise _refusal(request, record, needed, tried, remedy, proof)
 
 
 def _others(
@@ -327,11 +348,34 @@ def _longer(
     if len(missed.samples) != samples:
         one = replace(request, settings=replace(request.settings, candidates=1, most_candidates=1))
         missed = make_record(one, design, samples) or missed
-    raise _refusal(request, missed, search.needed, tried or Counter(), remedy)
+    known = design.any_record
+    proof = f"no record of fewer than {known.bound:.0f} samples can" if known and allowed else ""
+    raise _refusal(request, missed, search.needed, tried or Counter(), remedy, proof)
+
+
+def _impossible(request: RecordRequest, question: Question, samples: int) -> str:
+    """Return the proof that no record of this length within the amplitude can meet the accuracy, or nothing.
+
+    The best accuracy of all records is bounded, and so is the number of samples that meet it.
+    """
+
+    def bounded(goal: Goal, length: int) -> RecordBound | None:
+        best = solve_design(replace(question.of_length(length), goal=goal), tolerance=_TOLERANCE)
+        if best.any_spectrum is None or best.problem.demands.criterion is not None:
+            return None
+        hold = request.settings.hold
+        return bound_over_records(best.problem, best.any_spectrum, samples, windows=_WINDOWS, hold=hold)
+
+    reached = bounded("factor", samples)
+    if reached is None or reached.bound <= MET:
+        return ""
+    proof = f"no record of {samples} samples can, the best has r_u / r_adm = {np.sqrt(reached.bound):.4g}"
+    least = bounded("samples", 1)
+    return proof if least is None else f"{proof}; {least.bound:.0f} samples at least are needed"
 
 
 def _refusal(
-    request: RecordRequest, missed: Record, needed: float, tried: Counter[str], remedy: str
+    request: RecordRequest, missed: Record, needed: float, tried: Counter[str], remedy: str, proof: str
 ) -> InfeasibleError:
     """Return the error that no record was found, with what was tried and about how many samples would do."""
     best = "excites every parameter"
@@ -340,6 +384,7 @@ def _refusal(
         best = f"meets the accuracy: the best of those tried reaches {reached}"
     kinds = [f"{kind} of {count} {'spectrum' if count == 1 else 'spectra'}" for kind, count in tried.items()]
     best += f"; tried besides: {', '.join(kinds)}" if kinds else ""
+    best += f"; proved: {proof}" if proof else ""
     hint = "raise the limits, or loosen the accuracy"
     if np.isfinite(needed):
         hint += f": a record of the kinds that were tried would take about {needed:.3g} samples"

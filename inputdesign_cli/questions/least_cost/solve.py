@@ -31,7 +31,15 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions.common.bound import Informed, equal_white
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
-from inputdesign_cli.questions.common.record import Made, designed_spectrum, peak_at, redrawn, worst_ratio
+from inputdesign_cli.questions.common.record import (
+    Made,
+    design_cost,
+    designed_spectrum,
+    peak_at,
+    redrawn,
+    worst_ratio,
+)
+from inputdesign_cli.questions.common.searched_record import distance_to_best
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.questions.common.task import SpectrumTask
@@ -41,6 +49,8 @@ from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.questions.least_cost.sought import Sought
 from inputdesign_cli.signal.selection import Record
+
+_NEAR = 0.05  # of the best record there is: nothing is worth a note
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,7 +215,9 @@ class ConvexTask(SpectrumTask):
             *length_of_record(record, asked, block, shares),
         ]
         if known is not None:
-            if problem.goal == "factor" and problem.demands.criterion is None:
+            spectral = problem.goal == "factor" and problem.demands.criterion is None
+            near = signal.distance_to_best is not None and signal.distance_to_best <= _NEAR
+            if spectral and not near:  # a record that is near the best there is needs no other
                 designed = float(np.sqrt(done.design.result.objective))
                 findings += less_accurate(record.worst_ratio, designed)
             names = list(dict.fromkeys(requirement.name for requirement in problem.side))
@@ -225,6 +237,10 @@ class ConvexTask(SpectrumTask):
         )
         if exact is not None and known is not None:
             signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
+        if known is not None:
+            cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)
+            distance = distance_to_best(done.design, record, known, cost)
+            signal = replace(signal, distance_to_best=distance)
         if made.input_power is None:
             return signal
         return replace(signal, spectrum_of={"input_power": made.input_power})

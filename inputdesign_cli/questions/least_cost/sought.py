@@ -17,6 +17,7 @@ from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_d
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.record_bound import bound_over_records
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import PowerKind
@@ -35,6 +36,7 @@ from inputdesign_cli.spectrum import PolynomialBasis, flat_basis, hvec, svec
 # The second frequency of a grid that begins at zero, as a share of the last.
 _ABOVE_ZERO = 1e-3
 _STARTS = 3
+_LONGEST = 20_000  # samples of records that are bounded one by one
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,7 @@ class Sought:
     The experiment of the question has one sample if the length is sought. `exact` calibrates `alpha`;
     `plants` are those beside the plant of the spec. `tolerance` is the relative gap that is proved, and
     `any_spectrum_tolerance` that of the bound over every spectrum (None: none). `grid` replaces the exchange.
+    `windows` are the longest of the bound over all records within an amplitude; 0 leaves it out.
     """
 
     header: Header
@@ -132,15 +135,27 @@ class Sought:
     reach: Reach
     grid: GridMethod | None = None
     columns: FewColumns | None = None
+    windows: int = 0
 
     def designed(self, request: RecordRequest) -> Designed:
         """Return the design with its experiment, its status and what the solver did.
 
         It raises `InfeasibleError`, or `InaccurateError` where the proof did not close in time.
         """
-        if self.exact is None:
-            return self._designed(self.question, Confidence(self.alpha, self.alpha))
-        return self.exact.designed(self._designed, request)
+        if self.exact is not None:
+            return self.exact.designed(self._designed, request)
+        done = self._designed(self.question, Confidence(self.alpha, self.alpha))
+        return self._bounded(done, request) if done.excites and self.grid is None else done
+
+    def _bounded(self, done: Designed, request: RecordRequest) -> Designed:
+        """Return the design with its bound over all records within the amplitude, where one is known."""
+        free, samples = done.design.any_spectrum, request.length(done.experiment.samples)
+        if free is None or samples > _LONGEST or (request.samples or samples) != samples:
+            return done
+        bound = bound_over_records(
+            done.design.problem, free, samples, windows=self.windows, hold=request.settings.hold
+        )
+        return replace(done, answer=replace(done.answer, design=replace(done.design, any_record=bound)))
 
     def _designed(self, question: Question, confidence: Confidence) -> Designed:
         solve = partial(

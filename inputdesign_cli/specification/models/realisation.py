@@ -69,6 +69,14 @@ class Signal(Section):
     )
     periods: Samples | None = optional("Number of equal periods.")
     hold: Samples | None = optional("Samples for which each value is held.")
+    tolerance: fields.Fraction = Field(
+        default=0.02,
+        description="A search for the best record within limits.amplitude ends this near to its bound "
+        "(default 0.02).",
+    )
+    seconds: fields.Positive = Field(
+        default=10.0, description="Seconds that such a search may take (default 10)."
+    )
     lines: Annotated[fields.Harmonics, SIZES["signal.lines"]] | None = optional(
         "Harmonics of a period that are used: their number, odd, or a list."
     )
@@ -118,6 +126,9 @@ class Solver(Section):
     any_spectrum: fields.Flag = Field(default=True, description="Whether to bound what other spectra reach.")
     any_spectrum_tolerance: fields.Tolerance = Field(
         default=1e-4, description="Relative gap of the bound over every spectrum."
+    )
+    windows: Annotated[fields.Index, SIZES["solver.windows"]] = Field(
+        default=12, description="Longest windows of the bound over all records (0: no bound)."
     )
     time_limit: fields.Positive = Field(default=600.0, description="Seconds that a design may take.")
     grid: Annotated[fields.Count, SIZES["solver.grid"]] = Field(

@@ -73,6 +73,7 @@ SIZES = {
     "spectrum.factor_columns": Size(20, "a factor has no more columns than there are inputs"),
     "spectrum.grid": Size(100_000, "every frequency has a matrix of its own"),
     "spectrum.given.frequencies": Size(5000, "a number is kept for each pair of lines"),
+    "solver.windows": Size(14, "a window more doubles the work"),
     "solver.grid": Size(2000, "the program has a matrix inequality at every frequency"),
     "accuracy.model_error.confidence.draws": Size(100_000, "every draw is a model of its own"),
     "accuracy.model_error.confidence.runs": Size(100_000, "every run is a record that is identified"),

@@ -1,0 +1,114 @@
+"""Records of two levels within an amplitude: their bound, their distance to it, and what no record can."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.signal.prbs import pseudo_random
+
+B, F = 1.2, -0.6
+ROUGH = "{model_error: {relative: 0.4, band: [0.02, 2.5], alpha: 3}}"
+W = np.geomspace(0.02, 2.5, 4000)
+
+
+def asked(**more):
+    keys = {
+        "plant": f"{{B: [0, {B}], F: [1, {F}]}}",
+        "noise": "{variance: 1.0}",
+        "experiment": "{samples: 60}",
+        "objective": "best_accuracy",
+        "limits": "{amplitude: 1}",
+        "accuracy": "{model_error: {relative: 0.2, band: [0.02, 2.5], alpha: 3}}",
+        "spectrum": "{type: free}",
+        "signal": "{type: binary, seconds: 0.5}",
+        "solver": "{windows: 8}",
+    }
+    return parse_spec("\n".join(f"{key}: {value}" for key, value in {**keys, **more}.items()))
+
+
+def ratio(u, relative=0.2):
+    """The largest r_u/r_adm of a record from rest by a textbook formula on a grid."""
+    rows = [
+        scipy.signal.lfilter([0, 1], [1, F], u),
+        scipy.signal.lfilter([0, 0, -B], np.convolve([1, F], [1, F]), u),
+    ]
+    covariance = np.linalg.inv(np.array(rows) @ np.array(rows).T)
+    q = np.exp(-1j * W)
+    slopes = np.stack([q / (1 + F * q), -B * q**2 / (1 + F * q) ** 2], axis=1)
+    parts = np.stack([slopes.real, slopes.imag], axis=1)
+    spread = np.linalg.eigvalsh(parts @ covariance @ parts.transpose(0, 2, 1))[:, -1]
+    return float(np.max(3 * np.sqrt(spread) / (relative * np.abs(B * q / (1 + F * q)))))
+
+
+def test_the_record_is_as_near_to_the_bound_as_stated_and_beats_every_pseudo_random_sequence():
+    results = solve(asked())
+    objective, signal, u = results.result["objective"], results.result["signal"], results.signal[:, 0]
+    assert set(np.abs(u)) == {1.0}
+    assert ratio(u) == pytest.approx(signal["worst_ratio"], rel=1e-4)
+    assert objective["any_spectrum_bound"] < objective["any_record_bound"] < signal["worst_ratio"]
+    further = signal["worst_ratio"] / objective["any_record_bound"] - 1
+    assert signal["distance_to_best"] == pytest.approx(further, abs=1e-9)
+    assert further < 0.08
+    rng = np.random.default_rng(1)
+    for clock, bits in product((1, 2, 3, 4, 6), range(2, 7)):
+        sequence = np.repeat(pseudo_random(bits, 60, rng), clock)[:60]
+        assert signal["worst_ratio"] <= ratio(sequence) * (1 + 1e-6)
+
+
+def test_held_values_are_searched_as_such():
+    results = solve(asked(signal="{type: binary, hold: 4, seconds: 1}"))
+    u = results.signal[:, 0].reshape(-1, 4)
+    assert np.all(u == u[:, :1])
+    assert results.result["objective"]["any_record_bound"] <= ratio(u.ravel())
+
+
+def test_the_cheapest_record_is_that_of_the_best_shape_at_the_level_that_it_needs():
+    more = {"experiment": "{samples: 200}", "objective": "least_cost", "cost": "{input_power: 1}"}
+    results = solve(asked(**more))
+    objective, u = results.result["objective"], results.signal[:, 0]
+    assert ratio(u) == pytest.approx(1.0, abs=1e-5)
+    cost = np.mean(u**2)
+    assert objective["any_record_bound"] <= cost
+    assert results.result["signal"]["distance_to_best"] == pytest.approx(
+        cost / objective["any_record_bound"] - 1, rel=1e-6
+    )
+
+
+@pytest.mark.slow
+def test_the_shortest_record_is_no_shorter_than_the_bound_and_meets_the_accuracy():
+    results = solve(asked(experiment="{samples: 9}", objective="shortest_experiment", accuracy=ROUGH))
+    least, u = results.result["objective"]["any_record_bound"], results.signal[:, 0]
+    assert ratio(u, 0.4) <= 1.0 + 1e-6
+    assert least <= len(u) <= 1.2 * least
+    assert results.result["signal"]["distance_to_best"] == pytest.approx(len(u) / least - 1)
+
+
+@pytest.mark.slow
+def test_what_no_record_can_is_refused_with_a_proof():
+    more = {"objective": "least_cost", "cost": "{input_power: 1}", "accuracy": ROUGH}
+    with pytest.raises(InfeasibleError) as refused:
+        solve(asked(experiment="{samples: 25}", **more))
+    message = refused.value.diagnostics[0].message
+    assert refused.value.diagnostics[0].code == "limits-too-tight"
+    least = int(message.split("; ")[-1].split()[0])
+    assert 26 <= least <= 32
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"limits": "{input_power: 1}"},
+        {"limits": "{amplitude: 1}", "solver": "{windows: 0}"},
+        {"experiment": "{samples: 60, controller: {numerator: [0.2]}}"},
+    ],
+)
+def test_there_is_no_bound_without_an_amplitude_or_in_a_loop(more):
+    result = solve(asked(**{"signal": "{type: binary}", **more})).result
+    assert "any_record_bound" not in result["objective"]
+    assert "distance_to_best" not in result["signal"]
