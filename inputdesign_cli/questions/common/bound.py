@@ -57,10 +57,10 @@ class Informed:
         tables, curves = dict[str, Table](), dict[str, plots.Curves]()
         with suppress(np.linalg.LinAlgError):  # a parameter that the design does not excite
             tables["bound"], curves["bound"] = self.bound()
-            loops = nyquist_curves(self.units, self.errors[:1], self.information, self.active)
-            tables, curves = tables | loops[0], curves | loops[1]
-        white = self.white if flat else None
-        drawn = experiment_ellipses(experiment, self.information, white, pairs)
+            loop = self._nyquist()
+            if loop is not None:
+                tables["nyquist"], curves["nyquist"] = loop
+        drawn = experiment_ellipses(experiment, self.information, self.white if flat else None, pairs)
         return tables, curves if drawn is None else curves | {"ellipses": drawn}
 
     def of_length(
@@ -117,6 +117,35 @@ class Informed:
             )
         return Table(columns), plots.BoundCurves(tuple(panels), self.of_several)
 
+    def _nyquist(self) -> tuple[Table, plots.NyquistCurves] | None:
+        """Return the loop gain C G with discs of radius |C| r_u; None without a scalar loop.
+
+        The loop is that whose sensitivity is bounded, else that of the experiment.
+        """
+        if not self.errors or not self.units.single:
+            return None
+        error, limiting = self.errors[0], self.active[0] if self.active else np.zeros(0)
+        kept = error.admissible.kept
+        loop = error.experiment.loop if kept is None else kept.loop
+        if loop is None:
+            return None
+        limiting = distinct(limiting, error.band[1])
+        w = axis(*error.band, np.concatenate([error.grid, limiting]))
+        S, applied = (part[:, 0, 0] for part in loop.sensitivity(w))
+        # With integral action S vanishes at frequency zero, where the loop has no end.
+        inside = np.abs(S) > _NOTHING
+        w, S, applied = w[inside], S[inside], applied[inside]
+        L, radius = 1.0 / S - 1.0, np.abs(applied / S) * error.error_bound(self.information, w)
+        frequency = w / self.units.frequency
+        columns = {self.units.frequency_header: frequency, "CG_re": L.real, "CG_im": L.imag, "radius": radius}
+        circle = None
+        if kept is not None:
+            columns["distance_kept"] = np.abs(kept.weight.at(w))
+            lowest, highest = columns["distance_kept"].min(), columns["distance_kept"].max()
+            circle = float(lowest) if highest - lowest <= _ROUNDING * highest else None
+        curves = plots.NyquistCurves(frequency, L, radius, circle, limiting / self.units.frequency)
+        return Table(columns), curves
+
 
 def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
     """Return the information (k, k) of white noise at the design's cost or length; None if limits bind both.
@@ -129,38 +158,6 @@ def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
     share = samples / white.s if problem.goal == "samples" else 1.0 / ratio
     known = problem.fixed_information[0]
     return np.asarray(known + share * (white.informations[0] - known))
-
-
-def nyquist_curves(
-    units: Units, errors: Sequence[OnModelError], information: Array, active: Sequence[Array] = ()
-) -> tuple[dict[str, Table], dict[str, plots.Curves]]:
-    """Return the loop gain C G with discs of radius |C| r_u, by file stem; empty without a scalar loop.
-
-    The loop is that whose sensitivity is bounded, else that of the experiment.
-    """
-    if not errors or not units.single:
-        return {}, {}
-    error, limiting = errors[0], active[0] if active else np.zeros(0)
-    kept = error.admissible.kept
-    loop = error.experiment.loop if kept is None else kept.loop
-    if loop is None:
-        return {}, {}
-    limiting = distinct(limiting, error.band[1])
-    w = axis(*error.band, np.concatenate([error.grid, limiting]))
-    S, applied = (part[:, 0, 0] for part in loop.sensitivity(w))
-    # With integral action S vanishes at frequency zero, where the loop has no end.
-    inside = np.abs(S) > _NOTHING
-    w, S, applied = w[inside], S[inside], applied[inside]
-    L, radius = 1.0 / S - 1.0, np.abs(applied / S) * error.error_bound(information, w)
-    frequency = w / units.frequency
-    columns = {units.frequency_header: frequency, "CG_re": L.real, "CG_im": L.imag, "radius": radius}
-    circle = None
-    if kept is not None:
-        columns["distance_kept"] = np.abs(kept.weight.at(w))
-        lowest, highest = columns["distance_kept"].min(), columns["distance_kept"].max()
-        circle = float(lowest) if highest - lowest <= _ROUNDING * highest else None
-    curves = plots.NyquistCurves(frequency, L, radius, circle, limiting / units.frequency)
-    return {"nyquist": Table(columns)}, {"nyquist": curves}
 
 
 def experiment_ellipses(

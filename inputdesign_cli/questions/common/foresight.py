@@ -53,12 +53,22 @@ class Foresight:
         self, record: Array, requirements: Sequence[Requirement]
     ) -> tuple[Entry | None, list[Finding]]:
         """Return the rivals that fit a record (n, r) (None: not known), with findings on them."""
-        reason = self._not_now(len(record))
+        nominal = self.nominal
+        seconds = _SECONDS * len(record) * nominal.inputs * nominal.model.outputs * len(nominal.model.names)
+        if not self.looks:
+            reason = "solver.any_spectrum: false (or --fast)"
+        elif seconds > _LONGEST:
+            reason = "the record is long"
+        else:
+            try:
+                late = seconds > seconds_left()
+            except OutOfTimeError:
+                late = True
+            reason = f"{what_ended()} left no time" if late else ""
         if reason:
             return None, [not_foreseen(reason)]
         try:
-            estimate, _ = self._searched(record, np.random.default_rng(_SEED))
-            found = self._beyond(record, estimate, requirements)
+            estimate, _, found = self._searched(record, requirements, np.random.default_rng(_SEED))
         except _ENDS:
             return None, []
         entry = Entry(foreseen_entries(self.units, estimate, found))
@@ -70,8 +80,7 @@ class Foresight:
         for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
             tell(Counted("records searched from several starts", done, runs))
             try:
-                estimate, at_home = self._searched(record, rng)
-                found = self._beyond(record, estimate, requirements)
+                _, at_home, found = self._searched(record, requirements, rng)
             except _ENDS:
                 return None
             better = any(one.rival.excess < 0.0 for one in found)
@@ -79,29 +88,18 @@ class Foresight:
             rivals += bool(found)
         return Searched(runs, elsewhere, rivals)
 
-    def _searched(self, record: Array, rng: np.random.Generator) -> tuple[Estimate, bool]:
-        return searched_run(self.nominal, record, self.units.step, rng, self.earlier)
-
-    def _beyond(self, record: Array, estimate: Estimate, requirements: Sequence[Requirement]) -> list[Apart]:
+    def _searched(
+        self, record: Array, requirements: Sequence[Requirement], rng: np.random.Generator
+    ) -> tuple[Estimate, bool, list[Apart]]:
+        """Return a simulated estimate, whether it is the nearest minimum, and the rivals that are apart."""
+        estimate, at_home = searched_run(self.nominal, record, self.units.step, rng, self.earlier)
+        possible = estimate
         if self.knowledge is not None:
             known = tuple(one for one in estimate.search.rivals if self.knowledge.admits(one.theta))
-            estimate = estimate.with_rivals(known)
+            possible = estimate.with_rivals(known)
         model, errors = self.nominal.model.at(estimate.theta), model_errors(requirements)
         if errors:
-            return beyond(model, estimate, errors)
+            return estimate, at_home, beyond(model, possible, errors)
         plant = FiniteRecord(self.nominal, len(record), self.units.step)
         unstated: Sequence[OnModelError] = self.entries
-        return beyond(model, estimate, unstated, plant.information(record))
-
-    def _not_now(self, samples: int) -> str:
-        """Return the reason to search for no rivals; empty if the search is to be done."""
-        if not self.looks:
-            return "solver.any_spectrum: false (or --fast)"
-        nominal = self.nominal
-        seconds = _SECONDS * samples * nominal.inputs * nominal.model.outputs * len(nominal.model.names)
-        if seconds > _LONGEST:
-            return "the record is long"
-        try:
-            return f"{what_ended()} left no time" if seconds > seconds_left() else ""
-        except OutOfTimeError:
-            return f"{what_ended()} left no time"
+        return estimate, at_home, beyond(model, possible, unstated, plant.information(record))

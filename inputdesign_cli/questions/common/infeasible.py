@@ -98,14 +98,17 @@ class Bought:
     def sentence(self) -> str:
         """Return the accuracy within the limits and where it is worst, as a sentence."""
         if self.stated:
-            parts = [
+            buys = " and ".join(
                 f"{one.label} {one.shown(one.loosened(self.factor))} (asked: {one.shown(one.value)})"
                 for one in self.stated
-            ]
-            buys = " and ".join(parts)
+            )
         else:
             buys = f"standard deviations {rounded_up(self.factor, 4)} times as large as it takes"
-        places = [text for text in map(self._place, self._binding) if text]
+        places = []
+        for asked, w in self._binding:
+            entry = self._entry(asked)
+            parts = (f"in entry {entry}" if entry else "", "" if w is None else f"at {self.units.named(w)}")
+            places += filter(None, [" ".join(filter(None, parts))])
         shown = list(dict.fromkeys(places))
         more = ", .." if len(shown) > _MOST_PLACES else ""
         worst = f", worst {' and '.join(shown[:_MOST_PLACES])}{more}" if shown else ""
@@ -114,6 +117,13 @@ class Bought:
     @property
     def details(self) -> dict[str, object]:
         """Return the best accuracy within the limits as data, with frequencies in the user's unit."""
+        worst = []
+        for asked, w in self._binding:
+            requirement, entry, at = asked.requirement, self._entry(asked), np.array([w or 0.0])
+            ratio = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
+            item: dict[str, object] = {"name": requirement.name, "worst_ratio": ratio}
+            item |= {"entry": entry} if entry else {}
+            worst.append(item | ({} if w is None else {"frequency": w / self.units.frequency}))
         return {
             "factor": self.factor,
             "factor_bound": float(np.sqrt(max(self.nearest.certificate.bound, 1.0))),
@@ -121,7 +131,7 @@ class Bought:
                 {"key": bound.key, "asked": bound.value, "bought": bound.loosened(self.factor)}
                 for bound in self.stated
             ],
-            "worst": [self._listed(asked, w) for asked, w in self._binding],
+            "worst": worst,
             "limits": [
                 {
                     "name": limit.key.removeprefix("limits."),
@@ -152,19 +162,6 @@ class Bought:
         """Return the entry of G that a requirement is about; empty of a single one."""
         entry = asked.requirement.entry
         return "" if entry is None or self.units.single else self.units.entry(*entry)
-
-    def _place(self, place: tuple[Asked, float | None]) -> str:
-        entry, w = self._entry(place[0]), place[1]
-        parts = (f"in entry {entry}" if entry else "", "" if w is None else f"at {self.units.named(w)}")
-        return " ".join(filter(None, parts))
-
-    def _listed(self, asked: Asked, w: float | None) -> dict[str, object]:
-        requirement, entry = asked.requirement, self._entry(asked)
-        at = np.array([0.0 if w is None else w])
-        ratio = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
-        item: dict[str, object] = {"name": requirement.name, "worst_ratio": ratio}
-        item |= {"entry": entry} if entry else {}
-        return item | ({} if w is None else {"frequency": w / self.units.frequency})
 
 
 def named(limit: PowerLimit) -> str:

@@ -119,7 +119,18 @@ def with_record(
         levels=around is not None and bool(np.any(around)),
     )
     tables = {"signal": Table(columns), "predicted_output": Table(predicted)}
-    results = replace(results, files=other_files(request, units, record, columns))
+    # signal.mat, .npz and .h (time, u1 or r1, .., sample_time), and signal.wav (32-bit float up to 1).
+    delivery = request.delivery
+    endings = [ending for ending in WRITERS if ending in delivery.also]
+    files = {f"signal.{ending}": WRITERS[ending](columns, units.sample_time) for ending in endings}
+    if "wav" in delivery.also:
+        import scipy.io.wavfile
+
+        buffer = io.BytesIO()
+        values = applied(delivery, record) / _full_scale(delivery, record)
+        scipy.io.wavfile.write(buffer, round(delivery.sampling_rate), values.astype(np.float32))
+        files["signal.wav"] = buffer.getvalue()
+    results = replace(results, files=files)
     return adding(results, replace(results.outcome, signal=signal), (), tables, {"signal": curves})
 
 
@@ -162,31 +173,10 @@ def applied(delivery: Delivery, record: Record) -> Array:
     if points is None or record.method == "given":
         return record.samples
     if np.any(np.spacing(np.abs(points)) > _LOST * np.abs(record.samples).max(axis=0)):
-        raise bad_spec(
-            "out-of-range",
-            "the operating point is so far off that the samples added to it lose their digits",
-            hint="move the zero of the scale, or lower signal.offset",
-            key="signal.offset",
-        )
+        message = "the operating point is so far off that the samples added to it lose their digits"
+        hint = "move the zero of the scale, or lower signal.offset"
+        raise bad_spec("out-of-range", message, hint=hint, key="signal.offset")
     return record.samples + points
-
-
-def other_files(
-    request: RecordRequest, units: Units, record: Record, columns: dict[str, Array]
-) -> dict[str, bytes]:
-    """Return signal.mat, .npz and .h (time, u1 or r1, .., sample_time); signal.wav (32-bit float up to 1)."""
-    delivery, files = request.delivery, {}
-    for ending, made in WRITERS.items():
-        if ending in delivery.also:
-            files[f"signal.{ending}"] = made(columns, units.sample_time)
-    if "wav" in delivery.also:
-        import scipy.io.wavfile
-
-        buffer = io.BytesIO()
-        values = applied(delivery, record) / _full_scale(delivery, record)
-        scipy.io.wavfile.write(buffer, round(delivery.sampling_rate), values.astype(np.float32))
-        files["signal.wav"] = buffer.getvalue()
-    return files
 
 
 def _full_scale(delivery: Delivery, record: Record) -> float:

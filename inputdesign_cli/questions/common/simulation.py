@@ -204,22 +204,15 @@ class Simulation:
     entries: Sequence[ModelError]
 
 
+@time_limit(inf)  # that of the solver is for the design
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
     """Return the results with the study of their excitation, or raise `SpecError` (`nothing-to-simulate`)."""
-    with time_limit(inf):  # that of the solver is for the design
-        return _simulated(plan, delivered, executor)
-
-
-def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None) -> Results:
     started = time.perf_counter()
     units, results = plan.units, delivered.results
     if delivered.record is None:
-        raise bad_spec(
-            "nothing-to-simulate",
-            "there is no record of the excitation, so that there is no experiment to simulate",
-            hint="ask for more accuracy or a longer signal, or give an excitation under spectrum.given",
-            key="accuracy",
-        )
+        message = "there is no record of the excitation, so that there is no experiment to simulate"
+        hint = "ask for more accuracy or a longer signal, or give an excitation under spectrum.given"
+        raise bad_spec("nothing-to-simulate", message, hint=hint, key="accuracy")
     outcome = results.outcome
     assert outcome.power is not None
     assert outcome.samples is not None

@@ -43,12 +43,9 @@ def stated_response(spec: Spec) -> FrequencyResponse:
     """Return `accuracy.frequency_response`, or raise `SpecError` (`missing-key`)."""
     stated = spec.accuracy.frequency_response
     if stated is None:
-        raise bad_spec(
-            "missing-key",
-            "nothing is said of the lines and of the accuracy of a frequency response",
-            hint="add accuracy: {frequency_response: {relative: 0.05, band: [0.01, 1], lines: 40}}",
-            key="accuracy",
-        )
+        message = "nothing is said of the lines and of the accuracy of a frequency response"
+        hint = "add accuracy: {frequency_response: {relative: 0.05, band: [0.01, 1], lines: 40}}"
+        raise bad_spec("missing-key", message, hint=hint, key="accuracy")
     return stated
 
 
@@ -68,12 +65,9 @@ def build_periods(spec: Spec) -> Periods:
                 key="signal.periods",
             )
     elif shortest:
-        raise bad_spec(
-            "missing-key",
-            "the length of the experiment is sought, so that the period of its lines must be given",
-            hint=f"add {KEY}.period: the time that resolves the lines, in samples",
-            key=KEY,
-        )
+        message = "the length of the experiment is sought, so that the period of its lines must be given"
+        hint = f"add {KEY}.period: the time that resolves the lines, in samples"
+        raise bad_spec("missing-key", message, hint=hint, key=KEY)
     else:
         times = (spec.signal.periods or blocks * (skip + _COUNTED)) // blocks
         period = samples // (blocks * max(times, 1))
@@ -86,20 +80,14 @@ def build_periods(spec: Spec) -> Periods:
             key=f"{KEY}.period" if stated.period is not None else "experiment.samples",
         )
     if period < 3:
-        raise bad_spec(
-            "bad-period",
-            f"a period of {period} samples has no harmonic between 0 and the Nyquist frequency",
-            hint="take more samples, or fewer periods",
-            key="experiment.samples",
-        )
+        message = f"a period of {period} samples has no harmonic between 0 and the Nyquist frequency"
+        hint = "take more samples, or fewer periods"
+        raise bad_spec("bad-period", message, hint=hint, key="experiment.samples")
     longest = most("signal.samples")
     if not shortest and blocks * times * period > longest:
-        raise bad_spec(
-            "too-large",
-            f"the record has {blocks * times * period} samples, and at most {longest} are computed",
-            hint=f"write experiment.samples: {longest} or less",
-            key="experiment.samples",
-        )
+        message = f"the record has {blocks * times * period} samples, and at most {longest} are computed"
+        hint = f"write experiment.samples: {longest} or less"
+        raise bad_spec("too-large", message, hint=hint, key="experiment.samples")
     return Periods(period, blocks, skip)
 
 
@@ -233,19 +221,13 @@ def _admitted(spec: Spec, grid: harmonic_grid.HarmonicGrid, response: ComplexArr
     largest = G.max(axis=0)
     found[:, largest <= _ZERO * largest.max()] = np.inf
     for n, i, j in np.argwhere((_ZERO * largest >= G) & np.isfinite(found)).tolist():
-        raise bad_spec(
-            "admissible-not-positive",
-            f"G{units.entry(i, j)} vanishes at {units.named(w[n])}: no share of it can be met",
-            hint=f"leave the line out, or write {KEY}.absolute",
-            key=f"{KEY}.relative",
-        )
+        message = f"G{units.entry(i, j)} vanishes at {units.named(w[n])}: no share of it can be met"
+        hint = f"leave the line out, or write {KEY}.absolute"
+        raise bad_spec("admissible-not-positive", message, hint=hint, key=f"{KEY}.relative")
     if np.any(np.all(np.isinf(found), axis=(0, 1))):
-        raise bad_spec(
-            "admissible-not-positive",
-            "an input moves no output, so that a share of |G| says nothing of its lines",
-            hint=f"drop the input, or write {KEY}.absolute",
-            key=f"{KEY}.relative",
-        )
+        message = "an input moves no output, so that a share of |G| says nothing of its lines"
+        hint = f"drop the input, or write {KEY}.absolute"
+        raise bad_spec("admissible-not-positive", message, hint=hint, key=f"{KEY}.relative")
     return found
 
 
@@ -267,11 +249,9 @@ def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
     if given is None:
         return None
     if given.type != "multisine" or spec.plant.inputs > 1:
-        raise refuse(
-            "spectrum.given",
-            what="compute the deviations of a frequency response by this excitation",
-            hint="give {type: multisine, frequencies, amplitudes} of one input",
-        )
+        what = "compute the deviations of a frequency response by this excitation"
+        hint = "give {type: multisine, frequencies, amplitudes} of one input"
+        raise refuse("spectrum.given", what=what, hint=hint)
     powers = np.zeros(grid.excited.size)
     for n, (frequency, amplitude) in enumerate(zip(given.frequencies, given.rows[0], strict=True)):
         place = frequency * spec.sample_time * grid.period / (2.0 * np.pi)
@@ -286,12 +266,9 @@ def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
     silent = np.flatnonzero(powers <= 0.0)
     if silent.size:
         at = grid.frequencies[silent[0]] / spec.sample_time
-        raise bad_spec(
-            "not-exciting",
-            f"the given multisine has no power at the line {at:.6g} rad/{spec.time_unit}",
-            hint=f"add it to spectrum.given, or leave it out of {KEY}",
-            key="spectrum.given.frequencies",
-        )
+        message = f"the given multisine has no power at the line {at:.6g} rad/{spec.time_unit}"
+        hint = f"add it to spectrum.given, or leave it out of {KEY}"
+        raise bad_spec("not-exciting", message, hint=hint, key="spectrum.given.frequencies")
     return powers[:, None]
 
 

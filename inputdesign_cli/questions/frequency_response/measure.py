@@ -17,15 +17,7 @@ from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings import frequency_responses as responses
-from inputdesign_cli.findings.frequency_responses import (
-    Distorted,
-    distorted,
-    drifting_periods,
-    nonlinear_response,
-    silent_lines_answer,
-    spiked_periods,
-    within_chance,
-)
+from inputdesign_cli.findings.frequency_responses import Distorted, distorted
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.identification import FrequencyResponse, frequency_response, response_delays
 from inputdesign_cli.identification.faults import period_spikes
@@ -39,8 +31,8 @@ from inputdesign_cli.identification.periodic_response import (
     period_drift,
     periodic_response,
 )
-from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
-from inputdesign_cli.outcome.curves import Curves, ResponseCurves
+from inputdesign_cli.outcome import Assessment, Identification, Outcome, RequirementMet
+from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.estimate import SilentLine
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Header, Units
@@ -107,12 +99,6 @@ class Judged:
         sure = self.least / (1.0 + (self.lines.share or 0.0) * (self.moved + bent))
         return not self.scattered and bool(np.any(sure > 1.0))
 
-    def doubts(self, units: Units) -> list[Finding]:
-        """Return findings on spikes, drifts and a nonlinearity."""
-        w = self.grid.frequencies / units.frequency
-        bent = nonlinear_response(units, self.distorted, w, decided=self.missed)
-        return [*self.scattered, *bent]
-
     @property
     def periods_needed(self) -> int | None:
         """Return the periods (of each block) that would have to count; None if more are no remedy."""
@@ -132,39 +118,32 @@ class Judged:
         return f"more periods of this signal are no remedy, as the inputs {why}: {responses.REMEDY}"
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Holds a response with the data that count for it; with lines of a spec also the comparison."""
-
-    data: Record
-    response: FrequencyResponse
-    judged: Judged | None = None
-    findings: tuple[Finding, ...] = ()
-
-
-def measured_results(
-    header: Header,
-    measured: Measured,
-    shown: tuple[Table, ResponseCurves, MeasuredLines],
+def _measured_results(
+    question: Measurement,
+    data: Record,
+    found: FrequencyResponse,
+    judged: Judged | None,
+    findings: Sequence[Finding],
     seconds: float,
     *,
     assess: bool,
 ) -> Results:
     """Return the outcome, frequency_response.csv and its figure; with lines also their deviations."""
-    table, curve, response = shown
-    data, judged, found = measured.data, measured.judged, list(measured.findings)
+    header, units = question.header, question.header.units
+    by_reference = data.r is not None and judged is None
+    table, curve, response = response_of_data(units, question.model, found, by_reference=by_reference)
     tables, curves = {"frequency_response": table}, dict[str, Curves](frequency_response=curve)
     assessment, blocks = None, 1
     if judged is not None:
-        w, blocks = judged.grid.frequencies / header.units.frequency, judged.periods.blocks
+        w, blocks = judged.grid.frequencies / units.frequency, judged.periods.blocks
         listed = {"deviation": judged.expected, "deviation_data": judged.found}
         drawn = ("deviation_data", "these data")
-        columns, curves["deviations"] = deviation_curves(header.units, w, judged.lines, listed, drawn)
+        columns, curves["deviations"] = deviation_curves(units, w, judged.lines, listed, drawn)
         tables["deviations"] = Table(columns)
-        silent, bent = silent_entry(judged.silent), judged.distorted
-        if bent is not None:
-            at, cubed = float(w[bent.line]), bent.cubed or None
-            silent["odd"] = replace(silent["odd"], worst_ratio=bent.share, frequency=at, cubed=cubed)
+        silent, moved = silent_entry(judged.silent), judged.distorted
+        if moved is not None:
+            at, cubed = float(w[moved.line]), moved.cubed or None
+            silent["odd"] = replace(silent["odd"], worst_ratio=moved.share, frequency=at, cubed=cubed)
         response = replace(
             response,
             lines=int(w.size),
@@ -179,10 +158,12 @@ def measured_results(
             worst_ratio_limits=judged.limits,
             nonlinearity=silent or None,
         )
-        doubts = judged.doubts(header.units)
+        # Spikes, drifts and a nonlinearity.
+        bent = responses.nonlinear_response(units, judged.distorted, w, decided=judged.missed)
+        doubts = [*judged.scattered, *bent]
         if assess:
-            assessment, doubts = _assessment(header.units, judged, w, doubts)
-        found += [*silent_lines_answer(judged.silent), *doubts]
+            assessment, doubts = _assessment(units, judged, w, doubts)
+        findings = [*findings, *responses.silent_lines_answer(judged.silent), *doubts]
     outcome = Outcome(
         title=header.title,
         status="measured" if assessment is None else assessment.verdict,
@@ -194,19 +175,15 @@ def measured_results(
         notes=data.notes or None,
         timing_s={"measurement": seconds},
     )
-    return results_of(header, outcome.saying(found), tables, curves)
+    return results_of(header, outcome.saying(findings), tables, curves)
 
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
     """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
+    listed = {kind: (one.over_noise, one.probability, one.rms) for kind, one in silent.items()}
     return {
-        kind: SilentLine(
-            one.lines,
-            tuple(one.over_noise.tolist()),
-            tuple(one.probability.tolist()),
-            tuple(one.rms.tolist()),
-        )
-        for kind, one in silent.items()
+        kind: SilentLine(silent[kind].lines, *(tuple(values.tolist()) for values in by_output))
+        for kind, by_output in listed.items()
     }
 
 
@@ -224,7 +201,7 @@ def _assessment(
         if judged.missed:
             no_top_up = judged.remedy if periods is None else f"repeat the record: {judged.remedy}"
         else:
-            doubts = [*doubts, within_chance(units, ratio, judged.limits, at, judged.remedy)]
+            doubts = [*doubts, responses.within_chance(units, ratio, judged.limits, at, judged.remedy)]
     answer, why = verdict(doubts, met=met), reasons(doubts)
     return Assessment(
         verdict=answer,
@@ -335,33 +312,21 @@ def measure(
     """Return the response with its confidence, compared with what a spec asks of its lines."""
     started = time.perf_counter()
     units, terms, name = question.header.units, question.terms, paths[0].name
+    results = partial(_measured_results, question, assess=assess)
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
     if terms is None:
         delays = partial(response_delays, question.model, step=units.step)
         response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
         if response is None:
-            raise DataError.because(
-                "too-few-samples",
-                f"{name} excites no frequency enough for a response without a model",
-                hint="record longer, or excite more frequencies",
-            )
-        found = Measured(data, response)
-    else:
-        counted = whole_periods(terms.periods, data, name, units.sample_time)
-        found = _at_lines(question, terms, counted, name, assess=assess)
-    by_reference = data.r is not None and terms is None
-    shown = response_of_data(units, question.model, found.response, by_reference=by_reference)
-    return measured_results(question.header, found, shown, time.perf_counter() - started, assess=assess)
-
-
-def _at_lines(
-    question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
-) -> Measured:
-    """Return the response at the lines of the spec that the data excite."""
+            message = f"{name} excites no frequency enough for a response without a model"
+            hint = "record longer, or excite more frequencies"
+            raise DataError.because("too-few-samples", message, hint=hint)
+        return results(data, response, None, (), time.perf_counter() - started)
+    counted = whole_periods(terms.periods, data, name, units.sample_time)
     data, periods = counted.data, counted.periods
     excited = excited_lines(data.u, periods, terms.grid.excited, repeats=counted.repeats)
-    missing = responses.unexcited_lines(question.header.units, terms.grid.frequencies, excited)
+    missing = responses.unexcited_lines(units, terms.grid.frequencies, excited)
     found = counted.response(terms.grid.excited[excited])
     if found is None or (assess and missing):
         why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
@@ -371,7 +336,7 @@ def _at_lines(
     # Periods of outputs differ if the inputs do not repeat.
     if judged.differing <= responses.UNLIKE:
         judged = _doubted(question, terms, found, counted, judged)
-    return Measured(data, of_periods(found, periods.period), judged, tuple(seen))
+    return results(data, of_periods(found, periods.period), judged, seen, time.perf_counter() - started)
 
 
 def _doubted(
@@ -382,7 +347,7 @@ def _doubted(
     spikes = period_spikes(data.y, periods, repeats=repeats)
     if spikes:
         where = [places(units, data, one.samples) for one in spikes]
-        spiked = list(spiked_periods(units, spikes, where, len(data.y), counted.kept))
+        spiked = list(responses.spiked_periods(units, spikes, where, len(data.y), counted.kept))
         return replace(judged, scattered=tuple(spiked))
     # The noise of the data near frequency zero; noise of the spec may go on rising below the lowest line.
     lowest = int(np.argmin(judged.grid.frequencies))
@@ -398,7 +363,7 @@ def _doubted(
             scatter = np.abs(found.deviation**2 - without.deviation**2)
             moved = judged.lines.ratios(np.sqrt(np.abs(found.G - without.G) ** 2 + scatter))
             w = judged.grid.frequencies / units.frequency
-            drifting = drifting_periods(units, drift, moved, w, lined=data.lined)
+            drifting = responses.drifting_periods(units, drift, moved, w, lined=data.lined)
             found, judged = without, replace(judged, scattered=tuple(drifting))
             judged = replace(judged, moved=moved) if drifting else judged
     judged = replace(judged, silent=silent_of(terms, counted))
@@ -410,11 +375,9 @@ def _doubted(
     nominal = [question.model.plant_at(terms.grid.at(lines)) for lines in (found.harmonics, odd)]
     shape = _between(terms.grid.at(odd), terms.grid.frequencies, terms.lines.noise)
     cube = cubes(found, data.u, data.y, periods, odd, (nominal[0], nominal[1]), shape, repeats=repeats)
-
-    def moved_by(outputs: Array) -> Array:
-        return judged.lines.ratios(cube.error * outputs[:, None])
-
-    return replace(judged, distorted=distorted(judged.silent, judged.lines.ratios(error), cube, moved_by))
+    ratios = judged.lines.ratios
+    bent = distorted(judged.silent, ratios(error), cube, lambda y: ratios(cube.error * y[:, None]))
+    return replace(judged, distorted=bent)
 
 
 def judge_lines(
@@ -425,11 +388,9 @@ def judge_lines(
     Few periods give the noise of one line badly: its ratio to that of the spec is averaged along the lines.
     """
     if np.any(found.noise <= 0.0):
-        raise DataError.because(
-            "noise-free-data",
-            "the periods do not differ at all, so that their noise is not known",
-            hint="give records of a real plant, not of one period that was repeated",
-        )
+        message = "the periods do not differ at all, so that their noise is not known"
+        hint = "give records of a real plant, not of one period that was repeated"
+        raise DataError.because("noise-free-data", message, hint=hint)
     periods, repeats = counted.periods, counted.repeats
     lines = terms.lines.where(excited).at(found.G)
     expected = found.deviation * np.sqrt(lines.noise / found.noise)[:, :, None]

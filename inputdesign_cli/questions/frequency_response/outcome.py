@@ -125,11 +125,6 @@ class Planned:
         """Return the powers (L, r) of the record."""
         return self.powers * (1.0 + self.record.extra_power)
 
-    @property
-    def flat(self) -> NDArray[np.float64]:
-        """Return equal lines (L, r) with the power of the record in each input."""
-        return np.broadcast_to(self.applied.mean(axis=0), self.powers.shape)
-
 
 def deviation_curves(
     units: Units,

@@ -43,11 +43,7 @@ _STREAM = 0x5EED
 
 @dataclass(frozen=True)
 class ResponseTask:
-    """Designs lines, or analyses given ones, and studies them.
-
-    Attributes:
-        given: (L, r) powers that are not designed.
-    """
+    """Designs lines, or analyses `given` ones with powers (L, r), and studies them."""
 
     terms: ResponseTerms
     given: Array | None
@@ -62,17 +58,15 @@ class ResponseTask:
         """Return the design, and beside its deviations the scatter of many simulated experiments."""
         terms, study = self.terms, self.simulation
         if study.runs < 2:
-            raise bad_spec(
-                "out-of-range",
-                "a single run has no standard deviation",
-                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
-                key="simulation.runs",
-            )
+            message = "a single run has no standard deviation"
+            hint = "write simulation.runs: 1000, whose deviations are known to 2 %"
+            raise bad_spec("out-of-range", message, hint=hint, key="simulation.runs")
         plan, results = self._solved()
         begun = time.perf_counter()
         records = {"design": (plan.applied, plan.record.samples)}
-        if study.compare:
-            records["white"] = (plan.flat, self._best(plan.flat, plan.length))
+        if study.compare:  # equal lines with the power of the record in each input
+            flat = np.broadcast_to(plan.applied.mean(axis=0), plan.powers.shape)
+            records["white"] = (flat, self._best(flat, plan.length))
         nominal, power = terms.experiment, results.outcome.power
         if study.truth is not None and power is not None:
             nominal = study.truth.experiment(nominal, power.output or ())
@@ -88,30 +82,29 @@ class ResponseTask:
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
         return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
 
-    def _designed(self) -> tuple[ResponseDesign, int]:
-        """Return the powers and the samples that count."""
-        terms, samples = self.terms, self.terms.experiment.samples
-        problem = terms.problem(samples)
-        if self.given is not None:
-            flat = self.given.ravel()
-            return ResponseDesign(flat, float(problem.price @ flat), float(problem.price @ flat)), samples
-        try:
-            design = cheapest(problem) if terms.goal == "cost" else most_accurate(problem)
-        except UnreachableError as error:
-            raise self._unreachable(error, samples) from error
-        return design, self._whole(1.0 / design.value) if terms.goal == "samples" else samples
-
     def _whole(self, samples: float) -> int:
         """Return a number of samples rounded up to whole periods."""
         whole = self.terms.periods.blocks * self.terms.periods.period
         return whole * int(np.ceil(samples / whole * (1.0 - 1e-12)))
 
     def _solved(self) -> tuple[Planned, Results]:
-        started = time.perf_counter()
-        design, counted = self._designed()
+        """Return the record of the designed or given lines, and its results, reread and checked."""
+        started, terms = time.perf_counter(), self.terms
+        counted = terms.experiment.samples
+        problem = terms.problem(counted)
+        if self.given is not None:
+            cost = float(problem.price @ self.given.ravel())
+            design = ResponseDesign(self.given.ravel(), cost, cost)
+        else:
+            try:
+                design = cheapest(problem) if terms.goal == "cost" else most_accurate(problem)
+            except UnreachableError as error:
+                raise self._unreachable(error, counted) from error
+        if terms.goal == "samples":
+            counted = self._whole(1.0 / design.value)
         solved = time.perf_counter()
         plan = self._planned(design, counted)
-        terms = replace(self.terms, experiment=replace(self.terms.experiment, samples=plan.counted))
+        terms = replace(terms, experiment=replace(terms.experiment, samples=plan.counted))
         results = outcome.response_results(terms, plan, self.record, timing(started, solved))
         audit_response(terms, plan, results)
         return plan, results
@@ -140,11 +133,14 @@ class ResponseTask:
                 length, factor = len(samples), rounded_up(scale * beyond, 4)
                 more = int(np.ceil(length * (scale * beyond) ** 2))
                 best = (
-                    f"meets the accuracy: that of the lowest peaks would have to be {factor} times as large"
+                    f"meets the accuracy: that of the lowest peaks would have to be {factor} times as large "
+                    "as they allow"
                 )
-                hint = f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
-                hint += f"{factor} times as much, or write objective: shortest_experiment"
-                raise no_record(self.record, length, f"{best} as they allow", hint)
+                hint = (
+                    f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
+                    f"{factor} times as much, or write objective: shortest_experiment"
+                )
+                raise no_record(self.record, length, best, hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
@@ -174,12 +170,7 @@ class ResponseTask:
         return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
 
     def _length(self, counted: int) -> int:
-        """Return the length of a record, transient included.
-
-        Raises:
-            InfeasibleError: the shortest experiment is longer than it may be.
-            SpecError: `too-large`.
-        """
+        """Return the length of a record, transient included; raise `too-long` or `too-large`."""
         periods, most = self.terms.periods, self.terms.most_samples
         length = counted + periods.blocks * periods.skip * periods.period
         if self.terms.goal == "samples" and most is not None and length > most:
@@ -192,12 +183,9 @@ class ResponseTask:
                 limit.split(":")[0],
             )
         if length > self.record.longest:
-            raise bad_spec(
-                "too-large",
-                f"the record has {length} samples, and at most {self.record.longest} are computed",
-                hint="ask for less accuracy, or allow more power",
-                key=KEY,
-            )
+            message = f"the record has {length} samples, and at most {self.record.longest} are computed"
+            hint = "ask for less accuracy, or allow more power"
+            raise bad_spec("too-large", message, hint=hint, key=KEY)
         return length
 
     def _best(self, powers: NDArray[np.float64], length: int) -> Array:

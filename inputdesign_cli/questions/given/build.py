@@ -45,12 +45,9 @@ _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quan
 def build_given(spec: Spec) -> GivenTask:
     """Return the task of a given excitation; `SpecError` (`nothing-given`) where there is none."""
     if spec.spectrum is None or spec.spectrum.type != "given":
-        raise bad_spec(
-            "nothing-given",
-            "there is no excitation to analyse",
-            hint="give one, spectrum: {given: {type: white, power: 1}}, or design one: idesign solve SPEC",
-            key="spectrum",
-        )
+        message = "there is no excitation to analyse"
+        hint = "give one, spectrum: {given: {type: white, power: 1}}, or design one: idesign solve SPEC"
+        raise bad_spec("nothing-given", message, hint=hint, key="spectrum")
     check_supported(spec, "the analysis of a given excitation")
     refuse_unhandled(spec, "the analysis of a given excitation", dict.fromkeys(_OF_DESIGNS, "remove it"))
     _check_signal_is_open(spec, spec.spectrum)
@@ -166,10 +163,7 @@ def _sinusoids(spec: Spec, given: stated_spectrum.GivenMultisine) -> tuple[Array
     amplitudes = np.array(given.rows, dtype=float).T
     there = np.any(amplitudes != 0.0, axis=1)
     if not there.any():
-        raise bad_spec(
-            "not-exciting",
-            "all amplitudes are zero: nothing is excited",
-            hint="give the sinusoids amplitudes",
-            key="spectrum.given.amplitudes",
-        )
+        message = "all amplitudes are zero: nothing is excited"
+        hint = "give the sinusoids amplitudes"
+        raise bad_spec("not-exciting", message, hint=hint, key="spectrum.given.amplitudes")
     return frequencies[there], amplitudes[there]

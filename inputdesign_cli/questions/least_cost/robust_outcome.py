@@ -440,12 +440,9 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
         found, _ = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
         plants, looked_at = replace(plants, searched=found), [*looked_at, found.kept]
     if not all(np.isfinite(one.share) for one in looked_at):
-        raise bad_spec(
-            "not-exciting",
-            "the given excitation does not determine the parameters of every plant of uncertainty",
-            hint="excite more frequencies, or state the uncertainty more tightly",
-            key="uncertainty",
-        )
+        message = "the given excitation does not determine the parameters of every plant of uncertainty"
+        hint = "excite more frequencies, or state the uncertainty more tightly"
+        raise bad_spec("not-exciting", message, hint=hint, key="uncertainty")
     binding = [int(np.argmax([one.share for one in at_each]))]
     floors = [Floor.at(tried[place].asked) for place in kept]
     found_there = plants_kept(units, plants, kept, at_each, binding, floors)

@@ -30,7 +30,7 @@ from inputdesign_cli.questions.building.limits import build_power_limits, implie
 from inputdesign_cli.questions.building.signal_settings import build_bounds
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
-from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorSignalSettings, LoopErrorTask, LossTrial
+from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorSignalSettings, LoopErrorTask
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
@@ -157,7 +157,12 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
     )
-    spectrum = spec.spectrum
+    signal, spectrum = _signal(spec, error, plant.inputs), spec.spectrum
+    simulation = spec.simulation or Simulation()
+    check_compared(simulation.compare, "white")
+    true, key = plant, "simulation.plant"
+    if simulation.plant is not None or simulation.noise is not None:
+        true = matrix_plant(spec, simulation.plant or spec.plant, simulation.noise or spec.noise, key)
     return LoopErrorTask(
         problem=problem,
         header=build_header(spec),
@@ -167,8 +172,11 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         tolerance=spec.solver.tolerance,
         cost=system.build_cost(spec),
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
-        signal=_signal(spec, error, plant.inputs),
-        trial=_trial(spec, error, problem),
+        signal=signal,
+        true=replace(problem, plant=true, law=_law(spec, error, true, key)[1]),
+        runs=simulation.runs,
+        seed=simulation.seed,
+        white="white" in simulation.compare,
     )
 
 
@@ -226,20 +234,6 @@ def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalS
         candidates=signal.candidates or _CANDIDATES,
         seed=signal.seed or 0,
         bounds=build_bounds(spec),
-    )
-
-
-def _trial(spec: Spec, error: ClosedLoopError, problem: LoopErrorProblem) -> LossTrial:
-    simulation = spec.simulation or Simulation()
-    check_compared(simulation.compare, "white")
-    true = problem.plant
-    if simulation.plant is not None or simulation.noise is not None:
-        true = matrix_plant(
-            spec, simulation.plant or spec.plant, simulation.noise or spec.noise, "simulation.plant"
-        )
-    law = _law(spec, error, true, "simulation.plant")[1]
-    return LossTrial(
-        replace(problem, plant=true, law=law), simulation.runs, simulation.seed, "white" in simulation.compare
     )
 
 

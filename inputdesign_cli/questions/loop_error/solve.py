@@ -316,21 +316,12 @@ def _by_filter(
 
 
 @dataclass(frozen=True)
-class LossTrial:
-    """Holds the Monte Carlo study: `problem` with the true plant, and whether white noise is tried too."""
-
-    problem: LoopErrorProblem
-    runs: int
-    seed: int
-    white: bool
-
-
-@dataclass(frozen=True)
 class LoopErrorTask:
     """Designs for the closed-loop error, and studies the design.
 
     The `law` of control is called as in the spec, and `grid` are the points of spectrum.csv. The `covariance`
-    is that of a high model order, or exact for the model structure.
+    is that of a high model order, or exact for the model structure. The runs are on the plant of `true`, and
+    with `white` noise of equal power is tried, too.
     """
 
     problem: LoopErrorProblem
@@ -342,7 +333,10 @@ class LoopErrorTask:
     cost: Mapping[PowerKind, Weight]
     grid: int
     signal: LoopErrorSignalSettings
-    trial: LossTrial
+    true: LoopErrorProblem
+    runs: int
+    seed: int
+    white: bool
 
     def solve(self) -> Results:
         """Return the design with its proof, its signal and its curves."""
@@ -350,24 +344,22 @@ class LoopErrorTask:
 
     def simulate(self, executor: Executor | None = None) -> Results:
         """Return the design with its Monte Carlo study and the histogram of the loss."""
-        trial = self.trial
-        _check_simulated(self.problem, trial.problem)
+        _check_simulated(self.problem, self.true)
         design, results = self._solved()
-        begun = time.perf_counter()
-        samples = self.signal.samples
+        begun, samples = time.perf_counter(), self.signal.samples
         inputs = {"design": design_lines(design, samples)}
-        if trial.white:
+        if self.white:
             inputs["white"] = white_lines(design, samples)
         studies = study_losses(
-            trial.problem, inputs, samples=samples, runs=trial.runs, seed=trial.seed, executor=executor
+            self.true, inputs, samples=samples, runs=self.runs, seed=self.seed, executor=executor
         )
-        tried, improvement, curves = loss_results(trial.problem.parametric(), studies, inputs, samples)
-        names = tuple(trial.problem.plant.names)
+        tried, improvement, curves = loss_results(self.true.parametric(), studies, inputs, samples)
+        names = tuple(self.true.plant.names)
         study = Simulation(
-            trial.runs, trial.seed, tried, samples=samples, parameters=names, improvement=improvement
+            self.runs, self.seed, tried, samples=samples, parameters=names, improvement=improvement
         )
-        findings = list(unstable_runs({name: one.unstable for name, one in studies.items()}, trial.runs))
-        return with_study(results, study, begun, curves=curves, findings=findings)
+        findings = unstable_runs({name: one.unstable for name, one in studies.items()}, self.runs)
+        return with_study(results, study, begun, findings, curves=curves)
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
         started = time.perf_counter()

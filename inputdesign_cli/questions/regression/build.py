@@ -34,21 +34,15 @@ def build_regression_task(spec: Spec) -> RegressionTask:
     error, plant = spec.accuracy.mean_squared_error, spec.plant
     assert plant.kind == "regression"
     if error is None:
-        raise bad_spec(
-            "missing-key",
-            "nothing is asked of the regression",
-            hint="add accuracy: {mean_squared_error: {target: 1.0, estimated: [..], neglected_norm: 1.0}}",
-            key="accuracy",
-        )
+        message = "nothing is asked of the regression"
+        hint = "add accuracy: {mean_squared_error: {target: 1.0, estimated: [..], neglected_norm: 1.0}}"
+        raise bad_spec("missing-key", message, hint=hint, key="accuracy")
     _check_supported(spec)
     check_record(spec, plant.inputs)
     if not any(error.estimated):
-        raise bad_spec(
-            "zero-weights",
-            "all weights of the estimated parameters are zero: no experiment changes the quantity",
-            hint="give at least one of them a weight other than 0",
-            key=f"{KEY}.estimated",
-        )
+        message = "all weights of the estimated parameters are zero: no experiment changes the quantity"
+        hint = "give at least one of them a weight other than 0"
+        raise bad_spec("zero-weights", message, hint=hint, key=f"{KEY}.estimated")
     spectrum, signal, solver = spec.spectrum, spec.signal, spec.solver
     return RegressionTask(
         header=build_header(spec),

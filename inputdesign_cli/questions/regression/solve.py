@@ -120,21 +120,6 @@ def moments_outcome(
     )
 
 
-def error_curves(task: RegressionTask, design: MomentsDesign) -> ErrorCurves:
-    """Return squared bias and variance over the energy, beside the error of white regressors."""
-    regression = task.regression
-    energy = design.energy * np.geomspace(0.1, 10.0, _POINTS)
-    white = regression.error(np.eye(regression.n) / regression.n)
-    return ErrorCurves(
-        energy=energy,
-        bias_squared=np.full(_POINTS, design.split.bias_squared),
-        variance=design.split.variance * design.energy / energy,
-        white=white.bias_squared + white.variance / energy,
-        design=(design.energy, design.split.total),
-        target=task.target,
-    )
-
-
 def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Estimates) -> TriedInput:
     """Return the mean estimate and error with their standard errors, and the theory for these samples."""
     squared = found.error**2
@@ -178,12 +163,9 @@ def realise_regressors(task: RegressionTask, design: MomentsDesign) -> Regressor
     if samples < least:
         return None
     if periods is not None and (samples % periods or samples // periods < least):
-        raise bad_spec(
-            "bad-period",
-            f"{samples} samples do not make {periods} equal periods of at least {least} samples",
-            hint=f"choose a divisor of {samples} up to {samples // least}, or change signal.samples",
-            key="signal.periods",
-        )
+        message = f"{samples} samples do not make {periods} equal periods of at least {least} samples"
+        hint = f"choose a divisor of {samples} up to {samples // least}, or change signal.samples"
+        raise bad_spec("bad-period", message, hint=hint, key="signal.periods")
     period, details, lines = samples // periods if periods else None, dict[str, object](), None
     if rho is None:
         period = period or (least if samples % least == 0 else samples)
@@ -255,20 +237,14 @@ class RegressionTask:
         """Return the design with least-squares estimates of theta_1 in many runs of y = Phi theta + v."""
         trial = self.trial
         if trial is None:
-            raise bad_spec(
-                "missing-key",
-                "a regression is simulated with its true parameters, and there are none",
-                hint="write simulation: {runs: 10000, plant: {parameters: [..]}}, the estimated ones first",
-                key="simulation",
-            )
+            message = "a regression is simulated with its true parameters, and there are none"
+            hint = "write simulation: {runs: 10000, plant: {parameters: [..]}}, the estimated ones first"
+            raise bad_spec("missing-key", message, hint=hint, key="simulation")
         record, results = self._solved()
         if record is None:
-            raise bad_spec(
-                "wrong-shape",
-                f"{self.record_samples} samples are too few to realise these moments",
-                hint="set experiment.samples",
-                key="experiment.samples",
-            )
+            message = f"{self.record_samples} samples are too few to realise these moments"
+            hint = "set experiment.samples"
+            raise bad_spec("wrong-shape", message, hint=hint, key="experiment.samples")
         begun, regression, variance = time.perf_counter(), self.regression, trial.variance
         if trial.relative_std is not None:
             variance = float(trial.relative_std**2 * np.mean((record.Phi @ trial.theta) ** 2))
@@ -315,7 +291,18 @@ class RegressionTask:
         signal = None if record is None else record.signal
         outcome = moments_outcome(self, design, signal, timing(started, solved))
         units, tables = self.header.units, dict[str, Table]()
-        curves: dict[str, Curves] = {"error": error_curves(self, design)}
+        # Squared bias and variance over the energy, beside the error of white regressors.
+        energy, n = design.energy * np.geomspace(0.1, 10.0, _POINTS), self.regression.n
+        white = self.regression.error(np.eye(n) / n)
+        errors = ErrorCurves(
+            energy=energy,
+            bias_squared=np.full(_POINTS, design.split.bias_squared),
+            variance=design.split.variance * design.energy / energy,
+            white=white.bias_squared + white.variance / energy,
+            design=(design.energy, design.split.total),
+            target=self.target,
+        )
+        curves: dict[str, Curves] = {"error": errors}
         moments = MomentsCurves(design.R, self.regression.m)
         if record is not None:
             tables["signal"], curves["signal"] = signal_results(units, record.channels)
