@@ -1,10 +1,16 @@
-"""What given excitations buy: Example 1 of the least-costly paper, closed forms, tables and records."""
+"""What given excitations buy: Example 1 of the least-costly paper, closed forms, tables, records, limits."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from inputdesign_cli import analyse, load_spec, parse_spec, solve
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.outcome.text_formats import csv_text
+from inputdesign_cli.specification.yaml.plain import to_yaml
+from inputdesign_cli.specification.yaml.reader import read
+from inputdesign_cli.spectrum import TabulatedSpectrum
 
 BASE = """
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -54,13 +60,6 @@ def test_closed_form_of_one_cosine():
     np.testing.assert_allclose([sd["b1"], sd["f1"]], np.sqrt(np.diag(np.linalg.inv(expected))), rtol=1e-9)
 
 
-def test_a_table_of_sinusoids_has_nonnegative_powers(tmp_path):
-    table = tmp_path / "spectrum.csv"
-    table.write_text("frequency,power\n0.3,1\n0.9,-0.2\n", encoding="utf-8")
-    with pytest.raises(DataError, match="power must be nonnegative"):
-        analyse(spec_of(f"{{type: table, file: {table}}}"))
-
-
 def test_a_flat_table_is_white_noise(tmp_path):
     table = tmp_path / "phi.csv"
     rows = "\n".join(f"{w:.17g},1.7" for w in np.linspace(0.0, np.pi, 40))
@@ -88,18 +87,15 @@ def test_a_signal_is_judged_by_its_own_samples(tmp_path):
 
 def test_solve_analyses_a_given_excitation():
     solved, analysed = solve(spec_of(COSINE)), analyse(spec_of(COSINE))
-    assert (
-        solved.result["information"]["standard_deviation"]
-        == (analysed.result["information"]["standard_deviation"])
-    )
+    deviations = [found.result["information"]["standard_deviation"] for found in (solved, analysed)]
+    assert deviations[0] == deviations[1]
     assert solved.result["status"] == "met"
     assert analyse(spec_of("{type: white, power: 0.01}")).result["status"] == "missed"
 
 
 def test_without_a_requirement_there_is_still_an_answer():
-    outcome = analyse(
-        spec_of(WHITE, BASE.replace("accuracy: {model_error: {relative: 0.01, alpha: 1}}\n", ""))
-    )
+    asked = "accuracy: {model_error: {relative: 0.01, alpha: 1}}\n"
+    outcome = analyse(spec_of(WHITE, BASE.replace(asked, "")))
     assert outcome.result["status"] == "given"
     assert "r_adm" not in outcome.tables["bound"].columns
     assert outcome.result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)))
@@ -124,7 +120,8 @@ def test_a_constant_excites_too_little():
 BAD_TABLES = [
     ("frequency,phi\n0.2,1\n0.1,1\n", "increase"),
     ("frequency,phi\n0.2,1\n5.0,1\n", "Nyquist"),
-    ("frequency,phi\n0.2,-1\n0.5,1\n", "nonnegative"),
+    ("frequency,phi\n0.2,-1\n0.5,1\n", "phi must be nonnegative"),
+    ("frequency,power\n0.3,1\n0.9,-0.2\n", "power must be nonnegative"),
 ]
 
 
@@ -141,3 +138,111 @@ def test_nothing_to_analyse():
     with pytest.raises(SpecError) as caught:
         analyse(parse_spec(BASE.replace("{given: GIVEN}", "{type: white}")))
     assert caught.value.diagnostics[0].code == "nothing-given"
+
+
+SHIPPED = "specs/first_order_given.yaml"  # a cosine of amplitude 0.75: power 0.28125
+SHIPPED_TWO = "specs/two_by_two_given.yaml"
+
+
+def limits_not_kept(spec):
+    return [one for one in analyse(spec).outcome.findings or () if one.code == "limit-not-kept"]
+
+
+@pytest.mark.parametrize(
+    ("spec", "limits", "broken"),
+    [
+        (SHIPPED, "{input_power: 0.3, output_power: 40, samples: 500}", []),
+        (SHIPPED, "{input_power: 0.28}", [("limits.input_power", 0.28125, 0.28)]),
+        (SHIPPED, "{input_power: {min: 0.3}}", [("limits.input_power", 0.28125, 0.3)]),
+        (SHIPPED_TWO, "{input_power: [30, 20]}", [("limits.input_power", 22.5, 20.0)]),
+    ],
+)
+def test_what_an_excitation_breaks_is_found(spec, limits, broken):
+    found = limits_not_kept(load_spec(spec, [f"limits={limits}"]))
+    assert [one.where for one in found] == [where for where, _, _ in broken]
+    for one, (_, value, limit) in zip(found, broken, strict=True):
+        assert one.figures["value"] == pytest.approx(value, rel=1e-9)
+        assert one.figures["limit"] == limit
+
+
+@pytest.mark.parametrize(
+    ("spec", "limits", "broken"),
+    [
+        (
+            SHIPPED,
+            "{excitation_power: 0.2, output_power: 30}",
+            ["limits.output_power", "limits.excitation_power"],
+        ),
+        (SHIPPED_TWO, "{amplitude: {input: [100, 6], output: 1000}}", ["limits.amplitude.input"]),
+        (
+            SHIPPED_TWO,
+            "{rate: [1, 100], amplitude: {output: [1000, 1]}}",
+            ["limits.amplitude.output", "limits.rate"],
+        ),
+    ],
+)
+def test_every_limit_is_looked_at(spec, limits, broken):
+    assert [one.where for one in limits_not_kept(load_spec(spec, [f"limits={limits}"]))] == broken
+
+
+def test_a_record_longer_than_allowed_is_found(tmp_path):
+    (tmp_path / "u.csv").write_text("u\n" + "1\n-1\n1\n" * 40)
+    given = f"spectrum={{given: {{signal: {tmp_path / 'u.csv'}}}}}"
+    spec = load_spec(SHIPPED, [given, "limits={samples: 100}", "experiment.samples=100"])
+    (found,) = limits_not_kept(spec)
+    assert found.where == "limits.samples"
+    assert dict(found.figures) == {"value": 120, "limit": 100}
+
+
+SPECS = Path(__file__).parents[2] / "specs"
+# Those whose design is a density that just meets what is asked.
+DENSITIES = (
+    *("application", "first_order", "weighted_variance"),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("flexible_transmission", "motor_loop")),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("two_by_two_arx", "two_by_two_loop")),
+)
+_OF_THE_DESIGN = ("limits", "simulation", "objective", "solver", "uncertainty", "campaign")
+
+
+def given_back(spec, table):
+    """What analyse says of a table in place of the design of a shipped spec."""
+    stated = {
+        key: value for key, value in read(spec.read_text(), "spec").data.items() if key not in _OF_THE_DESIGN
+    }
+    stated["spectrum"] = {"given": {"type": "table", "file": str(table)}}
+    return analyse(parse_spec(to_yaml(stated), str(spec), folder=spec.parent)).result
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("name", DENSITIES)
+def test_what_solve_wrote_is_met_and_a_thousandth_less_is_missed(name, tmp_path):
+    spec, path = SPECS / f"{name}.yaml", tmp_path / "spectrum.csv"
+    table = solve(load_spec(spec)).tables["spectrum"]
+    path.write_text(csv_text(table))
+    found = given_back(spec, path)
+    assert found["status"] == "met"
+    ratio = found.get("model_error", {}).get("worst_ratio", 1.0)
+    if ratio > 1.0 + 1e-9:
+        assert found["findings"][0]["code"] == "met-within-table"
+    head, *rows = path.read_text().splitlines()
+    scaled = [0.999 if column.startswith("phi") else 1.0 for column in head.split(",")]
+    cells = [[float(cell) * s for cell, s in zip(row.split(","), scaled, strict=True)] for row in rows]
+    path.write_text("\n".join([head, *(",".join(map(repr, row)) for row in cells)]) + "\n")
+    assert given_back(spec, path)["status"] == "missed"
+
+
+@pytest.mark.parametrize("rows", [40, 41])
+def test_what_a_table_misses_is_of_the_size_of_the_errors_between_its_rows(rows):
+    """Of exp(w) the interpolation misses h^2/8 exp(w) in the middle, every second row four times that."""
+    w = np.linspace(0.0, 3.0, rows)
+    spectrum = TabulatedSpectrum(w, np.exp(w)[:, None, None].astype(complex))
+    added = (spectrum.raised(0.25).phi - spectrum.phi)[1:-1, 0, 0].real
+    expected = (w[1] ** 2 / 8.0 * np.exp(w))[1:-1]
+    inner = slice(1, -2)
+    assert np.all(added[inner] >= 0.8 * expected[inner])
+    assert np.all(added[inner] <= 2.4 * expected[inner])
+
+
+def test_a_flat_spectrum_misses_nothing():
+    flat = TabulatedSpectrum.white(np.array([1.0]), (0.0, 3.0))
+    assert np.array_equal(flat.raised(0.5).phi, flat.phi)

@@ -1,12 +1,14 @@
-"""What bound.csv and its figure show of a design: where each entry binds, at frequencies that lie apart."""
+"""Curves of a design: bound.csv, the loop with its discs, ellipses, and white excitation of equal means."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli import analyse, load_spec, parse_spec, solve
+from inputdesign_cli.figures.estimates import boundary
 from inputdesign_cli.questions.common.spectrum import axis, distinct
+from tests.support.pages import LOOP, SPEC
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -62,3 +64,104 @@ signal: {samples: 4000, candidates: 1, seed: 1}
 """
     (panel,) = solve(parse_spec(text)).curves["bound"].panels
     assert panel.r_u_record / panel.r_u == pytest.approx(np.ones(panel.r_u.size), abs=0.1)
+
+
+MARGIN = [
+    "accuracy.model_error={sensitivity: {controller: {numerator: [0.2], denominator: [1, -1]}, max_db: 6}, "
+    "confidence: 0.9, band: [0.01, 3.14]}"
+]
+
+
+def test_the_discs_touch_the_circle_that_is_to_be_kept_and_no_more():
+    table = solve(parse_spec(SPEC % "", overrides=MARGIN)).tables["nyquist"].columns
+    z = np.exp(-1j * table["frequency_rad_per_s"])
+    loop = 0.2 / (1 - z) * z / (1 - 0.5 * z)
+    np.testing.assert_allclose(table["CG_re"] + 1j * table["CG_im"], loop, rtol=1e-9, atol=1e-12)
+    left = np.abs(1.0 + loop) - table["radius"]
+    np.testing.assert_allclose(table["distance_kept"], 10 ** (-6 / 20))
+    assert left.min() == pytest.approx(10 ** (-6 / 20), rel=1e-6)
+
+
+def test_the_loop_of_the_experiment_has_discs_of_its_own_error():
+    found = solve(parse_spec(SPEC % LOOP))
+    table, bound = found.tables["nyquist"].columns, found.bound
+    assert "distance_kept" not in table
+    radius = np.interp(bound["frequency_rad_per_s"], table["frequency_rad_per_s"], table["radius"])
+    np.testing.assert_allclose(radius, 0.1 * bound["r_u"], rtol=1e-3)
+
+
+def test_without_a_loop_there_is_none():
+    assert "nyquist" not in solve(parse_spec(SPEC % "")).curves
+
+
+def shown(outcome):
+    return [pair.names for pair in outcome.curves["ellipses"].pairs]
+
+
+def test_chosen_pairs_have_the_blocks_of_the_covariance():
+    pairs = 'report={ellipses: [["b2[2,1]", "a1[2]"], ["b1[1,1]", "b1[2,2]"]]}'
+    outcome = analyse(load_spec(SPECS / "two_by_two_given.yaml", [pairs]))
+    assert shown(outcome) == [("b2[2,1]", "a1[2]"), ("b1[1,1]", "b1[2,2]")]
+    P = np.asarray(outcome.result["information"]["covariance"])
+    names = outcome.result["information"]["parameters"]
+    at = [names.index("b2[2,1]"), names.index("a1[2]")]
+    ellipse = outcome.curves["ellipses"].pairs[0]
+    np.testing.assert_allclose(ellipse.covariance, P[np.ix_(at, at)], rtol=1e-12)
+    np.testing.assert_allclose(ellipse.center, [0.2, 0.4])
+
+
+def test_one_channel_shows_ellipses_when_they_are_asked_for():
+    plain = solve(load_spec(SPECS / "first_order.yaml"))
+    assert "ellipses" not in plain.curves
+    asked = ["report.ellipses=[[b1, f1]]"]
+    assert shown(solve(load_spec(SPECS / "first_order.yaml", asked))) == [("b1", "f1")]
+    assert shown(analyse(load_spec(SPECS / "first_order_given.yaml", asked))) == [("b1", "f1")]
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-9, 0.0, -1e-17])
+@pytest.mark.parametrize("scale", [1.0, 1e-12, 1e9])
+def test_the_boundary_is_that_of_the_region_though_parameters_are_told_together(apart, scale):
+    """Points on it have the chi-squared quantile in the covariance; a singular one leaves a line."""
+    C = np.array([[1.0, scale], [scale, scale**2 * (1.0 + apart)]])
+    points = boundary(np.zeros(2), C, 0.95)
+    assert np.all(np.isfinite(points))
+    radius = np.sqrt(-2.0 * np.log(0.05))
+    # Farthest along each axis: radius times its standard deviation.
+    reach = np.abs(points).max(axis=1)
+    np.testing.assert_allclose(reach, radius * np.sqrt(np.diag(C)), rtol=1e-2)
+    if apart == 1.0:
+        sizes = np.sqrt(np.diag(C))[:, None]
+        inverse = np.linalg.inv(C / (sizes * sizes.T))
+        lengths = np.einsum("in,ij,jn->n", points / sizes, inverse, points / sizes)
+        np.testing.assert_allclose(lengths, radius**2, rtol=1e-9)
+
+
+PRIOR = ", prior: {information: [[30.0, 2.0], [2.0, 20.0]]}"
+SHORTEST = ["objective=shortest_experiment", "limits={input_power: 0.7}"]
+
+
+def error_of_white(text, power, samples):
+    given = f"spectrum={{given: {{type: white, power: {power!r}}}}}"
+    told = ["limits=null", "objective=null", f"experiment.samples={samples}", given]
+    return np.array(analyse(parse_spec(text, overrides=told)).bound["r_u"])
+
+
+@pytest.mark.parametrize("more", ["", LOOP, PRIOR])
+def test_of_the_cheapest_experiment_at_its_cost(more):
+    found = solve(parse_spec(SPEC % more))
+    white = found.result["baseline"]["white"]
+    expected = error_of_white(SPEC % more, white["power"]["excitation"][0] / white["ratio"], 100)
+    np.testing.assert_allclose(found.bound["r_u_equal"][[0, -1]], expected[[0, -1]], rtol=1e-6)
+    assert (found.bound["r_u_equal"] / found.bound["r_adm"]).max() > 1.0
+
+
+def test_of_the_shortest_experiment_at_its_length():
+    found = solve(parse_spec(SPEC % "", overrides=SHORTEST))
+    samples = found.result["samples"]
+    expected = error_of_white(SPEC % "", found.result["baseline"]["white"]["power"]["excitation"][0], samples)
+    np.testing.assert_allclose(found.bound["r_u_equal"][[0, -1]], expected[[0, -1]], rtol=1e-6)
+
+
+def test_of_the_best_experiment_within_limits_there_is_none():
+    limited = ["objective=best_accuracy", "limits={input_power: 0.7}"]
+    assert "r_u_equal" not in solve(parse_spec(SPEC % "", overrides=limited)).bound

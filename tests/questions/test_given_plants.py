@@ -107,17 +107,12 @@ def test_fresh_plants_are_counted():
     assert 30 < fresh["missed"] < 70  # half of the gains are smaller, and r_u does not depend on them
 
 
-@pytest.mark.parametrize("verb", [analyse, solve])
+@pytest.mark.parametrize("verb", [analyse, solve, simulate])
 def test_other_commands_look_at_the_plants_too(verb):
-    spec = parse_spec(FIRST, overrides=[WHITE, "signal=null", "uncertainty={scenarios: [{b1: 3}]}"])
-    assert verb(spec).result["robust"]["scenarios"] == 1
-
-
-def test_what_is_simulated_is_looked_at_at_the_plants_too():
-    overrides = [WHITE, "uncertainty={scenarios: [{b1: 3}]}", "simulation={runs: 4, seed: 1}"]
-    found = simulate(parse_spec(FIRST, overrides=overrides)).result
+    overrides = [WHITE, "signal=null", "uncertainty={scenarios: [{b1: 3}]}", "simulation={runs: 4, seed: 1}"]
+    found = verb(parse_spec(FIRST, overrides=overrides)).result
     assert found["robust"]["scenarios"] == 1
-    assert "simulation" in found
+    assert ("simulation" in found) == (verb is simulate)
 
 
 def test_several_channels():

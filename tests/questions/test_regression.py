@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli import load_spec, simulate, solve
 from inputdesign_cli.cli import main
+from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.monte_carlo.regression import run_experiments
@@ -28,9 +29,6 @@ FOUR = [
 
 def result(path, *overrides, verb=solve):
     return verb(load_spec(path, list(overrides))).result
-
-
-# Results -----------------------------------------------------------------------------------------
 
 
 def test_numbers_for_sweeps_are_plain():
@@ -66,9 +64,6 @@ def test_the_alternation_states_its_gap():
 
 def test_white_cannot_always_meet_the_target():
     assert result(FIR, *FOUR)["baseline"] == {}
-
-
-# Signals -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("samples", "periods"), [(100, None), (101, None), (100, 25), (4, None), (3, None)])
@@ -115,20 +110,13 @@ def test_from_rest_the_first_samples_are_missing():
     entry = result(FIR, *FOUR, "signal.start=zero")["signal"]
     assert entry["energy"] == entry["from_rest"]["energy"]
     assert entry["energy"] < result(FIR, *FOUR)["signal"]["energy"]
-    np.testing.assert_array_equal(
-        delayed_regressors(np.arange(1.0, 4.0), 2, "zero"), [[1, 0], [2, 1], [3, 2]]
-    )
-    np.testing.assert_array_equal(
-        delayed_regressors(np.arange(1.0, 4.0), 2, "steady"), [[1, 3], [2, 1], [3, 2]]
-    )
+    for start, before in (("zero", 0), ("steady", 3)):
+        found = delayed_regressors(np.arange(1.0, 4.0), 2, start)
+        np.testing.assert_array_equal(found, [[1, before], [2, 1], [3, 2]])
 
 
 def test_without_samples_there_is_a_design_and_no_signal():
-    found = result(FIR, *FOUR, "experiment.samples=3")
-    assert "signal" not in found
-
-
-# Simulation --------------------------------------------------------------------------------------
+    assert "signal" not in result(FIR, *FOUR, "experiment.samples=3")
 
 
 @pytest.mark.parametrize(("path", "mean"), [(FREE, 1.381966), (FIR, 1.0)])
@@ -152,8 +140,6 @@ def test_a_study_repeats_with_its_seed():
 
 
 def test_estimates_are_least_squares():
-    from inputdesign_cli.design.regression import Regression
-
     rng = np.random.default_rng(0)
     Phi, theta = rng.standard_normal((30, 4)), np.array([1.0, 2.0, 3.0, 4.0])
     regression = Regression(np.array([1.0, 0.0]), np.array([0.0, 1.0]), 1.0, 0.25)
@@ -165,45 +151,27 @@ def test_estimates_are_least_squares():
     np.testing.assert_allclose(found.error, found.theta[:, 0] - 1.0 - 4.0)
 
 
-# The run directory -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("path", [FREE, FIR], ids=lambda p: p.stem)
 def test_a_run_has_its_files(path, tmp_path):
     outcome = solve(load_spec(path, ["experiment.samples=60"]))
     files = {file.name for file in write_run(outcome, tmp_path / "run", draw_all(outcome))}
-    wanted = {
-        "spec.yaml",
-        "signal.csv",
-        "signal.png",
-        "error.png",
-        "moments.png",
-        "figures.json",
-        "result.json",
-    }
-    assert files == wanted | ({"spectrum.csv"} if path == FIR else set())
-
-
-# Bad input ---------------------------------------------------------------------------------------
-
-
-def test_periods_must_divide_the_record():
-    with pytest.raises(SpecError, match="7 equal periods") as error:
-        solve(load_spec(FIR, ["signal.periods=7"]))
-    assert error.value.diagnostics[0].code == "bad-period"
+    wanted = "spec.yaml signal.csv signal.png error.png moments.png figures.json result.json"
+    assert files == {*wanted.split(), *(["spectrum.csv"] if path == FIR else [])}
 
 
 @pytest.mark.parametrize(
-    ("overrides", "part"),
+    ("verb", "override", "code", "part"),
     [
-        (["simulation=null"], "there are none"),
-        (["simulation.compare=[prbs]"], "prbs"),
-        (["experiment.samples=1"], "too few"),
+        (solve, "signal.periods=7", "bad-period", "7 equal periods"),
+        (simulate, "simulation=null", "missing-key", "there are none"),
+        (simulate, "simulation.compare=[prbs]", "not-supported", "prbs"),
+        (simulate, "experiment.samples=1", "wrong-shape", "too few"),
     ],
 )
-def test_what_cannot_be_simulated(overrides, part):
-    with pytest.raises(SpecError, match=part):
-        simulate(load_spec(FIR, overrides))
+def test_what_cannot_be_made_or_simulated(verb, override, code, part):
+    with pytest.raises(SpecError, match=part) as error:
+        verb(load_spec(FIR, [override]))
+    assert error.value.diagnostics[0].code == code
 
 
 def test_an_infeasible_target_says_what_would_be_feasible(capsys, monkeypatch, tmp_path):

@@ -31,10 +31,7 @@ accuracy: {frequency_response: {absolute: 0.05, band: [0.1, 2], lines: 6}}
 
 
 def spec(text=SINGLE, **changes):
-    made = parse_spec(text)
-    return (
-        made.with_(**{key.replace("__", "."): value for key, value in changes.items()}) if changes else made
-    )
+    return parse_spec(text).with_(**{key.replace("__", "."): value for key, value in changes.items()})
 
 
 def lines_of(result):
@@ -65,14 +62,8 @@ def test_limits_are_exhausted_by_the_best_accuracy_and_the_shortest_experiment()
     assert best["objective"]["kind"] == "accuracy_factor"
     assert best["objective"]["value"] == pytest.approx(0.5, rel=1e-12)
     assert best["power"]["input"] == pytest.approx([4 * need], rel=1e-12)
-    short = solve(
-        spec(
-            objective="shortest_experiment",
-            limits__input_power=2 * need,
-            signal=None,
-            accuracy__frequency_response__period=400,
-        )
-    ).result
+    stated = {"limits__input_power": 2 * need, "accuracy__frequency_response__period": 400}
+    short = solve(spec(objective="shortest_experiment", signal=None, **stated)).result
     assert short["objective"]["value"] == pytest.approx(800.0, rel=1e-9)
     assert short["samples"] == 3 * 400  # two periods count, one is left to the transient
     assert short["frequency_response"]["worst_ratio"] == pytest.approx(1.0, rel=1e-9)
@@ -120,11 +111,9 @@ def test_simulated_deviations_are_those_designed_at_every_line(text):
     assert entry["bias"] < 0.12
     table = results.tables["deviations"].columns
     designed = [name for name in table if name.startswith("deviation") and "_record" not in name]
-    pairs = [
-        (name, name.replace("deviation", "deviation_simulated")) for name in designed if "sim" not in name
-    ]
-    for name, simulated in pairs:
-        assert table[simulated] == pytest.approx(table[name], rel=0.05)
+    for name in (name for name in designed if "sim" not in name):
+        simulated = table[name.replace("deviation", "deviation_simulated")]
+        assert simulated == pytest.approx(table[name], rel=0.05)
 
 
 def test_equal_lines_keep_lower_limits_too():
@@ -203,6 +192,7 @@ def test_limits_that_are_too_tight_say_what_would_do():
     assert solve(spec(limits__input_power=need * (1 + 1e-9)))
 
 
+@pytest.fixture(scope="module")
 def audited():
     task = build_task(spec())
     plan, results = task._solved()
@@ -210,15 +200,15 @@ def audited():
     return replace(task.terms, experiment=experiment), plan, results
 
 
-def test_what_is_written_passes_the_audit():
-    audit_response(*audited())
+def test_what_is_written_passes_the_audit(audited):
+    audit_response(*audited)
 
 
 @pytest.mark.parametrize(
     "path", ["cost", "spectrum.powers", "frequency_response.worst_ratio", "signal.worst_ratio"]
 )
-def test_a_number_that_is_wrong_does_not_pass(path):
-    terms, plan, results = audited()
+def test_a_number_that_is_wrong_does_not_pass(audited, path):
+    terms, plan, results = audited
     result = {name: dict(part) if isinstance(part, dict) else part for name, part in results.result.items()}
     *outer, name = path.split(".")
     holder = result[outer[0]] if outer else result
@@ -227,14 +217,12 @@ def test_a_number_that_is_wrong_does_not_pass(path):
         audit_response(terms, plan, replace(results, outcome=read_plain(Outcome, result)))
 
 
-def test_a_record_that_is_wrong_does_not_pass():
-    terms, plan, results = audited()
-    time, u = results.tables["signal"].columns.items()
-    wrong = np.array(u[1])
-    wrong[500:] *= 1.0001
-    tables = {**results.tables, "signal": Table(dict([time, (u[0], wrong)]))}
+def test_a_record_that_is_wrong_does_not_pass(audited):
+    terms, plan, results = audited
+    columns = dict(results.tables["signal"].columns)
+    columns["u1"] = columns["u1"] * np.where(np.arange(columns["u1"].size) < 500, 1.0, 1.0001)
     with pytest.raises(InaccurateError):
-        audit_response(terms, plan, replace(results, tables=tables))
+        audit_response(terms, plan, replace(results, tables={**results.tables, "signal": Table(columns)}))
 
 
 def test_the_shipped_spec_is_solved():

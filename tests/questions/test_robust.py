@@ -1,17 +1,20 @@
-"""`uncertainty`: designs for every plant that the true one might be."""
+"""`uncertainty`: designs for every plant that the true one might be, and for the worst of a region."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.signal
 from scipy.signal import lfilter
 
-from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli import load_spec, parse_spec, questions, solve
 from inputdesign_cli.compute.time_limit import stoppable
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
+from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.common.robust import Batch, tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
@@ -316,3 +319,113 @@ def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
     shares = [one.kept.share for one in tried_on(done.design, 500, replace(batch, plants=tuple(plants)))]
     assert shares[3] == np.inf
     assert np.delete(shares, 3) == pytest.approx([one.share for one in np.delete(alone, 3)], rel=1e-9)
+
+
+def test_of_an_interval_the_end_that_asks_for_most_is_found():
+    """A faster pole asks for more power: the worst case is the design for the end of the interval."""
+    found = solved(
+        FIRST, "uncertainty={intervals: {f1: [-0.8, -0.5]}, scenarios: 3, fresh: 0, worst_case: 0.95}"
+    )
+    told = found["robust"]["searched"]
+    assert told["proved"] is False
+    assert told["region"] == "the intervals"
+    assert told["added"] == 1
+    assert told["parameters"] == pytest.approx({"b1": 3.6, "c1": -0.9, "f1": -0.5}, abs=1e-12)
+    assert told["share"] == pytest.approx(1.0, abs=1e-6)
+    at_the_end = solved(FIRST, "uncertainty={scenarios: [{f1: -0.5}]}")
+    assert found["cost"] == pytest.approx(at_the_end["cost"], rel=1e-6)
+    assert "risk" not in found["robust"]  # the plant was not drawn
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "covariance"), [(FIRST, COVARIANCE), (LOOP, "[[0.001, 0.0003], [0.0003, 4.0e-4]]")]
+)
+def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, covariance):
+    """Of 200 plants on the boundary of the ellipsoid, drawn by other means."""
+    overrides = [f"uncertainty={{covariance: {covariance}, scenarios: 5, fresh: 0, worst_case: 0.9}}"]
+    spec = parse_spec(text, overrides=overrides)
+    task = build_convex(spec)
+    done = task.designed()
+    share = done.plants.searched.kept.share
+    assert share <= 1.0 + 1e-3
+    assert done.plants.searched.added >= 1
+    covariance = np.array(json.loads(covariance))
+    rng, nominal = np.random.default_rng(1), task.simulation.nominal.model.theta
+    z = rng.standard_normal((200, nominal.size))
+    z /= np.sqrt(np.einsum("ni,ij,nj->n", z, np.linalg.inv(covariance), z))[:, None]
+    radius = {2: 4.605170, 3: 6.251389}[nominal.size] ** 0.5  # of tables of chi-squared, 90 %
+    plants = build_plants(spec, task.asked.question.experiment, task.asked.question.basis)
+    tried = [(theta, plants.region.at(theta)) for theta in nominal + radius * z]
+    thetas, alternatives = zip(*[one for one in tried if one[1] is not None], strict=True)
+    assert len(thetas) > 150
+    shares = [
+        one.kept.share for one in tried_on(done.design, 500, Batch(np.array(thetas), alternatives, 200))
+    ]
+    assert max(shares) <= share * (1 + 1e-3)
+    assert max(shares) > 0.8
+
+
+PEAKS = """
+plant: {B: [0, 1.0], F: [1, -0.8]}
+noise: {variance: 0.01}
+experiment: {samples: 120}
+accuracy: {model_error: {relative: 0.5}}
+objective: best_accuracy
+limits: {amplitude: {input: 1, output: 2}}
+uncertainty: {intervals: {b1: [0.8, 1.2], f1: [-0.85, -0.75]}, scenarios: 4, fresh: 60}
+spectrum: {type: fir, order: 4}
+signal: {type: multisine, seed: 1, candidates: 1}
+solver: {any_spectrum: false}
+"""
+
+
+def peaks(u, plants):
+    return [
+        np.abs(scipy.signal.lfilter([0.0, b], [1.0, f], u)).max() / 2.0
+        for b, f in (plant.experiment.model.theta for plant in plants)
+    ]
+
+
+@pytest.mark.slow
+def test_drawn_plants_keep_limits_and_others_are_counted():
+    found = solve(parse_spec(PEAKS))
+    u = found.tables["signal"].columns["u1"]
+    done = build_convex(parse_spec(PEAKS)).designed()
+    assert max(peaks(u, done.plants.batch.plants)) <= 1.0
+    others = [size for batch in done.plants.afresh() for size in peaks(u, batch.plants)]
+    told = found.result["robust"]["fresh"]["beyond_limits"]
+    assert told["largest"] == pytest.approx(max(others), rel=1e-9)
+    assert told["draws"] == sum(size > 1.0 + 1e-6 for size in others) > 0
+    lines = {name: text for name, text, _ in facts(found.outcome, "s")}
+    assert f"of 60 more {told['draws']} go beyond, up to {100 * max(others):.3g} %" in lines["limits there"]
+
+
+@pytest.mark.slow
+def test_limits_that_no_plant_changes_are_not_counted():
+    found = solve(parse_spec(PEAKS, overrides=["limits={amplitude: 1}"]))
+    assert "beyond_limits" not in found.result["robust"]["fresh"]
+
+
+STEEP = """
+sample_time: 5
+plant: {continuous: {gain: 2, time_constant: 180, dead_time: 25}, sample: zoh}
+noise: {variance: 0.04}
+uncertainty:
+  intervals: {gain: [1.4, 2.6], time_constant: [126, 234], dead_time: [17.5, 32.5]}
+  scenarios: 6
+accuracy: {loop: {tuning: {simc: {}}, max_sensitivity_db: 4.2}}
+objective: best_accuracy
+limits: {amplitude: 5, duration: 3600}
+spectrum: {type: fir, order: 8}
+solver: {any_spectrum: false}
+"""
+
+
+# |S| of this loop reaches 4.038 dB: what a sound check of the result would refuse, it must not refuse here.
+@pytest.mark.slow
+@pytest.mark.parametrize("margin", [4.08, 4.1, 4.2])
+def test_the_design_passes_its_own_last_check(margin):
+    found = questions.solve(parse_spec(STEEP).with_(**{"accuracy.loop.max_sensitivity_db": margin}))
+    assert found.result["status"] == "optimal"
+    assert found.result["objective"]["value"] > 1.0

@@ -143,6 +143,7 @@ TABLES = [
     ("frequency,bound\n0,1\n3.2,1\n", "data-missing-column", "r_adm"),
     ("frequency,r_adm\n0,1\n3.2,x\n", "data-not-a-number", "'x'"),
     ("frequency,r_adm\n", "data-unreadable", "no rows"),
+    (None, "data-unreadable", "does not exist"),
 ]
 
 
@@ -151,18 +152,13 @@ TABLES = [
 )
 def test_bad_tables(tmp_path, content, code, words):
     table = tmp_path / "r.csv"
-    table.write_text(content, encoding="utf-8")
+    if content is not None:
+        table.write_text(content, encoding="utf-8")
     spec = parse_spec(SMALL.replace("relative: 0.01", f"table: {table}"))
     with pytest.raises(DataError) as error:
         validate(spec)
     assert error.value.diagnostics[0].code == code
     assert words in error.value.diagnostics[0].message
-
-
-def test_missing_table(tmp_path):
-    with pytest.raises(DataError) as error:
-        validate(parse_spec(SMALL.replace("relative: 0.01", f"table: {tmp_path / 'none.csv'}")))
-    assert "does not exist" in error.value.diagnostics[0].message
 
 
 def test_table_equal_to_a_relative_bound_gives_its_design(tmp_path):

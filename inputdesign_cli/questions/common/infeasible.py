@@ -104,7 +104,7 @@ class Bought:
             )
         else:
             buys = f"standard deviations {rounded_up(self.factor, 4)} times as large as it takes"
-        places = []
+        places = list[str]()
         for asked, w in self._binding:
             entry = self._entry(asked)
             parts = (f"in entry {entry}" if entry else "", "" if w is None else f"at {self.units.named(w)}")

@@ -180,10 +180,14 @@ def _measured_results(
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
     """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
-    listed = {kind: (one.over_noise, one.probability, one.rms) for kind, one in silent.items()}
     return {
-        kind: SilentLine(silent[kind].lines, *(tuple(values.tolist()) for values in by_output))
-        for kind, by_output in listed.items()
+        kind: SilentLine(
+            one.lines,
+            tuple(one.over_noise.tolist()),
+            tuple(one.probability.tolist()),
+            tuple(one.rms.tolist()),
+        )
+        for kind, one in silent.items()
     }
 
 

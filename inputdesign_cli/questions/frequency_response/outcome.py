@@ -25,16 +25,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.outcome.units import Header, Units
-from inputdesign_cli.questions.common.delivery import (
-    APART,
-    KINDS,
-    check_claims,
-    of_bounds,
-    of_cost,
-    of_limit,
-    proof_status,
-    results_of,
-)
+from inputdesign_cli.questions.common import delivery
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.signal_outcome import signal_of, with_record
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
@@ -173,7 +164,7 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
         found += limits_not_kept(stated, plan.length, power, None)
     return out.Outcome(
         title=terms.header.title,
-        status=proof_status(plan.design.gap, terms.tolerance) if designed else met,
+        status=delivery.proof_status(plan.design.gap, terms.tolerance) if designed else met,
         objective=objective,
         cost=cost,
         samples=plan.length,
@@ -213,7 +204,7 @@ def _objective(terms: ResponseTerms, plan: Planned) -> tuple[out.Objective, out.
         else:
             value, bound, white = value**-0.5, bound**-0.5, out.White(value=float(within**-0.5))
     gap = abs(value - bound) / value
-    kind = KINDS[terms.goal]
+    kind = delivery.KINDS[terms.goal]
     return out.Objective(kind, value, lower_bound=min(bound, value), relative_gap=gap), out.Baseline(white)
 
 
@@ -232,7 +223,7 @@ def response_results(
     tables = {"deviations": Table(columns), "spectrum": Table(spectrum)}
     lines = SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True)
     curves: dict[str, Curves] = {"deviations": deviations, "spectrum": lines}
-    results = results_of(terms.header, response_outcome(terms, plan, timing), tables, curves)
+    results = delivery.results_of(terms.header, response_outcome(terms, plan, timing), tables, curves)
     return with_record(results, request, units, experiment, plan.record, signal)
 
 
@@ -284,7 +275,7 @@ def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> Non
     written = out.read_plain(out.Outcome, results.result)
     _, *samples = csv_columns(csv_text(results.tables["signal"]).encode()).values()
     wrong = (*_of_lines(terms, written), *_of_record(terms, plan, written, np.stack(samples, axis=1)))
-    check_claims(wrong, "rescale the signals, or leave out lines where |G| is very small")
+    delivery.check_claims(wrong, "rescale the signals, or leave out lines where |G| is very small")
 
 
 def _of_lines(terms: ResponseTerms, written: out.Outcome) -> Iterator[str]:
@@ -299,9 +290,9 @@ def _of_lines(terms: ResponseTerms, written: out.Outcome) -> Iterator[str]:
     counted, ratio = claimed.counted or 0, claimed.worst_ratio or 0.0
     variances = 2.0 * terms.lines.noise[:, :, None] / (counted * powers[:, None, :])
     worst = float(np.max(np.sqrt(variances) / terms.lines.admitted))
-    if not abs(worst - ratio) <= APART * worst:
+    if not abs(worst - ratio) <= delivery.APART * worst:
         yield f"the lines leave {worst:.10g} times the deviation admitted, not {ratio:.10g}"
-    if terms.goal in ("cost", "samples") and not worst <= 1.0 + APART:
+    if terms.goal in ("cost", "samples") and not worst <= 1.0 + delivery.APART:
         yield f"the lines leave {worst:.10g} times the deviation that is admitted"
     found = {
         "input": powers,
@@ -315,11 +306,11 @@ def _of_lines(terms: ResponseTerms, written: out.Outcome) -> Iterator[str]:
         return float(total.sum() if channel is None else total[channel])
 
     paid = sum(weight * power(kind, channel) for kind, channel, weight in weights_of(terms.cost))
-    yield from of_cost(paid, written.cost or 0.0)
+    yield from delivery.of_cost(paid, written.cost or 0.0)
     for limit in terms.limits if terms.goal != "given" else ():
-        yield from of_limit(limit, power(limit.kind, limit.channel))
+        yield from delivery.of_limit(limit, power(limit.kind, limit.channel))
     if written.objective is not None:
-        yield from of_bounds(written.objective)
+        yield from delivery.of_bounds(written.objective)
 
 
 def _of_record(terms: ResponseTerms, plan: Planned, written: out.Outcome, record: Array) -> Iterator[str]:
@@ -333,8 +324,8 @@ def _of_record(terms: ResponseTerms, plan: Planned, written: out.Outcome, record
     noise *= 1.0 + (signal.extra_power or 0.0)
     found = np.sqrt(noise * spread[:, None, :] * terms.periods.blocks / plan.counted)
     apart = float(np.max(np.abs(found / plan.deviations - 1.0)))
-    if not apart <= APART:
+    if not apart <= delivery.APART:
         yield f"the samples of the record leave deviations that are off those claimed by {apart:.3g}"
     worst, claimed = float(np.max(found / terms.lines.admitted)), signal.worst_ratio or 0.0
-    if not abs(worst - claimed) <= APART * worst:
+    if not abs(worst - claimed) <= delivery.APART * worst:
         yield f"the record leaves {worst:.10g} times what is admitted, not {claimed:.10g}"

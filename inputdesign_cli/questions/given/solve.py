@@ -12,9 +12,11 @@ import numpy as np
 from inputdesign_cli.accuracy import Criterion, Requirement, worst
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.design.convex.question import Alternative
+from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.findings.designed_records import too_long
 from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept, met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
@@ -27,12 +29,18 @@ from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates, Simulator
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
 from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, worst_ratio
-from inputdesign_cli.questions.common.robust import Plants
+from inputdesign_cli.questions.common.robust import MET, Kept, Plants, Tried
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import spectrum_curves
 from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
-from inputdesign_cli.questions.least_cost.robust_outcome import AtPlants, given_robust, kept_of
+from inputdesign_cli.questions.least_cost.robust_outcome import (
+    Floor,
+    RobustResult,
+    fresh_plants,
+    plants_kept,
+    worst_plant,
+)
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.signal.selection import Record
@@ -97,6 +105,20 @@ class GivenExcitation:
         }
         information = partial(spectral_information, basis, x)
         return cls(kind, found, information, basis, x, in_phase)
+
+    def at(self, plant: Alternative, samples: int) -> Tried:
+        """Return the largest error ratio at a plant: infinite if its parameters are undetermined."""
+        seconds_left()
+        own = replace(plant.experiment, samples=samples)
+        asked = tuple(make(own) for make in (*plant.requirements, *plant.side))
+        try:
+            coordinates = own.whitened(self.scale)
+            there = plant.at(coordinates)
+            return Tried(_kept((*there.requirements, *there.side), self.information(coordinates)), asked)
+        except OutOfTimeError:
+            raise
+        except (np.linalg.LinAlgError, IdesignError):
+            return Tried(Kept(np.inf), asked)
 
     def described(self, units: Units) -> Spectrum:
         """Return the entry of the outcome for this excitation."""
@@ -232,15 +254,39 @@ class GivenTask(SpectrumTask):
                 units, excitation.basis, excitation.x, experiment.band, white=level
             )
             curves["spectrum"] = replace(drawn, label="given")
-        plants = self.plants
-        if plants is not None:
-            excited = AtPlants(excitation.information, excitation.scale, experiment.samples)
-            nominal, centre = kept_of(requirements, informed.information), experiment.model.theta
-            found = given_robust(excited, plants, nominal, centre, units)
+        if self.plants is not None:
+            found = self._at_plants(experiment, self.plants, _kept(requirements, informed.information))
             status = "missed" if found.entry.missed else outcome.status
             outcome = replace(outcome, robust=found.entry, status=status).saying(found.findings)
             tables |= found.tables
         return results_of(self.header, outcome, tables, curves)
+
+    def _at_plants(self, experiment: Experiment, plants: Plants, nominal: Kept) -> RobustResult:
+        """Return the accuracy at the plants of `uncertainty`, the worst left out as far as allowed.
+
+        The plant of the spec keeps `nominal`. It raises `SpecError` (`not-exciting`).
+        """
+        batch, at = plants.batch, partial(self.excitation.at, samples=experiment.samples)
+        tried = [at(plant) for plant in batch.plants]
+        rising = np.argsort([one.kept.share for one in tried], kind="stable").tolist()
+        kept = sorted(rising[: len(rising) - plants.discard])
+        at_each = [nominal, *(tried[place].kept for place in kept)]
+        looked_at = list(at_each)
+        if plants.region is not None:
+            starts = [experiment.model.theta, *(batch.thetas[place] for place in reversed(rising))]
+            worst_found, _ = worst_plant(plants.region, lambda _, plant: at(plant).kept, starts)
+            plants, looked_at = replace(plants, searched=worst_found), [*looked_at, worst_found.kept]
+        if not all(np.isfinite(one.share) for one in looked_at):
+            message = "the given excitation does not determine the parameters of every plant of uncertainty"
+            hint = "excite more frequencies, or state the uncertainty more tightly"
+            raise bad_spec("not-exciting", message, hint=hint, key="uncertainty")
+        binding = [int(np.argmax([one.share for one in at_each]))]
+        floors = [Floor.at(tried[place].asked) for place in kept]
+        found = plants_kept(self.header.units, plants, kept, at_each, binding, floors)
+        fresh, fewer = fresh_plants(plants, lambda drawn, _: [at(plant) for plant in drawn.plants])
+        missed = sum(one.share > MET for one in looked_at)
+        entry = replace(found.entry, missed=missed, fresh=fresh)
+        return replace(found, entry=entry, findings=(*found.findings, *fewer))
 
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
@@ -287,3 +333,9 @@ class GivenTask(SpectrumTask):
         spectrum = excitation.drawn(request.step)
         generator = SignalGenerator(spectrum, request.settings, samples, request.band)
         return excitation.in_phase or Redrawn("design", generator, excitation.basis, excitation.x)
+
+
+def _kept(requirements: Sequence[Requirement], information: Array) -> Kept:
+    """Return the largest ratio of an error to what is admitted, and where it is."""
+    found = worst([one for requirement in requirements for one in requirement.violations(information)])
+    return Kept(found.ratio, found.frequency)

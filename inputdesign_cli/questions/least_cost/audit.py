@@ -19,7 +19,6 @@ from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
-from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import Objective, Outcome, plain, read_plain
 from inputdesign_cli.plant import graded_grid
@@ -88,10 +87,13 @@ def _disagreements(done: Designed, written: _Written, apart: float, *, on_grid: 
     kept = kept_by(problem, done.design, done.experiment.samples)
     doubtful = [one for n, one in enumerate(plants) if n == 0 or kept[n].share > _DOUBTFUL]
     for reread in doubtful if not on_grid else ():
-        yield from reread.missed(goal)
+        for promised in reread.scenario.side if goal == "factor" else reread.scenario.requirements:
+            ratio = reread.worst(promised)
+            if not ratio <= 1.0 + APART:
+                yield f"the design leaves {ratio:.6g} times the error that {promised.name} admits"
     if goal == "factor":  # the value is that of the plant at which it is worst
         if problem.demands.criterion is None:
-            found, size = max(one.worst_of_all for one in doubtful), value
+            found, size = max(one.worst(r) for one in doubtful for r in one.scenario.requirements), value
         else:
             found, size = min(one.criterion for one in doubtful), size or abs(value)
         if not abs(found - value) <= apart * size:
@@ -115,18 +117,6 @@ class _Reread:
     written: _WrittenSpectrum
     scenario: Scenario
 
-    def missed(self, goal: Goal) -> Iterator[str]:
-        """Yield a sentence on each requirement that is promised and not met."""
-        for requirement in self.scenario.side if goal == "factor" else self.scenario.requirements:
-            worst = self._worst(requirement)
-            if not worst <= 1.0 + APART:
-                yield f"the design leaves {worst:.6g} times the error that {requirement.name} admits"
-
-    @property
-    def worst_of_all(self) -> float:
-        """Return the worst ratio of all requirements."""
-        return max(self._worst(requirement) for requirement in self.scenario.requirements)
-
     @property
     def criterion(self) -> float:
         """Return the value of the criterion that is the goal."""
@@ -134,7 +124,7 @@ class _Reread:
         assert first is not None
         return first.value(first.level(self._information))
 
-    def _worst(self, requirement: Requirement) -> float:
+    def worst(self, requirement: Requirement) -> float:
         """Return the largest ratio over the band and its ends, also between the points of its grid."""
         try:
             np.linalg.cholesky(self._information)

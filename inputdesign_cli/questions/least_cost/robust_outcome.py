@@ -14,14 +14,14 @@ from itertools import cycle, islice
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement, model_errors, worst
+from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
-from inputdesign_cli.errors import IdesignError, bad_spec
+from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.unfinished import fewer_plants, floor_findings, unstable_draws
 from inputdesign_cli.information import Experiment
@@ -56,9 +56,6 @@ _STARTS = 3  # beside the plant of the spec
 _NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
 
 
-Keeps = Callable[[Array, Alternative], Kept]
-
-
 # A plant binds when it is within this share of its limit.
 _BINDS = 1e-5
 _LISTED = 12
@@ -67,7 +64,9 @@ _ESTIMATES, _MOST_OF_THEM = 100, 0.95
 _GRID_POINTS = 300
 
 
-def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> tuple[Searched, Alternative]:
+def worst_plant(
+    region: Region, keeps: Callable[[Array, Alternative], Kept], starts: Sequence[Array]
+) -> tuple[Searched, Alternative]:
     """Return the worst plant of the region that ascents from parameters (k,) find, the worst known first."""
     tried, worst = 0, list[tuple[Array, Alternative, Kept]]()
 
@@ -165,19 +164,6 @@ class Floor:
         return cls(raised, lost, peak if lost else None, share)
 
 
-def floor_use(plants: Plants, kept: Sequence[int], floors: Sequence[Floor]) -> parts.FloorUse | None:
-    """Return the numbers of plants that are held to the floor; None if each has an r_adm of its own."""
-    raised = [place for place, one in enumerate(floors) if one.raised]
-    if not raised:
-        return None
-    lost = sorted((p for p in raised if floors[p].lost), key=lambda p: -(floors[p].peak or 0.0))
-    named = (_named(plants, plants.batch.thetas[kept[p]]) for p in lost[:_LISTED])
-    worst = [parts.LostPlant(kept[p] + 1, name, floors[p].peak) for p, name in zip(lost, named, strict=False)]
-    numbers = np.array(kept) + 1
-    among = (tuple(numbers[raised].tolist()), tuple(numbers[sorted(lost)].tolist()))
-    return parts.FloorUse(floors[raised[0]].share, *among, tuple(worst) or None)
-
-
 @dataclass(frozen=True)
 class RobustResult:
     """Holds `robust` of the outcome, with tables and curves by the names of their files, and findings."""
@@ -188,12 +174,14 @@ class RobustResult:
     findings: tuple[Finding, ...] = ()
 
 
-Peak = Callable[[Experiment], float]
-"""The largest share of a limit on single samples that the record uses at a plant."""
+def robust_result(
+    done: Designed, plants: Plants, peak: Callable[[Experiment], float] | None = None
+) -> RobustResult:
+    """Return the accuracy of a design at its plants.
 
-
-def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> RobustResult:
-    """Return the accuracy of a design at its plants; `peak` is None if limits do not depend on them."""
+    The `peak` is the largest share of a limit on single samples that the record uses at a plant; it is None
+    if the limits do not depend on plants.
+    """
     kept, problem, samples = done.kept, done.problem, done.experiment.samples
     at_each = kept_by(problem, done.design, samples)
     numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
@@ -238,7 +226,16 @@ def plants_kept(
     """
     numbers, batch = [0, *(number + 1 for number in kept)], plants.batch
     shares = np.array([one.share for one in at_each])
-    worst, floor = int(np.argmax(shares)), floor_use(plants, kept, floors)
+    worst, raised = int(np.argmax(shares)), [p for p, one in enumerate(floors) if one.raised]
+    floor: parts.FloorUse | None = None
+    if raised:  # numbers of the plants that are held to the floor, and of those without an r_adm of their own
+        lost = sorted((p for p in raised if floors[p].lost), key=lambda p: -(floors[p].peak or 0.0))
+        listed = (
+            parts.LostPlant(numbers[p + 1], _named(plants, batch.thetas[kept[p]]), floors[p].peak)
+            for p in lost[:_LISTED]
+        )
+        held, without = (tuple(numbers[p + 1] for p in places) for places in (raised, sorted(lost)))
+        floor = parts.FloorUse(floors[raised[0]].share, held, without, tuple(listed) or None)
     active = (
         parts.ActivePlant(
             numbers[place],
@@ -303,7 +300,7 @@ def _searched(units: Units, plants: Plants) -> parts.SearchedPlant | None:
 def fresh_plants(
     plants: Plants,
     try_on: Callable[[Batch, float], Sequence[Tried]],
-    peak: Peak | None = None,
+    peak: Callable[[Experiment], float] | None = None,
     promised: float | None = None,
 ) -> tuple[parts.FreshPlants | None, list[Finding]]:
     """Return the share of other plants from the same distribution that are missed, as time allows.
@@ -387,69 +384,3 @@ def fan_curves(
     columns = {units.frequency_header: frequency, "nominal": ratios[0], "largest": ratios.max(axis=0)}
     columns |= {name.replace(" ", "_"): values for name, values in named.items()}
     return Table(columns), FanCurves(frequency, ratios[1:], ratios[0], named)
-
-
-@dataclass(frozen=True)
-class AtPlants:
-    """Holds an excitation of this `power` over these `samples`; `information` gives M in any coordinates."""
-
-    information: Callable[[Experiment], Array]
-    power: float
-    samples: int
-
-    def on(self, plant: Alternative) -> Tried:
-        """Return the largest error ratio at a plant: infinite if its parameters are undetermined."""
-        seconds_left()
-        own = replace(plant.experiment, samples=self.samples)
-        asked = tuple(make(own) for make in (*plant.requirements, *plant.side))
-        try:
-            coordinates = own.whitened(self.power)
-            there = plant.at(coordinates)
-            return Tried(kept_of((*there.requirements, *there.side), self.information(coordinates)), asked)
-        except OutOfTimeError:
-            raise
-        except (np.linalg.LinAlgError, IdesignError):
-            return Tried(Kept(np.inf), asked)
-
-    def on_each(self, batch: Batch, above: float = 0.0) -> list[Tried]:
-        """Return the largest error ratio at every plant of a batch, to the last digit also up to `above`."""
-        return [self.on(plant) for plant in batch.plants]
-
-
-def kept_of(requirements: Sequence[Requirement], information: Array) -> Kept:
-    """Return the largest ratio of an error to what is admitted, and where it is."""
-    found = worst([one for requirement in requirements for one in requirement.violations(information)])
-    return Kept(found.ratio, found.frequency)
-
-
-def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, units: Units) -> RobustResult:
-    """Return the accuracy at the plants of `uncertainty`, the worst left out as far as allowed.
-
-    The plant of the spec has parameters `centre` (k,) and keeps `nominal`. It raises `SpecError` (`not-
-    exciting`).
-    """
-    batch = plants.batch
-    tried = at.on_each(batch)
-    shares = np.array([one.kept.share for one in tried])
-    rising = np.argsort(shares, kind="stable").tolist()
-    kept = sorted(rising[: len(rising) - plants.discard])
-    at_each = [nominal, *(tried[place].kept for place in kept)]
-    looked_at = list(at_each)
-    if plants.region is not None:
-        starts = [centre, *(batch.thetas[place] for place in reversed(rising))]
-        found, _ = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
-        plants, looked_at = replace(plants, searched=found), [*looked_at, found.kept]
-    if not all(np.isfinite(one.share) for one in looked_at):
-        message = "the given excitation does not determine the parameters of every plant of uncertainty"
-        hint = "excite more frequencies, or state the uncertainty more tightly"
-        raise bad_spec("not-exciting", message, hint=hint, key="uncertainty")
-    binding = [int(np.argmax([one.share for one in at_each]))]
-    floors = [Floor.at(tried[place].asked) for place in kept]
-    found_there = plants_kept(units, plants, kept, at_each, binding, floors)
-    fresh, fewer = fresh_plants(plants, at.on_each)
-    missed = sum(one.share > MET for one in looked_at)
-    return replace(
-        found_there,
-        entry=replace(found_there.entry, missed=missed, fresh=fresh),
-        findings=(*found_there.findings, *fewer),
-    )

@@ -30,14 +30,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
-from inputdesign_cli.questions.common.delivery import (
-    check_claims,
-    of_bounds,
-    proof_status,
-    results_of,
-    timing,
-    with_study,
-)
+from inputdesign_cli.questions.common import delivery
 from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.signal.limits import Bounds
@@ -55,7 +48,7 @@ KEY = "accuracy.closed_loop_error"
 
 
 def design_outcome(
-    task: LoopErrorTask, design: LoopErrorDesign, signal: out.Signal, timing: dict[str, float]
+    task: LoopErrorTask, design: LoopErrorDesign, signal: out.Signal, seconds: dict[str, float]
 ) -> out.Outcome:
     """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
     samples, white = task.samples, design.white
@@ -75,10 +68,11 @@ def design_outcome(
         relative_gap=design.gap,
         any_spectrum_bound=design.lower_bound,
     )
-    check_claims(of_bounds(objective, task.tolerance), "rescale the signals, or restrict the band")
+    remedy = "rescale the signals, or restrict the band"
+    delivery.check_claims(delivery.of_bounds(objective, task.tolerance), remedy)
     return out.Outcome(
         title=task.header.title,
-        status=proof_status(design.gap, task.tolerance),
+        status=delivery.proof_status(design.gap, task.tolerance),
         objective=objective,
         cost=weighted_sum(task.cost, {"input": inputs, "output": outputs, "excitation": inputs}),
         samples=samples,
@@ -107,7 +101,7 @@ def design_outcome(
         ),
         signal=signal,
         solver=out.Solver("exchange" if design.of_lines else "dual", task.tolerance, details=details),
-        timing_s=timing,
+        timing_s=seconds,
     )
 
 
@@ -359,17 +353,17 @@ class LoopErrorTask:
             self.runs, self.seed, tried, samples=samples, parameters=names, improvement=improvement
         )
         findings = unstable_runs({name: one.unstable for name, one in studies.items()}, self.runs)
-        return with_study(results, study, begun, findings, curves=curves)
+        return delivery.with_study(results, study, begun, findings, curves=curves)
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
         started = time.perf_counter()
         design = design_loop_error(self.problem, self.covariance, tolerance=self.tolerance)
         solved = time.perf_counter()
         samples, signal = realise(design, self.signal)
-        outcome = design_outcome(self, design, signal, timing(started, solved))
+        outcome = design_outcome(self, design, signal, delivery.timing(started, solved))
         tables, curves = spectrum_results(self, design)
         tables["signal"], curves["signal"] = signal_results(self.header.units, samples)
-        return design, results_of(self.header, outcome, tables, curves)
+        return design, delivery.results_of(self.header, outcome, tables, curves)
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:

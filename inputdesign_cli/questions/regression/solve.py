@@ -27,14 +27,7 @@ from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
 from inputdesign_cli.outcome.units import Header
-from inputdesign_cli.questions.common.delivery import (
-    check_claims,
-    of_bounds,
-    proof_status,
-    results_of,
-    timing,
-    with_study,
-)
+from inputdesign_cli.questions.common import delivery
 from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
 from inputdesign_cli.signal.moments import Start, delayed_regressors, free_regressors, periodic_input, rank
 
@@ -65,7 +58,7 @@ class MomentsDesign:
 
 
 def moments_outcome(
-    task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
+    task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, seconds: dict[str, float]
 ) -> out.Outcome:
     """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
     regression, split, target, n = task.regression, design.split, task.target, task.regression.n
@@ -88,10 +81,11 @@ def moments_outcome(
     objective = out.Objective(
         kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
     )
-    check_claims(of_bounds(objective, design.tolerance), "rescale the regressors, or state the weights anew")
+    remedy = "rescale the regressors, or state the weights anew"
+    delivery.check_claims(delivery.of_bounds(objective, design.tolerance), remedy)
     return out.Outcome(
         title=task.header.title,
-        status=proof_status(gap, design.tolerance),
+        status=delivery.proof_status(gap, design.tolerance),
         objective=objective,
         cost=design.energy,
         samples=task.samples,
@@ -116,7 +110,7 @@ def moments_outcome(
         baseline=out.Baseline(white),
         signal=signal,
         solver=design.how,
-        timing_s=timing,
+        timing_s=seconds,
     )
 
 
@@ -267,7 +261,7 @@ class RegressionTask:
                 rng=np.random.default_rng(drawn),
             )
             inputs[name] = tried(Phi, noise)
-        return with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
+        return delivery.with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
 
     def free(self) -> tuple[Array, float]:
         """Return the best moments R (n, n) of any structure, and the bound that proves them."""
@@ -289,7 +283,7 @@ class RegressionTask:
         solved = time.perf_counter()
         record = realise_regressors(self, design)
         signal = None if record is None else record.signal
-        outcome = moments_outcome(self, design, signal, timing(started, solved))
+        outcome = moments_outcome(self, design, signal, delivery.timing(started, solved))
         units, tables = self.header.units, dict[str, Table]()
         # Squared bias and variance over the energy, beside the error of white regressors.
         energy, n = design.energy * np.geomspace(0.1, 10.0, _POINTS), self.regression.n
@@ -312,7 +306,7 @@ class RegressionTask:
                 nyquist = np.pi / units.sample_time
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
         curves["moments"] = moments
-        return record, results_of(self.header, outcome, tables, curves)
+        return record, delivery.results_of(self.header, outcome, tables, curves)
 
     def _toeplitz(self) -> MomentsDesign:
         try:
