@@ -1,12 +1,12 @@
-"""Combinations of inputs that nothing pays for or limits: refused, since their power has no end."""
+"""Inputs that nothing pays for or limits are refused; a loop that integrates is excited where it is slow."""
 
 import warnings
 
+import numpy as np
 import pytest
 
-from inputdesign_cli import solve, validate
+from inputdesign_cli import parse_spec, solve, validate
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification import parse_spec
 
 TWO_INPUTS = """
 plant: {B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]]], F: [[[1, -0.7], [1, 0.4]]]}
@@ -71,3 +71,31 @@ def test_a_limit_may_leave_combinations_that_the_cost_counts():
         result = solve(held).result
     assert result["power"]["output"][0] <= most * (1.0 + 1e-9)
     assert least["cost"] * (1.0 - 1e-7) <= result["cost"] <= 1.01 * least["cost"]
+
+
+# A pole of this loop has an angle of rounding, so that the grid of frequencies has a point next to zero.
+INTEGRATING = """
+plant:
+  parameters: {a: 3.21, k: 0.9362, m: 1.865}
+  state_space: {A: [[-a, 0], [m, -m]], B: [[k*a], [0]], C: [[0, 1]], delay: 0.04888}
+  sample: zoh
+  known: [m]
+noise: {variance: 0.02358, C: [1.0, 0.23507, -0.52711]}
+experiment: {samples: 1000, controller: {pid: {Kp: 0.3, Ti: 0.9346}}}
+sample_time: 0.06794
+accuracy: {standard_deviation: {k: 0.1024}}
+objective: best_accuracy
+limits: {input_power: 0.2527}
+spectrum: {type: free}
+signal: {seed: 81, type: multisine}
+"""
+
+
+def test_the_proof_closes_for_a_very_slow_input():
+    """To a very slow input the gain alone matters: var(k) <= v C(1)^2 / (N p), for G(0) = k."""
+    found = solve(parse_spec(INTEGRATING)).result["objective"]
+    assert found["relative_gap"] < 1e-7
+    slow = np.sqrt(0.02358 / (1000 * 0.2527)) * (1 + 0.23507 - 0.52711)
+    # What the noise adds around the loop only helps, and is little.
+    assert 0.99 * slow < found["value"] * 0.1024 < slow
+    assert found["value"] == pytest.approx(found["any_spectrum_bound"], rel=1e-7)

@@ -33,8 +33,6 @@ from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.signal.selection import Record
 
 KEY = "accuracy.frequency_response"
-
-
 _ROUNDING = 1e-9
 _CHANCE = 0.05
 
@@ -86,9 +84,7 @@ class ResponseTerms:
     def powers(self, lines: NDArray[np.float64]) -> tuple[out.Powers, float]:
         """Return mean squares by channel, and the cost, of lines with powers (L, r)."""
         found = {kind: np.einsum("lar,lr->a", self.gains(kind), lines).tolist() for kind in POWER_KINDS}
-        return out.Powers(**{kind: tuple(power) for kind, power in found.items()}), weighted_sum(
-            self.cost, found
-        )
+        return out.Powers.of(found), weighted_sum(self.cost, found)
 
 
 @dataclass(frozen=True)
@@ -217,7 +213,7 @@ def response_results(
     signal = replace(signal, worst_ratio=plan.record.worst_ratio, start_shift=plan.shift)
     matrices = _matrices(plan.powers)
     spectrum = {units.frequency_header: terms.frequency, **hermitian_columns(matrices, "power")}
-    columns, deviations = deviation_curves(units, terms.frequency, terms.lines, _deviations(terms, plan))
+    columns, deviations = deviation_curves(units, terms.frequency, terms.lines, deviations_of(terms, plan))
     for i in range(units.outputs):
         columns[f"noise_spectrum{'' if units.outputs == 1 else f'_{i + 1}'}"] = terms.lines.noise[:, i]
     tables = {"deviations": Table(columns), "spectrum": Table(spectrum)}
@@ -227,21 +223,10 @@ def response_results(
     return with_record(results, request, units, experiment, plan.record, signal)
 
 
-def _deviations(terms: ResponseTerms, plan: Planned) -> dict[str, NDArray[np.float64]]:
+def deviations_of(terms: ResponseTerms, plan: Planned) -> dict[str, NDArray[np.float64]]:
     """Return the deviations (L, p, r) of the designed lines and of the record."""
     designed = terms.lines.deviations(plan.powers, plan.counted)
     return {"deviation": designed, "deviation_record": plan.deviations}
-
-
-def studied_deviations(
-    terms: ResponseTerms, plan: Planned, results: Results, study: ResponseStudy
-) -> tuple[Table, DeviationCurves]:
-    """Return deviations.csv and its figure with the simulated deviations."""
-    name = "deviation_simulated"
-    listed = {**_deviations(terms, plan), name: study.deviation}
-    shown = (name, f"{study.runs} simulated experiments")
-    columns, curves = deviation_curves(terms.header.units, terms.frequency, terms.lines, listed, shown)
-    return Table({**results.tables["deviations"].columns, **columns}), curves
 
 
 def tried_lines(

@@ -21,7 +21,7 @@ from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
-from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.delivery import timing, with_study
@@ -78,7 +78,11 @@ class ResponseTask:
         inputs = {
             name: outcome.tried_lines(terms, plan, records[name][0], found) for name, found in studies.items()
         }
-        table, curves = outcome.studied_deviations(terms, plan, results, studies["design"])
+        name, units, lines = "deviation_simulated", terms.header.units, terms.lines
+        listed = {**outcome.deviations_of(terms, plan), name: studies["design"].deviation}
+        shown = (name, f"{study.runs} simulated experiments")
+        columns, curves = outcome.deviation_curves(units, terms.frequency, lines, listed, shown)
+        table = Table({**results.tables["deviations"].columns, **columns})
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
         return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
 

@@ -105,17 +105,13 @@ def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
 
 def _check_signal_is_open(spec: Spec, stated: stated_spectrum.GivenSpectrum) -> None:
     """Refuse settings of the signal of a record, and of sinusoids in phase over several inputs."""
-    kind = stated.given.type
+    kind, settings = stated.given.type, spec.signal
     fixed = kind == "signal" or (kind == "multisine" and spec.plant.inputs > 1)
-    for name in spec.signal.stated(*_MADE) if fixed else ():
-        if (name, spec.signal.type) == ("type", "multisine") or (name, spec.signal.phases) == (
-            "phases",
-            "random",
-        ):
-            continue
-        raise refuse(
-            f"signal.{name}", "apply it to a given excitation whose samples are settled", "remove it"
-        )
+    harmless = {"type": settings.type == "multisine", "phases": settings.phases == "random"}
+    for name in settings.stated(*_MADE) if fixed else ():
+        if not harmless.get(name):
+            what = "apply it to a given excitation whose samples are settled"
+            raise refuse(f"signal.{name}", what, "remove it")
 
 
 def _excitation(spec: Spec, stated: stated_spectrum.GivenSpectrum, experiment: Experiment) -> GivenExcitation:

@@ -184,37 +184,36 @@ def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
     return [weighted_sum(done.cost, powers_by_kind(problem, basis, x, at)) for at in problem.paying]
 
 
+def _stated(problem: Problem, value: float) -> float:
+    """Return a value of the program as the outcome states it: a criterion, an accuracy factor, or as it is.
+
+    The program minimises the inverse of the criterion, or the square of the factor.
+    """
+    if problem.goal != "factor":
+        return value
+    criterion = problem.demands.criterion
+    return float(np.sqrt(value)) if criterion is None else criterion.value(1.0 / max(value, 1e-300))
+
+
 def _objective(design: Design) -> out.Objective:
     """Return the value with the bounds that are proved."""
-    found, anything = design.result, design.any_spectrum
+    found, anything, problem = design.result, design.any_spectrum, design.problem
     value, bound = found.objective, found.certificate.bound
     any_bound = 0.0 if anything is None else anything.certificate.bound
-    of_records = None if design.any_record is None else design.any_record.bound
-    proved, proved_of_any = (b > 0.0 or value == 0.0 for b in (bound, any_bound))
-    criterion, goal = design.problem.demands.criterion, design.problem.goal
-    if goal == "factor" and criterion is not None:
-        # s is the inverse of the level, so that its lower bound is an upper bound of the criterion.
-        reached = criterion.value(1.0 / value)
-        upper = criterion.value(1.0 / max(bound, 1e-300)) if proved else None
-        size = design.problem.experiment.size if criterion.letter == "D" else abs(reached)
-        return out.Objective(
-            criterion.letter,
-            reached,
-            upper_bound=upper,
-            relative_gap=None if upper is None else abs(upper - reached) / size,
-            any_spectrum_bound=criterion.value(1.0 / max(any_bound, 1e-300)) if proved_of_any else None,
-            any_record_bound=None if of_records is None else criterion.value(1.0 / of_records),
-        )
-    if goal == "factor":
-        value, bound, any_bound = (float(np.sqrt(v)) for v in (value, bound, any_bound))
-    return out.Objective(
-        KINDS[goal],
-        value,
-        lower_bound=bound,
-        relative_gap=abs(value - bound) / value if value > 0 else 0.0,
-        any_spectrum_bound=any_bound if proved_of_any else None,
-        any_record_bound=float(np.sqrt(of_records)) if of_records and goal == "factor" else of_records,
-    )
+    reached, limit = _stated(problem, value), _stated(problem, bound)
+    of_any = _stated(problem, any_bound) if any_bound > 0.0 or value == 0.0 else None
+    of_records = None if design.any_record is None else _stated(problem, design.any_record.bound)
+    criterion = problem.demands.criterion
+    if problem.goal == "factor" and criterion is not None:
+        # A lower bound of the inverse is an upper bound of the criterion.
+        upper = limit if bound > 0.0 or value == 0.0 else None
+        size = problem.experiment.size if criterion.letter == "D" else abs(reached)
+        gap = None if upper is None else abs(upper - reached) / size
+        bounds = {"upper_bound": upper, "any_spectrum_bound": of_any, "any_record_bound": of_records}
+        return out.Objective(criterion.letter, reached, relative_gap=gap, **bounds)
+    gap = abs(reached - limit) / reached if reached > 0 else 0.0
+    bounds = {"lower_bound": limit, "any_spectrum_bound": of_any, "any_record_bound": of_records}
+    return out.Objective(KINDS[problem.goal], reached, relative_gap=gap, **bounds)
 
 
 def _white(done: Designed, cost: float) -> out.White:
@@ -222,19 +221,12 @@ def _white(done: Designed, cost: float) -> out.White:
     design, problem = done.design, done.design.problem
     basis, x = flat_basis(problem.experiment), np.array([design.white_power])
     white_cost = paid_for(problem.paid, costs_of(done, basis, x))
-    samples, value = None, None
-    if problem.goal == "samples":
-        samples = int(np.ceil(design.white.s * (1 - 1e-9)))
-    elif problem.demands.criterion is not None:
-        value = problem.demands.criterion.value(1.0 / design.white.objective)
-    elif problem.goal == "factor":
-        value = float(np.sqrt(design.white.objective))
     return out.White(
         cost=white_cost,
         power=powers(problem, basis, x),
         ratio=white_cost / cost if cost > 0 else 1.0,
-        samples=samples,
-        value=value,
+        samples=int(np.ceil(design.white.s * (1 - 1e-9))) if problem.goal == "samples" else None,
+        value=_stated(problem, design.white.objective) if problem.goal == "factor" else None,
         within_limits=design.white_within if done.question.limits or done.question.densities else None,
     )
 

@@ -42,8 +42,6 @@ from inputdesign_cli.signal.spectral_factor import matrix_factor
 # Frequencies of the plots, and what share of the band they reach down to.
 _POINTS = 800
 _LOWEST = 1e-3
-
-
 KEY = "accuracy.closed_loop_error"
 
 
@@ -56,10 +54,12 @@ def design_outcome(
     informations = {"design": design.information, "white": white.information}
     theories = {name: loss_theory(design.criterion, M) for name, M in informations.items()}
     inputs, outputs = (np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance))
+    powers: dict[PowerKind, list[float]] = {"input": inputs, "output": outputs, "excitation": inputs}
     # White noise of the same total power; in open loop the excitation is the input.
     G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
     even = [white.level * float(weights.sum())] * design.problem.plant.inputs
     caused = white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
+    of_white: dict[PowerKind, list[float]] = {"input": even, "output": caused.tolist(), "excitation": even}
     details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
     objective = out.Objective(
         "closed_loop_error",
@@ -74,9 +74,9 @@ def design_outcome(
         title=task.header.title,
         status=delivery.proof_status(design.gap, task.tolerance),
         objective=objective,
-        cost=weighted_sum(task.cost, {"input": inputs, "output": outputs, "excitation": inputs}),
+        cost=weighted_sum(task.cost, powers),
         samples=samples,
-        power=out.Powers(tuple(inputs), tuple(outputs), tuple(inputs)),
+        power=out.Powers.of(powers),
         closed_loop_error=out.ClosedLoopError(
             law=task.law,
             covariance=task.covariance,
@@ -93,11 +93,7 @@ def design_outcome(
         ),
         spectrum=_spectrum(task, design),
         baseline=out.Baseline(
-            out.White(
-                value=white.value,
-                ratio=white.value / design.value,
-                power=out.Powers(tuple(even), tuple(caused.tolist()), tuple(even)),
-            )
+            out.White(value=white.value, ratio=white.value / design.value, power=out.Powers.of(of_white))
         ),
         signal=signal,
         solver=out.Solver("exchange" if design.of_lines else "dual", task.tolerance, details=details),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,7 @@ from inputdesign_cli.design.regression import ErrorSplit, OutOfReachError, Regre
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
-from inputdesign_cli.monte_carlo.regression import (
-    Contender,
-    Estimates,
-    contending_regressors,
-    run_experiments,
-)
+from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
 from inputdesign_cli.outcome import Signal, Simulation, Solver
 from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
 from inputdesign_cli.outcome.results import Results, Table
@@ -32,8 +28,6 @@ from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal
 from inputdesign_cli.signal.moments import Start, delayed_regressors, free_regressors, periodic_input, rank
 
 _POINTS = 400
-
-
 KEY = "accuracy.mean_squared_error"
 
 
@@ -114,10 +108,18 @@ def moments_outcome(
     )
 
 
-def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Estimates) -> TriedInput:
+def tried_regressors(
+    regression: Regression,
+    theta: Array,
+    Phi: Array,
+    *,
+    runs: int,
+    seed: np.random.SeedSequence,
+    executor: Executor | None,
+) -> TriedInput:
     """Return the mean estimate and error with their standard errors, and the theory for these samples."""
+    found = run_experiments(regression, Phi, theta, runs=runs, seed=seed, executor=executor)
     squared = found.error**2
-    runs = squared.size
     G, m = Phi.T @ Phi, regression.m
     inverse = np.linalg.pinv(G[:m, :m], rcond=1e-12, hermitian=True)
     mean = inverse @ G[:m] @ theta
@@ -244,14 +246,8 @@ class RegressionTask:
             variance = float(trial.relative_std**2 * np.mean((record.Phi @ trial.theta) ** 2))
         regression = replace(regression, variance=regression.variance if variance is None else variance)
         seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
-
-        def tried(Phi: Array, seed: np.random.SeedSequence) -> TriedInput:
-            found = run_experiments(
-                regression, Phi, trial.theta, runs=trial.runs, seed=seed, executor=executor
-            )
-            return tried_regressors(regression, Phi, trial.theta, found)
-
-        inputs = {"design": tried(record.Phi, seeds[0])}
+        tried = partial(tried_regressors, regression, trial.theta, runs=trial.runs, executor=executor)
+        inputs = {"design": tried(record.Phi, seed=seeds[0])}
         for name, drawn, noise in zip(trial.compare, seeds[1::2], seeds[2::2], strict=True):
             Phi = contending_regressors(
                 name,
@@ -260,7 +256,7 @@ class RegressionTask:
                 energy=float(np.sum(record.Phi**2)),
                 rng=np.random.default_rng(drawn),
             )
-            inputs[name] = tried(Phi, noise)
+            inputs[name] = tried(Phi, seed=noise)
         return delivery.with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
 
     def free(self) -> tuple[Array, float]:
