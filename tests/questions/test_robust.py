@@ -118,7 +118,7 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     task = build_convex(parse_spec(LOOP, overrides=[prior]))
     done = task.designed()
     tried = [
-        one.kept
+        one
         for batch in task.asked.plants.afresh()
         for one in tried_on(done.design, done.experiment.samples, batch)
     ]
@@ -179,9 +179,7 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     assert cost == pytest.approx(12.444049, rel=1e-5)
     own = Alternative(oracle.experiment, oracle.requirements)
     estimated = replace(own, requirements=nominal.asked.question.requirements)
-    by_own, by_estimate = (
-        one.kept for one in tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
-    )
+    by_own, by_estimate = tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
     assert by_own.share == pytest.approx(1.02, abs=0.02)
     assert by_estimate.share == pytest.approx(1.86, abs=0.02)
     assert by_estimate.frequency == pytest.approx(0.390, abs=2e-3)
@@ -256,9 +254,7 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     batches = list(done.plants.afresh())
-    shares = [
-        one.kept.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch)
-    ]
+    shares = [one.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch)]
     whole = robust_result(done, done.plants)
     assert whole.entry.fresh.draws == len(shares) == 120
     assert whole.entry.fresh.missed == sum(share > 1.0 + 1e-6 for share in shares) > 0
@@ -309,14 +305,14 @@ def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 20}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     (batch,) = done.plants.afresh()
-    alone = [tried_on(done.design, 500, batch.only([place]))[0].kept for place in range(20)]
-    together = [one.kept for one in tried_on(done.design, 500, batch)]
+    alone = [tried_on(done.design, 500, batch.only([place]))[0] for place in range(20)]
+    together = tried_on(done.design, 500, batch)
     assert [one.share for one in together] == pytest.approx([one.share for one in alone], rel=1e-9)
     model = batch.plants[3].experiment.model
     gone = model.at(np.where(np.array(model.names) == "b1", 1e-200, model.theta))
     plants = list(batch.plants)
     plants[3] = replace(plants[3], experiment=replace(plants[3].experiment, model=gone))
-    shares = [one.kept.share for one in tried_on(done.design, 500, replace(batch, plants=tuple(plants)))]
+    shares = [one.share for one in tried_on(done.design, 500, replace(batch, plants=tuple(plants)))]
     assert shares[3] == np.inf
     assert np.delete(shares, 3) == pytest.approx([one.share for one in np.delete(alone, 3)], rel=1e-9)
 
@@ -359,9 +355,7 @@ def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, cov
     tried = [(theta, plants.region.at(theta)) for theta in nominal + radius * z]
     thetas, alternatives = zip(*[one for one in tried if one[1] is not None], strict=True)
     assert len(thetas) > 150
-    shares = [
-        one.kept.share for one in tried_on(done.design, 500, Batch(np.array(thetas), alternatives, 200))
-    ]
+    shares = [one.share for one in tried_on(done.design, 500, Batch(np.array(thetas), alternatives, 200))]
     assert max(shares) <= share * (1 + 1e-3)
     assert max(shares) > 0.8
 

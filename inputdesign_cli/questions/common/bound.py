@@ -183,12 +183,6 @@ def experiment_ellipses(
     found = []
     for i, j in index:
         chosen = np.ix_([i, j], [i, j])
-        found.append(
-            plots.Ellipse(
-                (names[i], names[j]),
-                theta[[i, j]],
-                covariance[chosen],
-                None if flat is None else flat[chosen],
-            )
-        )
+        white_too = None if flat is None else flat[chosen]
+        found.append(plots.Ellipse((names[i], names[j]), theta[[i, j]], covariance[chosen], white_too))
     return plots.EllipseCurves(tuple(found))

@@ -138,15 +138,11 @@ class Confidence:
 
 def covered(coverage: Coverage) -> Reported:
     """Return the shares of estimates within r_adm with their 95 % limits: of draws and of runs."""
-    draws, runs = coverage.draws, coverage.runs
-    found = Reported(
-        draws, coverage.exact / draws, binomial_limits(coverage.exact, draws), coverage.linear / draws
-    )
+    draws, runs, exact, kept = coverage.draws, coverage.runs, coverage.exact, coverage.kept
+    found = Reported(draws, exact / draws, binomial_limits(exact, draws), coverage.linear / draws)
     if not runs:
         return found
-    return replace(
-        found, runs=runs, kept=coverage.kept / runs, kept_limits=binomial_limits(coverage.kept, runs)
-    )
+    return replace(found, runs=runs, kept=kept / runs, kept_limits=binomial_limits(kept, runs))
 
 
 def beyond_chance(coverage: Coverage, probability: float) -> int:

@@ -52,12 +52,14 @@ class Batch:
 class Kept:
     """Holds the largest ratio of an error at a plant to the admitted one, and its frequency.
 
-    `cost` is that of the design at the plant, where that is looked at.
+    `cost` is that of the design at the plant, where that is looked at, and `asked` are the requirements at a
+    plant that the design was not made for.
     """
 
     share: float
     frequency: float | None = None
     cost: float = 0.0
+    asked: tuple[Requirement, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -176,15 +178,7 @@ def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.floa
     )
 
 
-@dataclass(frozen=True)
-class Tried:
-    """Holds the accuracy at a plant that the design was not made for, and the requirements there."""
-
-    kept: Kept
-    asked: tuple[Requirement, ...]
-
-
-def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Tried]:
+def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Kept]:
     """Return the accuracy at plants outside the design; a ratio up to `above` may come out as 0."""
     seconds_left()
     try:
@@ -199,9 +193,9 @@ def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> 
             return [tried for own in each for tried in tried_on(design, samples, own, above=above)]
         (plant,) = batch.plants  # the experiment does not identify all of its parameters
         own = plant.at(plant.experiment)
-        return [Tried(Kept(np.inf), (*own.requirements, *own.side))]
-    asked = ((*scenario.requirements, *scenario.side) for scenario in at.scenarios)
-    return [Tried(*both) for both in zip(kept, asked, strict=True)]
+        return [Kept(np.inf, asked=(*own.requirements, *own.side))]
+    pairs = zip(kept, at.scenarios, strict=True)
+    return [replace(one, asked=(*there.requirements, *there.side)) for one, there in pairs]
 
 
 def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:

@@ -39,19 +39,9 @@ _SIGNAL = (
 _COUNTED = 4
 
 
-def stated_response(spec: Spec) -> FrequencyResponse:
-    """Return `accuracy.frequency_response`, or raise `SpecError` (`missing-key`)."""
-    stated = spec.accuracy.frequency_response
-    if stated is None:
-        message = "nothing is said of the lines and of the accuracy of a frequency response"
-        hint = "add accuracy: {frequency_response: {relative: 0.05, band: [0.01, 1], lines: 40}}"
-        raise bad_spec("missing-key", message, hint=hint, key="accuracy")
-    return stated
-
-
-def build_periods(spec: Spec) -> Periods:
+def build_periods(spec: Spec, stated: FrequencyResponse) -> Periods:
     """Return the repetition of the record; raise `bad-period` unless whole periods fit into it."""
-    stated, blocks, samples = stated_response(spec), spec.plant.inputs, spec.experiment.samples
+    blocks, samples = spec.plant.inputs, spec.experiment.samples
     skip, shortest = stated.transient, spec.designs and spec.goal == "shortest_experiment"
     if stated.period is not None:
         period = stated.period
@@ -91,10 +81,9 @@ def build_periods(spec: Spec) -> Periods:
     return Periods(period, blocks, skip)
 
 
-def build_grid(spec: Spec, period: int) -> harmonic_grid.HarmonicGrid:
+def build_grid(spec: Spec, stated: FrequencyResponse, period: int) -> harmonic_grid.HarmonicGrid:
     """Return the lines and the silent ones; raise `SpecError` (`too-few-lines`, `out-of-range`)."""
-    stated, step, unit = stated_response(spec), spec.sample_time, f"rad/{spec.time_unit}"
-    odd = stated.detection is not None
+    step, unit, odd = spec.sample_time, f"rad/{spec.time_unit}", stated.detection is not None
     if stated.frequencies is None:
         return harmonic_grid.HarmonicGrid.of(period, _in_band(spec, stated, period), watched=odd)
     wanted, half = np.array(stated.frequencies), np.pi / (period * step)
@@ -162,12 +151,13 @@ def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | Non
 
 def build_response_task(spec: Spec) -> ResponseTask:
     """Return the task; everything that can be wrong with its spec or a table is reported here."""
-    stated = stated_response(spec)
+    stated = spec.accuracy.frequency_response
+    assert stated is not None
     _check_supported(spec)
     goal: Goal = "given" if not spec.designs else _GOALS[spec.goal]
-    periods = build_periods(spec)
+    periods = build_periods(spec, stated)
     model = build_model(spec)
-    grid = build_grid(spec, periods.period)
+    grid = build_grid(spec, stated, periods.period)
     # The counted length is found where the shortest is asked for; all else is per sample of it.
     counted = (
         1 if goal == "samples" else periods.blocks * periods.kept(spec.experiment.samples) * periods.period
@@ -177,7 +167,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
         noise: NDArray[np.float64] = NoiseSpectrum.of(model).at(grid.period, grid.excited)
     else:
         noise = _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
-    lines = ResponseLines(G, noise, _admitted(spec, grid, G), stated.relative)
+    lines = ResponseLines(G, noise, _admitted(spec, stated, grid.frequencies, G), stated.relative)
     experiment = Experiment(model, counted)
     terms = ResponseTerms(
         header=build_header(spec),
@@ -209,9 +199,9 @@ def build_measurement(spec: Spec) -> Measurement:
     )
 
 
-def _admitted(spec: Spec, grid: harmonic_grid.HarmonicGrid, response: ComplexArray) -> NDArray[np.float64]:
+def _admitted(spec: Spec, stated: FrequencyResponse, w: Array, response: ComplexArray) -> NDArray[np.float64]:
     """Return r_adm (L, p, r), infinite where G is zero; raise `SpecError` (`admissible-not-positive`)."""
-    stated, w, G = stated_response(spec), grid.frequencies, np.abs(response)
+    G = np.abs(response)
     if stated.absolute is not None:
         return np.full(G.shape, stated.absolute)
     if stated.table is not None:

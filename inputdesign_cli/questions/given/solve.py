@@ -29,7 +29,7 @@ from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates, Simulator
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
 from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, worst_ratio
-from inputdesign_cli.questions.common.robust import MET, Kept, Plants, Tried
+from inputdesign_cli.questions.common.robust import MET, Kept, Plants
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import spectrum_curves
 from inputdesign_cli.questions.common.task import SpectrumTask
@@ -106,7 +106,7 @@ class GivenExcitation:
         information = partial(spectral_information, basis, x)
         return cls(kind, found, information, basis, x, in_phase)
 
-    def at(self, plant: Alternative, samples: int) -> Tried:
+    def at(self, plant: Alternative, samples: int) -> Kept:
         """Return the largest error ratio at a plant: infinite if its parameters are undetermined."""
         seconds_left()
         own = replace(plant.experiment, samples=samples)
@@ -114,11 +114,12 @@ class GivenExcitation:
         try:
             coordinates = own.whitened(self.scale)
             there = plant.at(coordinates)
-            return Tried(_kept((*there.requirements, *there.side), self.information(coordinates)), asked)
+            found = _kept((*there.requirements, *there.side), self.information(coordinates))
+            return replace(found, asked=asked)
         except OutOfTimeError:
             raise
         except (np.linalg.LinAlgError, IdesignError):
-            return Tried(Kept(np.inf), asked)
+            return Kept(np.inf, asked=asked)
 
     def described(self, units: Units) -> Spectrum:
         """Return the entry of the outcome for this excitation."""
@@ -268,13 +269,13 @@ class GivenTask(SpectrumTask):
         """
         batch, at = plants.batch, partial(self.excitation.at, samples=experiment.samples)
         tried = [at(plant) for plant in batch.plants]
-        rising = np.argsort([one.kept.share for one in tried], kind="stable").tolist()
+        rising = np.argsort([one.share for one in tried], kind="stable").tolist()
         kept = sorted(rising[: len(rising) - plants.discard])
-        at_each = [nominal, *(tried[place].kept for place in kept)]
+        at_each = [nominal, *(tried[place] for place in kept)]
         looked_at = list(at_each)
         if plants.region is not None:
             starts = [experiment.model.theta, *(batch.thetas[place] for place in reversed(rising))]
-            worst_found, _ = worst_plant(plants.region, lambda _, plant: at(plant).kept, starts)
+            worst_found, _ = worst_plant(plants.region, lambda _, plant: at(plant), starts)
             plants, looked_at = replace(plants, searched=worst_found), [*looked_at, worst_found.kept]
         if not all(np.isfinite(one.share) for one in looked_at):
             message = "the given excitation does not determine the parameters of every plant of uncertainty"

@@ -38,7 +38,6 @@ from inputdesign_cli.questions.common.robust import (
     Plants,
     Region,
     Searched,
-    Tried,
     delivered,
     delivered_samples,
     estimate_from,
@@ -127,7 +126,7 @@ def with_worst_plants(
         thetas = [nominal, *plants.batch.thetas[np.argsort(-shares, kind="stable")]]
 
         def keeps(theta: Array, plant: Alternative, design: Design = design, samples: int = samples) -> Kept:
-            return tried_on(design, samples, Batch(theta[None], (plant,), 1))[0].kept
+            return tried_on(design, samples, Batch(theta[None], (plant,), 1))[0]
 
         found, plant = worst_plant(region, keeps, thetas)
         if found.kept.share <= _NEARLY or added == _MOST_ADDED:
@@ -299,7 +298,7 @@ def _searched(units: Units, plants: Plants) -> parts.SearchedPlant | None:
 
 def fresh_plants(
     plants: Plants,
-    try_on: Callable[[Batch, float], Sequence[Tried]],
+    try_on: Callable[[Batch, float], Sequence[Kept]],
     peak: Callable[[Experiment], float] | None = None,
     promised: float | None = None,
 ) -> tuple[parts.FreshPlants | None, list[Finding]]:
@@ -309,30 +308,33 @@ def fresh_plants(
     """
     if plants.afresh is None:
         return None, []
-    tried, peaks, rejected, largest, floors = list[Kept](), list[float](), 0, 0.0, list[Floor]()
+    shares, costs, peaks, floors = list[float](), list[float](), list[float](), list[Floor]()
+    rejected, largest = 0, 0.0
     for batch in plants.afresh():
         try:
             at_each = try_on(batch, min(largest, 1.0))
         except OutOfTimeError:
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
-        tried += (one.kept for one in at_each)
+        shares += (one.share for one in at_each)
+        costs += (one.cost for one in at_each)
         floors += (Floor.at(one.asked) for one in at_each)
-        tell(Counted("fresh plants", len(tried), plants.fresh))
+        tell(Counted("fresh plants", len(shares), plants.fresh))
         rejected += batch.rejected
-        largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
-    fewer = fewer_plants(len(tried), plants.fresh)
-    if not tried:
+        largest = max((share for share in shares if np.isfinite(share)), default=0.0)
+    draws = len(shares)
+    fewer = fewer_plants(draws, plants.fresh)
+    if not shares:
         return None, fewer
-    less = np.array([one.share for one in tried]) > MET
-    dearer = np.array([promised is not None and one.cost > MET * promised for one in tried])
+    less = np.array(shares) > MET
+    dearer = np.array(costs) > (np.inf if promised is None else MET * promised)
     missed = int(np.sum(less | dearer))
     found = parts.FreshPlants(
-        draws=len(tried),
+        draws=draws,
         rejected=rejected,
         missed=missed,
-        share=missed / len(tried),
-        limits=binomial_limits(missed, len(tried)),
+        share=missed / draws,
+        limits=binomial_limits(missed, draws),
         largest=largest,
         raised=sum(floor.raised for floor in floors) or None,
         lost=sum(floor.lost for floor in floors) or None,
@@ -357,7 +359,7 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.
                 shares.append(np.inf)
                 continue
             tried = tried_on(done.design, samples, Batch(theta[None], (estimated,), 1))
-            shares += [one.kept.share for one in tried]
+            shares += [one.share for one in tried]
     except IdesignError:  # no time is left, or what is asked cannot be asked of this plant
         return None
     highest = float(np.quantile(shares, _MOST_OF_THEM, method="higher"))
