@@ -112,8 +112,9 @@ def test_the_price_is_attained_and_never_exceeded(name):
         assert price.at(x) >= pricing.scale * value.at(x)
 
 
-def test_enlarged_faces_keep_the_solution():
-    basis = PolynomialBasis(2, 20, (0.0, 2.0))
+@pytest.mark.parametrize("hermitian", [False, True])
+def test_enlarged_faces_keep_the_solution(hermitian):
+    basis = PolynomialBasis(2, 20, (0.0, 2.0), hermitian)
     price, value = functionals(basis, PAPER)
     face = basis.first_face(price)
     assert face.order < basis.gram_order

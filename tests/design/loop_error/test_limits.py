@@ -6,6 +6,7 @@ import pytest
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.loop_error import design_within
 from inputdesign_cli.design.loop_error.closed_form import error_of, power_of
+from inputdesign_cli.design.loop_error.problem import metric
 from tests.support.loop_error import adjoint, column, random_complex, random_hermitian
 
 
@@ -28,8 +29,8 @@ def grid_program(A, metrics, limits, weights):
     Q = [cp.Variable((n, n), hermitian=True) for _ in range(K)]
     root = power_of(A, 0.5)
     constraints = [cp.bmat([[Q[k], root[k]], [root[k], Phi[k]]]) >> 0 for k in range(K)]
-    for metric, limit in zip(metrics, limits, strict=True):
-        constraints.append(cp.real(sum(weights[k] * cp.trace(metric[k] @ Phi[k]) for k in range(K))) <= limit)
+    for M, limit in zip(metrics, limits, strict=True):
+        constraints.append(cp.real(sum(weights[k] * cp.trace(M[k] @ Phi[k]) for k in range(K))) <= limit)
     value = cp.real(sum(weights[k] * cp.trace(Q[k]) for k in range(K)))
     return cp.Problem(cp.Minimize(value), constraints).solve(solver=cp.CLARABEL)
 
@@ -104,3 +105,10 @@ def test_the_column_with_a_limit_for_each_input_and_output():
     again = problem.spectrum_at(rule.nodes, design.multipliers)
     ratio = np.trace(design.spectrum, axis1=1, axis2=2).real / np.trace(again, axis1=1, axis2=2).real
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("w", [0.0, 0.3, 2.0])
+def test_the_power_of_moves_is_that_of_differences(w):
+    """A sinusoid of power one moves from sample to sample with power |1 - exp(-jw)|^2 = 2 - 2 cos w."""
+    found = metric(PowerLimit("moves", 1.0, channel=1), w, np.ones((1, 2, 2), dtype=complex))
+    np.testing.assert_allclose(found[0], np.diag([0.0, 2.0 - 2.0 * np.cos(w)]), atol=1e-12)
