@@ -27,7 +27,9 @@ def _random_form(length: int, inputs: int, seed: int) -> Array:
     return form
 
 
-@pytest.mark.parametrize(("inputs", "length", "samples"), [(1, 2, 5), (1, 4, 11), (1, 9, 6), (2, 3, 5)])
+@pytest.mark.parametrize(
+    ("inputs", "length", "samples"), [(1, 2, 5), (1, 4, 11), (1, 9, 6), (1, 5, 1), (2, 3, 5)]
+)
 def test_largest_sum_is_that_of_all_records(inputs: int, length: int, samples: int) -> None:
     windows = Windows.within(np.array([1.5, 0.5])[:inputs], length)
     form = _random_form(length, inputs, length)

@@ -108,8 +108,9 @@ class Windows:
 
     def largest_sum(self, form: Array, samples: int) -> tuple[float, Array]:
         """Return the largest form (m, r, r) of records of this length from rest, and that record."""
-        if self.length > samples:  # lags beyond the record do not count
-            return Windows(self.letters, max(samples, 2)).largest_sum(form[: max(samples, 2)], samples)
+        fewest = max(samples, 2)
+        if self.length > fewest:  # lags beyond the record do not count
+            return Windows(self.letters, fewest).largest_sum(form[:fewest], samples)
         size, m = len(self.letters), self.length
         rewards = self._rewards(form)
         values = np.zeros(self.states)

@@ -123,6 +123,15 @@ def test_a_reference_figure_of_the_window_bound():
     assert np.sqrt(bound.bound) == pytest.approx(0.2977, abs=4e-4)
 
 
+def test_a_record_shorter_than_the_longest_run_is_searched():
+    design = designed({"B": [0, 1.3], "F": [1, 0.4]}, 5, {"criterion": "D"})
+    goal = worst_of(design, 5)
+    start = np.ones((5, 1))
+    search = FlipSearch([goal], np.array([[-1.0], [1.0]]), 5)
+    _, found = search.best([start], np.random.default_rng(0), enough=0.0, over=lambda: False, changes=20)
+    assert found == pytest.approx(best_of_all(goal, 5), rel=1e-9)
+
+
 @pytest.mark.parametrize("more", [{"experiment": {"samples": 50, "controller": {"numerator": [0.2]}}}])
 def test_there_is_none_in_a_loop(more):
     design = designed({"B": [0, 0.63], "F": [1, -0.5]}, 50, ERROR, **more)
