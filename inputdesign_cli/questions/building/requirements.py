@@ -38,15 +38,9 @@ def build_requirements(
 ) -> list[RequirementFactory]:
     """Return a maker for each requirement of `accuracy`, in the order of the contract.
 
-    Requirements over frequency are made entry by entry of G.
-
-    Args:
-        nominal: the plant of the spec, if the experiment is on a scenario.
-
-    Raises:
-        SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
-            cannot be met or is not supported.
-        DataError: a table cannot be used.
+    Requirements over frequency are made entry by entry of G. On a scenario, `nominal` is the plant of the
+    spec. Raises `SpecError`: a name that the model does not have, a matrix of the wrong size, a
+    requirement that cannot be met or is not supported. Or `DataError`: a table cannot be used.
     """
     found: list[RequirementFactory] = []
     for key in spec.accuracy.requirements:
@@ -60,10 +54,7 @@ def build_requirements(
 
 
 def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
-    """Return the maker of `accuracy.criterion`, of the parameters or of their relative errors.
-
-    Raises `SpecError`: `zero-parameter` when a relative error of a parameter that is zero is asked for.
-    """
+    """Return the maker of `accuracy.criterion`; `SpecError` (`zero-parameter`) without a relative error."""
     letter = spec.accuracy.criterion
     if letter is None:
         return None
@@ -86,10 +77,7 @@ def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment]
 def build_asked(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
-    """Return the makers of the goal of a design, and of the requirements besides a criterion.
-
-    Raises `SpecError` or `DataError`: see `build_requirements` and `build_criterion`.
-    """
+    """Return the makers of the goal of a design, and of the requirements besides a criterion; or raise."""
     requirements = build_requirements(spec, experiment, nominal)
     criterion = build_criterion(spec, experiment)
     return (requirements, []) if criterion is None else ([criterion], requirements)
@@ -167,20 +155,17 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
     found = [bound(entry=entry, relative=stated.relative) for entry in entries]
     for variance in found:
         model_error.check_bounded(spec, variance, key)
-        if stated.relative:
-            _check_nowhere_zero(spec, variance)
+        if not stated.relative:
+            continue
+        units, size = build_units(spec), variance.nominal_size(variance.grid)
+        if size.min() <= _RELATIVE_ZERO * np.median(size):
+            at = units.named(variance.grid[int(np.argmin(size))])
+            entry = variance.entry
+            named = f"entry {units.entry(*entry)} of G" if entry and not units.single else "G"
+            message = f"{named} vanishes at {at}: its relative variance is infinite there"
+            hint = "restrict `band` to the frequencies that matter"
+            raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
     return [_maker(variance) for variance in found]
-
-
-def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
-    """Raise `SpecError` (`admissible-not-positive`) if G vanishes: its relative variance is infinite."""
-    units, size = build_units(spec), variance.nominal_size(variance.grid)
-    if size.min() <= _RELATIVE_ZERO * np.median(size):
-        at = units.named(variance.grid[int(np.argmin(size))])
-        named = f"entry {units.entry(*variance.entry)} of G" if variance.entry and not units.single else "G"
-        message = f"{named} vanishes at {at}: its relative variance is infinite there"
-        hint, key = "restrict `band` to the frequencies that matter", "accuracy.weighted_variance"
-        raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
 
 
 _BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
