@@ -31,8 +31,7 @@ _WHOLE = 1e-9
 def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
     """Add `samples` to each section with a `duration`: the largest number that fits.
 
-    An experiment without a length takes all that limits allow, unless the shortest one is asked for. The
-    validation reports durations and sample times that cannot be read.
+    An experiment without a length takes all that limits allow, unless the shortest one is asked for.
     """
     step = data.get("sample_time", 1.0)
     for name in ("experiment", "limits"):
@@ -76,20 +75,11 @@ def load_spec(
     confine: FilePath | None = None,
     design: bool | None = True,
 ) -> Spec:
-    """Read a spec file.
+    """Read a spec file, with `key.path=value` texts applied in order; `null` removes a key.
 
-    Args:
-        path: The YAML file.
-        overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
-        confine: The folder outside of which the spec may name no files.
-        design: Whether it must ask for a design, or for an analysis, that can be answered; None: only if it
-            has some key of a design.
-
-    Returns:
-        The checked spec, with defaults filled in.
-
-    Raises:
-        SpecError: With one diagnostic for everything that is wrong, in the order of the file.
+    Outside the folder `confine` the spec may name no files. With `design` it must ask for a design, or for
+    an analysis, that can be answered; None: only if it has some key of a design. Raises `SpecError`, with
+    everything that is wrong in the order of the file.
     """
     folder = FilePath(path).parent
     return parse_spec(
@@ -108,9 +98,7 @@ def parse_spec(
 ) -> Spec:
     """Read a spec from its text in YAML, as `load_spec` does from a file, with the same arguments.
 
-    Args:
-        file: The name in diagnostics.
-        folder: The folder that paths in the spec are relative to (default: the current folder).
+    `file` is its name in diagnostics; paths in it are relative to `folder`, by default the current one.
     """
     folder = folder or FilePath()
     return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
@@ -138,8 +126,8 @@ def read_tree(
 ) -> Tree:
     """Return the plain data of a spec with included files and overrides, not yet checked.
 
-    A file that lies outside `confine` is a diagnostic of the tree. Raises `SpecError`: The text is no mapping
-    in YAML, or a file cannot be included.
+    A file outside `confine` is a diagnostic of the tree. Raises `SpecError`: it is no mapping in YAML, or
+    a file cannot be included.
     """
     tree = read(text, file)
     check_mapping(tree)

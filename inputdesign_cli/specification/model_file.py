@@ -22,8 +22,7 @@ _SAME = 1e-6
 def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
     """Return the block `estimate` of a file that the spec names at `key`; errors show nothing else of it.
 
-    Raises `SpecError`: `bad-model-file`; `wrong-estimate`, its data have another sample time than the spec;
-    the file cannot be read.
+    Raises `SpecError`: `bad-model-file`; `wrong-estimate`, of another sample time; it cannot be read.
     """
     try:
         text = read_text(spec.resolve_path(name))
@@ -35,13 +34,11 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
     try:
         data = read(text, name).data
         block = data.get("estimate") if isinstance(data, dict) else None
-        try:
-            estimated = Estimated.model_validate(block)
-        except ValidationError as error:
+        estimated = Estimated.model_validate(block)
+    except (SpecError, ValidationError) as error:
+        if isinstance(error, ValidationError):
             first = translate(error, block, Estimated)[0]
             said = f" ({first.code} at {format_key(['estimate', *first.path])})"
-            raise
-    except (SpecError, ValidationError) as error:
         message = f"{name} is no model that identify wrote: it has no sound block estimate{said}"
         hint = "name a model.yaml with estimate: {parameters: {..}, covariance: [[..]]}, positive definite"
         raise spec.complain("bad-model-file", message, hint=hint, key=key) from error

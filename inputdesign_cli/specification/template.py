@@ -46,10 +46,7 @@ class SpecTemplate:
         return parse_spec(self.text, self.file, every, folder=self.folder, confine=self.confine)
 
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
-        """Return the plain data of one variant, without the `sweep` block; only the overrides are checked.
-
-        Raises `SpecError`: An override that cannot be applied.
-        """
+        """Return the plain data of one variant, without the `sweep` block; only overrides are checked."""
         tree = Tree(copy.deepcopy(self.data), Places())
         apply_overrides(tree, [*overrides, "sweep=null"])
         return tree.sound().data
@@ -65,10 +62,7 @@ class SpecTemplate:
         return sorted(n for n in named if not (self.confine and is_outside(self.folder / n, self.confine)))
 
     def sweep(self) -> Sweep | None:
-        """Return the checked `sweep` block; None if the spec has none.
-
-        Raises `SpecError`: With the place of every error in the block.
-        """
+        """Return the checked `sweep` block, or None; `SpecError` with the place of every error in it."""
         if "sweep" not in self.data:
             return None
         try:
@@ -88,9 +82,7 @@ def read_template(
 ) -> SpecTemplate:
     """Read a spec file, or its `text`, with `overrides` applied; nothing is checked yet.
 
-    Raises:
-        SpecError: The file cannot be read or is no mapping in YAML, an override cannot be applied, or a
-            file cannot be included.
+    Raises `SpecError`: it is no mapping in YAML, or an override or an included file is wrong.
     """
     text, file = read_text(path) if text is None else text, os.fspath(path)
     folder = FilePath(path).parent
@@ -99,9 +91,6 @@ def read_template(
 
 
 def same_content(one: str, other: str) -> bool:
-    """Return whether two texts of a spec agree, apart from comments, layout and order of keys.
-
-    Raises `SpecError`: One of them is not YAML.
-    """
+    """Return whether two texts of a spec agree but for comments and layout; `SpecError` if not YAML."""
     first, second = (read(text, "spec.yaml").data for text in (one, other))
     return fingerprint(first) == fingerprint(second)

@@ -19,7 +19,7 @@ from inputdesign_cli.specification.models.plant import ContinuousPlant, Polynomi
 
 def delays_of(plant: ContinuousPlant) -> Rows:
     """Return rows of lists of one dead time, empty where none is present; () if no entry has one."""
-    terms = plant.stated_terms.delay
+    terms = plant.terms.delay
     rows = tuple(
         tuple(np.array([value] if terms[i][j].present else []) for j, value in enumerate(row))
         for i, row in enumerate(plant.continuous.delays)
@@ -29,7 +29,7 @@ def delays_of(plant: ContinuousPlant) -> Rows:
 
 def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
     """Return the degree of each numerator, -1 for an absent entry; see `Expression.present`."""
-    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_terms.numerator]
+    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.terms.numerator]
 
 
 def reparametrised(
