@@ -42,14 +42,25 @@ def build_requirements(
     spec. Raises `SpecError`: a name that the model does not have, a matrix of the wrong size, a
     requirement that cannot be met or is not supported. Or `DataError`: a table cannot be used.
     """
-    found: list[RequirementFactory] = []
-    for key in spec.accuracy.requirements:
-        if key in ("model_error", "loop"):
-            found += [_maker(error) for error in model_error.build_model_errors(spec, experiment, nominal)]
-        elif key in added("requirements"):
-            found += cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
-        else:
-            found += _BUILDERS[key](spec, experiment)
+    accuracy, found = spec.accuracy, list[RequirementFactory]()
+    for key in accuracy.requirements:
+        match key:
+            case "model_error" | "loop":
+                found += [_maker(one) for one in model_error.build_model_errors(spec, experiment, nominal)]
+            case "information" if (stated := accuracy.information) is not None:
+                found.append(_target(spec, experiment, stated.matrix, stated.parameters, key))
+            case "application" if (asked := accuracy.application) is not None:
+                # M >= (chi2 gamma / 2) V'', chi2 the quantile for the parameters of the hessian
+                chi2 = model_error.confidence_factor(asked.confidence, len(asked.parameters)) ** 2
+                hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
+                found.append(_target(spec, experiment, hessian, asked.parameters, key))
+            case "standard_deviation":
+                for name, most in (accuracy.standard_deviation or {}).items():
+                    found.append(_target(spec, experiment, [[1.0 / most**2]], (name,), key, f" of {name}"))
+            case "weighted_variance":
+                found += _weighted_variances(spec, experiment)
+            case _ if key in added("requirements"):
+                found += cast(AddedRequirement, accuracy.at(key)).build(spec, experiment)
     return found
 
 
@@ -109,28 +120,6 @@ def stated_bounds(spec: Spec) -> list[StatedBound]:
     ]
 
 
-def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    stated = spec.accuracy.information
-    assert stated is not None
-    return [_target(spec, experiment, stated.matrix, stated.parameters, "accuracy.information")]
-
-
-def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    """Require M >= (chi2 gamma / 2) V'', chi2 the quantile for the parameters of the hessian."""
-    asked = spec.accuracy.application
-    assert asked is not None
-    chi2 = model_error.confidence_factor(asked.confidence, len(asked.parameters)) ** 2
-    hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
-    return [_target(spec, experiment, hessian, asked.parameters, "accuracy.application")]
-
-
-def _standard_deviations(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    return [
-        _target(spec, experiment, [[1.0 / most**2]], (name,), "accuracy.standard_deviation", f" of {name}")
-        for name, most in (spec.accuracy.standard_deviation or {}).items()
-    ]
-
-
 def _maker(requirement: OverFrequency) -> RequirementFactory:
     return lambda experiment: replace(requirement, experiment=experiment)
 
@@ -138,9 +127,8 @@ def _maker(requirement: OverFrequency) -> RequirementFactory:
 def _target(
     spec: Spec, raw: Experiment, matrix: ArrayLike, names: Sequence[str] | None, key: str, of: str = ""
 ) -> RequirementFactory:
-    full = embedded(spec, raw.model.names, np.array(matrix, dtype=float), names, key)
-    label = key.removeprefix("accuracy.") + of
-    return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
+    full = embedded(spec, raw.model.names, np.array(matrix, dtype=float), names, f"accuracy.{key}")
+    return lambda experiment: InformationTarget(experiment.whiten_matrix(full), key + of)
 
 
 def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
@@ -166,12 +154,3 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
             hint = "restrict `band` to the frequencies that matter"
             raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
     return [_maker(variance) for variance in found]
-
-
-_BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
-    "information": _information,
-    "application": _application,
-    "weighted_variance": _weighted_variances,
-    "standard_deviation": _standard_deviations,
-    "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
-}

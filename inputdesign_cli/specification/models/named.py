@@ -71,12 +71,12 @@ class NamedParameter:
 
 def values_of(parameters: dict[str, Plain]) -> dict[str, float]:
     """Return the values by name; one that cannot be read counts as 1, and pydantic reports it."""
-    return {str(name): _number(value) for name, value in parameters.items()}
 
+    def number(value: Plain) -> float:
+        usable = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+        return float(value) if usable else 1.0
 
-def _number(value: Plain) -> float:
-    usable = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
-    return float(value) if usable else 1.0
+    return {str(name): number(value) for name, value in parameters.items()}
 
 
 def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:

@@ -5,7 +5,7 @@ import yaml
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.template import read_template
+from inputdesign_cli.specification.loading import read_template
 
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\n"
 REST = "accuracy: {standard_deviation: {b1: 0.1}}\nexperiment: {samples: 200}\n"
