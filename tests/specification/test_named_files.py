@@ -139,20 +139,14 @@ def test_what_is_included_is_kept_there_too(project, name):
     assert load_spec(project / "spec.yaml", ["include=more.yaml"], confine=project).experiment.samples == 7
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        b"hunter2:x:0:0:root:/root:/bin/sh\n",
-        b"token: hunter2\n",
-        b"a: [hunter2\n",
-        b"- hunter2\n",
-        b'"hunter2": {a: 1, a: 2}\n',
-        b"hunter2: !secret x\n",
-        b"<<: hunter2\n",
-        b"x: &a hunter2\ny: *b\n",
-        b"plant: hunter2 \xff\n",
-    ],
-)
+SECRETS = [
+    b"hunter2:x:0:0:root:/root:/bin/sh\n", b"token: hunter2\n", b"a: [hunter2\n", b"- hunter2\n",
+    b'"hunter2": {a: 1, a: 2}\n', b"hunter2: !secret x\n", b"<<: hunter2\n", b"x: &a hunter2\ny: *b\n",
+    b"plant: hunter2 \xff\n",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", SECRETS)
 def test_nothing_is_shown_of_an_included_file_that_holds_no_blocks(project, text):
     (project.parent / "secret.conf").write_bytes(text)
     with pytest.raises(SpecError) as caught:

@@ -103,19 +103,13 @@ ESTIMATED = {
 
 
 @pytest.mark.parametrize("text", ESTIMATED.values(), ids=ESTIMATED)
-def test_a_spec_to_estimate_from_needs_no_noise_and_no_question(text, schema):
+def test_only_a_spec_to_estimate_from_needs_no_noise_and_no_question(text, schema):
     assert accepts(read(text, "x").data, schema)
     validate(parse_spec(text, design=None))
-
-
-@pytest.mark.parametrize("text", ESTIMATED.values(), ids=ESTIMATED)
-@pytest.mark.parametrize(
-    "asked", ["accuracy: {criterion: D}", "limits: {input_power: 1}", "spectrum: {type: white}"]
-)
-def test_who_asks_for_a_design_needs_the_noise(text, asked, schema):
-    assert not accepts(read(f"{text}\n{asked}", "x").data, schema)
-    with pytest.raises(SpecError):
-        parse_spec(f"{text}\n{asked}", design=None)
+    for asked in ("accuracy: {criterion: D}", "limits: {input_power: 1}", "spectrum: {type: white}"):
+        assert not accepts(read(f"{text}\n{asked}", "x").data, schema)
+        with pytest.raises(SpecError):
+            parse_spec(f"{text}\n{asked}", design=None)
 
 
 DESIGN = "noise: {variance: 1}\naccuracy: {criterion: D}\nlimits: {input_power: 1, band: [0, 1]}\n"

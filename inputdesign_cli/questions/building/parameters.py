@@ -13,7 +13,6 @@ from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.specification import Spec, load_estimate
-from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 
@@ -25,11 +24,6 @@ def delays_of(plant: ContinuousPlant) -> Rows:
         for i, row in enumerate(plant.continuous.delays)
     )
     return rows if any(entry.size for row in rows for entry in row) else ()
-
-
-def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
-    """Return the degree of each numerator, -1 for an absent entry; see `Expression.present`."""
-    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.terms.numerator]
 
 
 def reparametrised(

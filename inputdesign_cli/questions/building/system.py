@@ -34,6 +34,7 @@ from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.loop import Controller
+from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 # A pole this near to the unit circle is on it, but for rounding.
@@ -104,7 +105,7 @@ def build_model(spec: Spec) -> Model:
                 common=matrix.common,
                 delay=parameters.delays_of(plant),
                 common_delay=matrix.common_delay,
-                degrees=parameters.degrees_of(plant),
+                degrees=[[len(b) - leading(b) - 1 for b in row] for row in plant.terms.numerator],
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
         case StateSpacePlant() as plant:

@@ -78,12 +78,6 @@ class UncertainPlant:
         columns[varied] = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
         return Knowledge(self.nominal.theta, columns, box=False)
 
-    def draw(self, rng: np.random.Generator) -> Array:
-        """Draw parameters (k,)."""
-        known, size = self.spread, self.spread.columns.shape[1]
-        z = rng.uniform(-1.0, 1.0, size) if known.box else rng.standard_normal(size)
-        return np.asarray(known.centre + known.columns @ z)
-
     def region(self, confidence: float) -> Knowledge:
         """Return the region of the draws: the ellipsoid of a confidence, or the box of all intervals."""
         known = self.spread
@@ -151,6 +145,10 @@ class UncertainPlant:
             message = "the information matrix is singular: no plants can be drawn of some parameters"
             hint = "name the parameters that it is about, or take an experiment that informs about all"
             raise self.spec.complain("not-positive-definite", message, hint=hint, key=key) from None
+
+    @cached_property
+    def _radius(self) -> float:
+        return farthest_radius(self.spec, self.experiment)
 
     def at(self, theta: Array, radius: float) -> Alternative:
         """Return the plant with these parameters, and the requirements on the design there.
@@ -223,13 +221,13 @@ class UncertainPlant:
     def possible(self, theta: Array) -> Alternative | None:
         """Return the plant with these parameters; None if there is none, or it is unstable."""
         try:
-            return self.at(theta, farthest_radius(self.spec, self.experiment))
+            return self.at(theta, self._radius)
         except _NoPlantError:
             return None
 
     def batch(self, number: int, rng: np.random.Generator) -> Batch:
         """Draw sound plants; raises `SpecError` (`no-stable-plant`) if hardly any draw gives one."""
-        radius = farthest_radius(self.spec, self.experiment)
+        radius, known, size = self._radius, self.spread, self.spread.columns.shape[1]
         thetas, plants = list[Array](), list[Alternative]()
         most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
         while len(plants) < number:
@@ -238,7 +236,8 @@ class UncertainPlant:
                 message = f"{few}, in their loop if there is one, with poles within {radius:.6g}{last}"
                 hint = "the uncertainty reaches far beyond what is possible: state it more tightly"
                 raise self.spec.complain("no-stable-plant", message, hint=hint, key=KEY)
-            theta, drawn = self.draw(rng), drawn + 1
+            z = rng.uniform(-1.0, 1.0, size) if known.box else rng.standard_normal(size)
+            theta, drawn = np.asarray(known.centre + known.columns @ z), drawn + 1
             try:
                 plants.append(self.at(theta, radius))
             except _NoPlantError as error:

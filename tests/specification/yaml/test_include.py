@@ -57,28 +57,18 @@ def test_complaints_point_into_the_included_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "files", "line", "said"),
+    ("text", "other", "line", "said"),
     [
-        ("title: x\ninclude: modell.yaml\n", {}, 2, "there is no file"),
-        ("include: 3\n", {}, 1, "not the name of a file"),
-        (
-            "include: [model.yaml, other.yaml]\n",
-            {"other": "include: model.yaml\n"},
-            1,
-            "includes others itself",
-        ),
-        ("include: other.yaml\n", {"other": "- 1\n"}, 1, "holds no blocks"),
-        ("include: model.yaml\nplant: {B: [0, 1]}\n", {}, 2, "plant stands here and in"),
-        (
-            "include: other.yaml\n" + MODEL,
-            {"other": "experiment: {samples: 3}\n"},
-            5,
-            "experiment.samples stands",
-        ),
+        ("title: x\ninclude: modell.yaml\n", "", 2, "there is no file"),
+        ("include: 3\n", "", 1, "not the name of a file"),
+        ("include: [model.yaml, other.yaml]\n", "include: model.yaml\n", 1, "includes others itself"),
+        ("include: other.yaml\n", "- 1\n", 1, "holds no blocks"),
+        ("include: model.yaml\nplant: {B: [0, 1]}\n", "", 2, "plant stands here and in"),
+        ("include: other.yaml\n" + MODEL, "experiment: {samples: 3}\n", 5, "experiment.samples stands"),
     ],
 )
-def test_what_cannot_be_put_together(text, files, line, said, tmp_path):
-    (diagnostic,) = diagnostics(written(tmp_path, text + REST, model=MODEL, **files))
+def test_what_cannot_be_put_together(text, other, line, said, tmp_path):
+    (diagnostic,) = diagnostics(written(tmp_path, text + REST, model=MODEL, other=other))
     assert diagnostic.code == "bad-include"
     assert diagnostic.location.line == line
     assert said in diagnostic.message
