@@ -140,21 +140,22 @@ def _on_entry(
         try:
             check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
         except SpecError as missed:
-            stated = spec.accuracy.loop
-            if stated is None or not isinstance(admissible, accuracy.Sensitivity):
-                raise
-            peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
-            message = (
-                f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g}"
-            )
-            less = (
-                f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
-            )
-            hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
-            raise spec.complain(
-                "admissible-not-positive", f"{message} at most", hint=hint, key=_LOOP
-            ) from missed
+            raise _too_much(spec, admissible, made) or missed from missed
     return made
+
+
+def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelError) -> SpecError | None:
+    """Return the error for a margin that the loop does not have with the nominal plant."""
+    stated = spec.accuracy.loop
+    if stated is None or not isinstance(admissible, accuracy.Sensitivity):
+        return None
+    peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
+    message = (
+        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most"
+    )
+    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
+    hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
+    return spec.complain("admissible-not-positive", message, hint=hint, key=_LOOP)
 
 
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
