@@ -36,10 +36,13 @@ FILES = {
     "nan.csv": "time,u,y\n" + "".join(f"{k},{int(k >= 20)},nan\n" for k in range(60)),
     "few.csv": "y\n1\n2\n",
     "empty.json": "",
+    "lists.json": json.dumps({"num": [[1]], "den": [[1, 2]]}),
     "sampled.json": json.dumps({"num": [0.1], "den": [1, -0.9], "dt": 1}),
     "unstable.json": json.dumps({"num": [1], "den": [1, -1]}),
     "half_unstable.json": json.dumps({"num": [1], "den": [1, 1, -2]}),
+    "improper.json": json.dumps({"num": [1, 2, 3], "den": [1, 1]}),
     "negative.json": json.dumps({"num": [1], "den": [10, 1], "delay": -3}),
+    "nothing.json": json.dumps({"num": [0], "den": [10, 1]}),
     "huge.json": json.dumps({"num": [1e300], "den": [1e308, 1]}),
 }
 ANYWHERE = ("", "text", "-1", "0", "1e308", "nan", "1e-300", "$(rm)", "{a: 1}")
@@ -59,35 +62,47 @@ gain 2, time constant 1e90 s
 log none.csv
 log empty.csv
 log head.csv
+step none.csv
+step empty.csv
+step head.csv
 log text.csv
+step text.csv
 log nan.csv
 step nan.csv
 log .
 step
 none.json
 empty.json
+lists.json
 sampled.json
 unstable.json
 half_unstable.json
+improper.json
 negative.json
+nothing.json
 huge.json
 """,
     "wish": """\
 PI loop with nan dB
 PI loop with 0 dB
 PI loop with 0.01 dB
+PI loop with -3 dB
 PI loop
+PI loop with 1e99 dB
 PI loop with 90 degrees
 PI loop with gain margin 0.5
 PI loop, 29 Hz
 own loop with 6 dB, Kp 100, Ti 180
+own loop with 6 dB, Kp -1, Ti 180
 own loop with 6 dB, Kp 0
 own loop with 6 dB, Kp 1, Ti 0
+own loop with 6 dB, Kp 1, Ti -5
 own loop with 6 dB, Kp 1e90
 own loop with 6 dB, Kp 1, Ti 1e-9
 own loop with 6 dB, Kp 1, Ti 9 kg
 own loop with 6 dB, 1/(z-1)
 prediction within 0 % up to 1
+prediction within -5 % up to 1
 prediction within 500 % up to 1
 prediction within 5 % up to 0
 prediction within 5 % up to 1e9
@@ -101,8 +116,10 @@ Bode plot within 5 % from 0.001 to 0.0010001
     "range": """\
 plus/minus nan
 plus/minus 0
+plus/minus -5
 45 to 35
 5 to 5
+plus/minus 1e99
 plus/minus 5 around nan
 plus/minus 5 around text
 plus/minus 1e-99
@@ -135,6 +152,9 @@ resolution 0
 rest
 standard deviation 1e-160
 rest none.csv
+rest empty.csv
+rest head.csv
+rest text.csv
 rest nan.csv
 rest few.csv
 0.2
@@ -156,6 +176,7 @@ C(z) = 1/(z-1)
 12 bits
 0 bits up to 100
 99 bits up to 100
+1e9 bits up to 100
 12 bits up to 0
 12 bits up to 10
 2 bits up to 100

@@ -61,6 +61,8 @@ def build_requirements(
                 found += _weighted_variances(spec, experiment)
             case _ if key in added("requirements"):
                 found += cast(AddedRequirement, accuracy.at(key)).build(spec, experiment)
+            case _:
+                raise KeyError(key)
     return found
 
 
