@@ -1,6 +1,6 @@
 """Maximise quadratic forms of a few lags over all signals of given letters, by dynamic programming.
 
-A signal takes its values, one a sample, from an alphabet of letters: vectors (r,) of what the inputs may be.
+A signal takes its values, one a sample, from an alphabet of letters: vectors (r,) of the inputs.
 The form sum_t u_t^T Q_0 u_t + 2 sum_k u_t^T Q_k u_(t-k), k < m, is a sum over windows of m letters. Walks on
 the graph of windows are the signals, so that its largest mean is that of the best cycle.
 """

@@ -71,7 +71,7 @@ class Signal(Section):
         "(default 0.02).",
     )
     seconds: fields.Positive = Field(
-        default=10.0, description="Seconds that such a search may take (default 10)."
+        default=10.0, description="Seconds that the search may take (default 10)."
     )
     lines: Annotated[fields.Harmonics, SIZES["signal.lines"]] | None = optional(
         "Harmonics of a period that are used: their number, odd, or a list."
