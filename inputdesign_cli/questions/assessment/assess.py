@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import bisect
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +26,8 @@ from inputdesign_cli.findings.frequency_responses import response_note
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.findings.other_systems import prior_left_out
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
-from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.estimate import Verdict
-from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.assessment.identify import (
     Identification,
@@ -46,7 +45,6 @@ _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
 _REACHED = 1e-6
 _MOST_EXPERIMENTS = 10**9
-Part = TypeVar("Part", Table, Curves)
 
 
 @dataclass(frozen=True)
@@ -234,11 +232,7 @@ def _topped_up(
     return replace(
         topped,
         outcome=outcome,
-        tables={**topped.tables, **_of_data(judged.tables)},
-        curves={**topped.curves, **_of_data(judged.curves)},
+        tables={**topped.tables, **{f"data_{name}": table for name, table in judged.tables.items()}},
+        curves={**topped.curves, **{f"data_{name}": figure for name, figure in judged.curves.items()}},
         files={**topped.files, **judged.files},
     )
-
-
-def _of_data(parts: Mapping[str, Part]) -> dict[str, Part]:
-    return {f"data_{name}": part for name, part in parts.items()}
