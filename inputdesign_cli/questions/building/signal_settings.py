@@ -274,7 +274,7 @@ def _check_moves(spec: Spec, settings: SignalSettings) -> None:
     known = peak is not None and not spec.closed_loop and spec.goal != "shortest_experiment"
     asked = spec.solver.any_spectrum and spec.solver.windows >= _LEAST_WINDOWS
     whole = spec.signal_samples == spec.experiment.samples
-    if not (searched and known and asked and whole and "output_power" not in build_cost(spec)):
+    if not (searched and known and asked and whole and "output" not in build_cost(spec)):
         message = "limits.moves is kept by the search for the best record, which does not go with this spec"
         hint = "use signal.type: binary, limits.amplitude, an open loop, a stated length and solver.windows"
         raise spec.complain("not-supported", message, hint=hint, key="limits.moves")

@@ -222,15 +222,16 @@ def _searched(request: RecordRequest, design: Design, record: Record) -> Record:
     search = level_search(request, design)
     samples = search.best(record.samples)
     found = of_samples(search, record, samples)
-    if not _few_moves(request.bounds, record):
-        record = replace(found, extra_power=np.inf, met=found.worst_ratio <= MET)
+    kept = _few_moves(request.bounds, record)
     if design.problem.goal == "factor" or found.worst_ratio > MET:
-        return found if found.worst_ratio < record.worst_ratio else record
+        if kept and record.worst_ratio <= found.worst_ratio:
+            return record
+        return replace(found, met=design.problem.goal == "factor")
     if not request.bounds.quantisers:
         level = least_level(lambda level: of_samples(search, record, level * samples).worst_ratio, 1.0)
         found = of_samples(search, record, min(level, 1.0) * samples)
     extra = search.cost(found.samples) / design_cost(design, request.cost) - 1.0
-    cheaper = not record.met or extra < record.extra_power
+    cheaper = not (kept and record.met) or extra < record.extra_power
     return replace(found, extra_power=extra, met=True) if cheaper else record
 
 
