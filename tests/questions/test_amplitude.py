@@ -175,6 +175,13 @@ def test_a_limit_on_moves_that_no_search_keeps_is_refused(more):
     )
 
 
+def test_no_move_at_all_is_no_experiment():
+    for limit, signal in (("{per_hour: 30}", ""), ("1", ", return: true")):
+        with pytest.raises(SpecError) as refused:
+            solve(asked(limits=f"{{amplitude: 1, moves: {limit}}}", signal=f"{{type: binary{signal}}}"))
+        assert refused.value.diagnostics[0].code == "out-of-range"
+
+
 @pytest.mark.parametrize("kind", ["filtered_noise", "multisine", "binary", "ternary", "prbs", "slewed"])
 @pytest.mark.parametrize("rate", ["", ", rate: 0.5"])
 def test_a_record_that_returns_ends_at_the_operating_point(kind, rate):

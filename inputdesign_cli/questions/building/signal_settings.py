@@ -267,8 +267,13 @@ def _check_kind(spec: Spec, settings: SignalSettings) -> None:
 
 def _check_moves(spec: Spec, settings: SignalSettings) -> None:
     """Refuse a limit on the number of moves where no search keeps it: it needs the bound over all records."""
-    if spec.limits.moves is None:
+    most, least = build_bounds(spec).most_moves(spec.signal_samples), 2 if settings.returns else 1
+    if most is None:
         return
+    if most < least:
+        message = f"limits.moves allows {most} moves in {spec.signal_samples} samples, and {least} are needed"
+        hint = "allow more, or make the record longer"
+        raise spec.complain("out-of-range", message, hint=hint, key="limits.moves")
     kind, peak = kind_of(settings.method), stated_peaks(spec)[0]
     searched = kind.few_levels and not kind.flat and settings.periods == 1 and settings.level is None
     known = peak is not None and not spec.closed_loop and spec.goal != "shortest_experiment"
