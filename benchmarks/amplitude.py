@@ -1,6 +1,6 @@
 """How near the records within an amplitude come to the bound over all records: N = 300, |u| <= 1.
 
-    python benchmarks/amplitude.py [RANDOM_PLANTS] [--radius R] [--hold N] [--seconds S] [--first K]
+    python benchmarks/amplitude.py [RANDOM_PLANTS] [--radius R] [--hold N|auto] [--seconds S] [--first K]
 
 Output-error plants of order one and two get a relative error of 0.2 on [0.02, 2.5] rad/s at alpha 3. Without
 RANDOM_PLANTS the eight reference plants of the table in docs/comparison.md are taken. A line a plant: ratio
@@ -81,7 +81,7 @@ def best_sequence(plant: tuple[list[float], list[float]], hold: int) -> float:
     return min(found)
 
 
-def solved(plant: tuple[list[float], list[float]], hold: int, seconds: float) -> dict[str, float]:
+def solved(plant: tuple[list[float], list[float]], hold: int | str, seconds: float) -> dict[str, float]:
     """Return what `idesign solve` finds for a plant, checked by the plain program."""
     start = time.monotonic()
     spec = {
@@ -103,7 +103,8 @@ def solved(plant: tuple[list[float], list[float]], hold: int, seconds: float) ->
         "record": found["signal"]["worst_ratio"],
         "plain": worst_ratio(plant, u),
         "distance": found["signal"]["distance_to_best"],
-        "sequence": best_sequence(plant, hold),
+        "hold": (held := found["signal"].get("hold", 1)),
+        "sequence": best_sequence(plant, held),
         "seconds": took,
     }
 
@@ -113,19 +114,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("plants", nargs="?", type=int)
     parser.add_argument("--radius", type=float, default=0.9)
-    parser.add_argument("--hold", type=int, default=1)
+    parser.add_argument("--hold", type=lambda text: text if text == "auto" else int(text), default=1)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--first", type=int, default=0)
     asked = parser.parse_args()
     plants = _EIGHT if asked.plants is None else random_plants(asked.plants, asked.radius, asked.first)
-    print("plant   power    bound   record    plain  distance  sequence  seconds")
+    print("plant   power    bound   record    plain  distance  sequence  seconds  hold")
     distances = []
     for number, plant in enumerate(plants):
         one = solved(plant, asked.hold, asked.seconds)
         distances.append(one["distance"])
         print(
             f"{number:5d} {one['power']:8.4f} {one['bound']:8.4f} {one['record']:8.4f} {one['plain']:8.4f}"
-            f" {one['distance']:9.2%} {one['sequence']:9.4f} {one['seconds']:8.1f}",
+            f" {one['distance']:9.2%} {one['sequence']:9.4f} {one['seconds']:8.1f} {one['hold']:5d}",
             flush=True,
         )
     print(f"distance: median {np.median(distances):.2%}, largest {max(distances):.2%}")

@@ -132,11 +132,15 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     axes = page.add_subplot()
     w, ratio, support = curves.frequency, curves.ratio, curves.support
     axes.plot(w, ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost")
+    if curves.within is not None:
+        label = "the same for records within the amplitude"
+        axes.plot(w, curves.within, color=GREY, linestyle=DASHED, linewidth=1.6, label=label)
     axes.axhline(1.0, color=BLACK, linewidth=1.0, label="the most that is allowed")
     if support.size:
         label = "where the optimum has its power"
         style.marked(axes, support, np.interp(support, w, ratio), color=ORANGE, label=label)
-    axes.set_ylim(0.0, 1.08 * max(1.0, float(ratio.max())))
+    top = max(1.0, float(ratio.max()), 0.0 if curves.within is None else float(curves.within.max()))
+    axes.set_ylim(0.0, 1.08 * top)
     axes.set_ylabel("relative worth of excitation")
     style.frequency_axis(axes, w, time_unit)
     page.suptitle(

@@ -131,11 +131,15 @@ class DeviationCurves(Curves):
 
 @dataclass(frozen=True)
 class OptimalityCurves(Curves):
-    """Holds the equivalence-theorem ratio over frequency: at most one, and one on the support."""
+    """Holds the equivalence-theorem ratio over frequency: at most one, and one on the support.
+
+    `within` is that of the bound over all records within an amplitude, where there is one.
+    """
 
     frequency: Array
     ratio: Array
     support: Array
+    within: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -192,6 +192,8 @@ class FlipSearch:
         goals: the plants; the worst of them counts.
         letters: the levels of each input, (levels, r), the same number for every input.
         allowed: says whether a record (samples, r) keeps to what else there is.
+        most_moves: the largest number of changes of the inputs, from rest.
+        returns: whether the last value is zero.
     """
 
     def __init__(
@@ -201,9 +203,13 @@ class FlipSearch:
         values: int,
         hold: int = 1,
         allowed: Callable[[Array], bool] | None = None,
+        *,
+        most_moves: int | None = None,
+        returns: bool = False,
     ) -> None:
         self._held = [_Held(goal, values, hold) for goal in goals]
         self._letters, self._hold, self._allowed = letters, hold, allowed
+        self._most_moves, self._returns = most_moves, returns
 
     def best(
         self,
@@ -233,7 +239,10 @@ class FlipSearch:
         for _ in range(changes):
             if over() or best.ratio <= enough:
                 break
-            point = self._descended(self._at(self._kicked(best.values, rng)), over, enough)
+            kicked = self._kicked(best.values, rng)
+            if not self.keeps(kicked):
+                continue
+            point = self._descended(self._at(kicked), over, enough)
             if point.ratio < best.ratio:
                 best = point
         return np.repeat(best.values, self._hold, axis=0), best.ratio
@@ -244,6 +253,8 @@ class FlipSearch:
 
     def keeps(self, values: Array) -> bool:
         """Return whether values (n, r) keep to the limits beside their levels."""
+        if self._most_moves is not None and moves_of(values) > self._most_moves:
+            return False
         return self._allowed is None or self._allowed(np.repeat(values, self._hold, axis=0))
 
     def _at(self, values: Array) -> _Point:
@@ -294,6 +305,8 @@ class FlipSearch:
             wanted = self._letters[
                 np.argmax(gradient[:, None] * self._letters, axis=1), range(gradient.shape[1])
             ]
+            if self._returns:
+                wanted[-1] = 0.0
             gain = (wanted - point.values) * gradient
             most = max(1, int(_SHARE * (1.0 - step / _CLIMBS) * gain.size))
             order = np.argsort(-gain, axis=None)[:most]
@@ -331,6 +344,7 @@ class FlipSearch:
         gradient = self._gradient(point, weights)
         apart = np.sum([h.slopes(Y) for h, Y in zip(self._held, weights, strict=True)], axis=0)
         found: list[tuple[float, int, int, Array]] = []
+        spare = np.inf if self._most_moves is None else self._most_moves - moves_of(point.values)
         for channel in range(point.values.shape[1]):
             column, levels = point.values[:, channel], self._letters[:, channel]
             options = (
@@ -345,8 +359,12 @@ class FlipSearch:
                     gain = np.lib.stride_tricks.sliding_window_view(along, run).sum(axis=1)
                     toeplitz = scipy.linalg.toeplitz(apart[:run, channel])
                     gain = gain + np.einsum("ni,ij,nj->n", ahead, toeplitz, ahead)
+                    if np.isfinite(spare):
+                        gain[_more_moves(column, ahead) > spare] = -np.inf
+                    if self._returns:
+                        gain[-1] = -np.inf
                     for first in np.argsort(-gain)[:_TRIED]:
-                        if np.any(ahead[first]):
+                        if np.any(ahead[first]) and np.isfinite(gain[first]):
                             found.append((float(gain[first]), channel, int(first), ahead[first]))
         found.sort(key=lambda one: -one[0])
         return [one[1:] for one in found]
@@ -381,4 +399,38 @@ class FlipSearch:
                 changed[first : first + run, channel] = levels.sum() - changed[first : first + run, channel]
             else:
                 changed[first : first + run, channel] = rng.choice(levels)
+        if self._returns:
+            changed[-1] = 0.0
         return changed
+
+
+def moves_of(values: Array) -> int:
+    """Return the number of changes of all inputs from one value (n, r) to the next, the first from rest."""
+    return int(np.count_nonzero(np.diff(values, axis=0, prepend=0.0)))
+
+
+def _more_moves(column: Array, steps: Array) -> Array:
+    """Return how many moves a column (n,) gains by steps (n - run + 1, run) at each place, as integers."""
+    run = steps.shape[1]
+    window = np.lib.stride_tricks.sliding_window_view(column, run)
+    before, after = np.append(0.0, column)[: len(window)], np.append(column, np.nan)[run:][: len(window)]
+
+    def count(values: Array) -> Array:
+        edges = (values[:, 0] != before).astype(int) + ((values[:, -1] != after) & ~np.isnan(after))
+        return edges + np.count_nonzero(np.diff(values, axis=1), axis=1)
+
+    return count(window + steps) - count(window)
+
+
+def with_few_moves(values: Array, most: int) -> Array:
+    """Return values (n, r) whose shortest runs have joined the run before them, until few moves are left."""
+    for shortest in range(1, len(values) + 1):
+        if moves_of(values) <= most:
+            break
+        columns = []
+        for column in values.T:
+            starts = np.append(0, 1 + np.flatnonzero(np.diff(column)))
+            kept = starts[(np.diff(starts, append=len(column)) > shortest) | (starts == 0)]
+            columns.append(column[kept][np.searchsorted(kept, np.arange(len(column)), side="right") - 1])
+        values = np.stack(columns, axis=1)
+    return values

@@ -87,7 +87,11 @@ class SignalGenerator:
             whole = self.factor.filtered(self.samples, rng)[:: settings.hold, None]
         else:
             whole = np.tile(self.kind.draw(self._draft, rng), (settings.periods, 1))
-        return whole * settings.taper(len(whole))[:, None] if settings.ramp else whole
+        if settings.ramp:
+            whole = whole * settings.taper(len(whole))[:, None]
+        if settings.returns:
+            whole[-1] = 0.0
+        return whole
 
     @property
     def _draft(self) -> Draft:

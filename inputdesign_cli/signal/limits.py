@@ -33,7 +33,8 @@ class Bounds:
 
     They bound |u|, its moves and |y|, where the record causes u and y from rest (in open loop u is
     the record). `powers` are the largest mean squares: kind, channel (None is the sum over the channels),
-    bound. `quantisers` are the converters of the inputs, none when empty.
+    bound. `quantisers` are the converters of the inputs, none when empty. A record has at most `moves`
+    changes of its inputs, or as many in `moves_in` samples.
     """
 
     amplitude: Array | None = None
@@ -41,6 +42,12 @@ class Bounds:
     output: Array | None = None
     powers: tuple[tuple[PowerKind, int | None, float], ...] = ()
     quantisers: tuple[Quantiser, ...] = ()
+    moves: float | None = None
+    moves_in: float | None = None
+
+    def most_moves(self, samples: int) -> int | None:
+        """Return the largest number of changes of the inputs in so many samples; None without a limit."""
+        return None if self.moves is None else int(self.moves * samples / (self.moves_in or samples))
 
     @property
     def hard(self) -> bool:
@@ -54,6 +61,7 @@ class Bounds:
             ("amplitude.input", self.amplitude, u),
             ("amplitude.output", self.output, y),
             ("rate", self.rate, np.diff(u, axis=0, prepend=0.0)),
+            ("moves", self.most_moves(len(u)), np.array(np.count_nonzero(np.diff(u, axis=0, prepend=0.0)))),
         )
         return {
             key: float(np.max(np.abs(x) / most))
@@ -115,6 +123,8 @@ class Limiter:
     def record(self, values: Array, level: float) -> Array:
         """Return `level` times the `values` as far as the limits allow, which hold exactly, (n, r)."""
         goal = level * values
+        if self.settings.returns:
+            goal[-1] = 0.0
         if self.plain:
             return self._held(goal)
         kind = kind_of(self.settings.method)
@@ -124,7 +134,11 @@ class Limiter:
         for _ in range(_TRIES):
             limited = np.clip(goal, -self._most, self._most)
             for channel in np.flatnonzero(np.isfinite(self._fastest)):
-                limited[:, channel] = follow(limited[:, channel], float(self._fastest[channel]))
+                rate, column = float(self._fastest[channel]), limited[:, channel]
+                if self.settings.returns:  # in time to come back
+                    reach = rate * np.arange(len(column))[::-1]
+                    column = np.clip(column, -reach, reach)
+                limited[:, channel] = follow(column, rate)
             if self.constraints:
                 limited = restrained(limited, tuple(one.tightened(shrink) for one in self.constraints))
             record = self._converted(limited)

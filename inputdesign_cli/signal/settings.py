@@ -67,6 +67,7 @@ class SignalSettings:
         tolerance, seconds: a search for the best record ends this near to the bound over all records, or
             after this time.
         ramp: samples over which the record fades in and out.
+        returns: whether its last value is zero, the operating point.
         bits: register of a pseudo-random sequence.
         number: levels of steps.
         level: (r,) the required peaks of the inputs, whatever accuracy follows.
@@ -82,6 +83,7 @@ class SignalSettings:
     tolerance: float = 0.02
     seconds: float = 10.0
     ramp: int = 0
+    returns: bool = False
     bits: int | None = None
     number: int | None = None
     level: Array | None = None

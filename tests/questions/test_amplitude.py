@@ -9,7 +9,8 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.signal.prbs import pseudo_random
 
 B, F = 1.2, -0.6
@@ -112,3 +113,110 @@ def test_there_is_no_bound_without_an_amplitude_or_in_a_loop(more):
     result = solve(asked(**{"signal": "{type: binary}", **more})).result
     assert "any_record_bound" not in result["objective"]
     assert "distance_to_best" not in result["signal"]
+
+
+def moves(u):
+    return int(np.count_nonzero(np.diff(u, prepend=0.0)))
+
+
+@pytest.mark.parametrize(
+    ("limit", "most"), [("8", 8), ("{per_hour: 600}", 10), ("{per_hour: 60}", 1), ("200", 200)]
+)
+def test_a_record_has_no_more_moves_than_allowed(limit, most):
+    """60 samples of a second are a minute."""
+    results = solve(asked(limits=f"{{amplitude: 1, moves: {limit}}}"))
+    u, signal = results.signal[:, 0], results.result["signal"]
+    assert moves(u) <= most
+    assert signal["moves"]["count"] == moves(u)
+    changes = [*np.flatnonzero(np.diff(u, prepend=0.0)), len(u)]
+    assert signal["moves"]["shortest_dwell"] == min(np.diff(changes))
+    assert signal["moves"]["largest"] == pytest.approx([2.0 if moves(u) > 1 else 1.0])
+    if most > 1:
+        assert ratio(u) == pytest.approx(signal["worst_ratio"], rel=1e-4)
+
+
+@pytest.mark.parametrize("returns", [False, True])
+def test_the_best_record_of_few_moves_is_found(returns):
+    """Of 14 samples all records of two levels with at most four moves are looked through."""
+    spec = asked(
+        experiment="{samples: 14}",
+        limits="{amplitude: 1, moves: 4}",
+        signal=f"{{type: binary, seconds: 5, return: {str(returns).lower()}}}",
+    )
+    found = solve(spec).signal[:, 0]
+    free = 14 - returns
+    every = (np.array([1.0, *rest, *[0.0] * returns]) for rest in product((-1.0, 1.0), repeat=free - 1))
+    best = min(ratio(u) for u in every if moves(u) <= 4)
+    assert moves(found) <= 4
+    assert ratio(found) == pytest.approx(best, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"signal": "{type: filtered_noise}"},
+        {"signal": "{type: prbs}"},
+        {"signal": "{type: binary, samples: 30}"},
+        {"signal": "{type: binary, periods: 2}"},
+        {"solver": "{windows: 0}"},
+        {"solver": "{any_spectrum: false}"},
+        {"limits": "{amplitude: {output: 1}, moves: 8}"},
+        {"experiment": "{samples: 60, controller: {numerator: [0.2]}}"},
+        {"objective": "shortest_experiment", "accuracy": ROUGH},
+        {"objective": "least_cost", "cost": "{output_power: 1}", "accuracy": ROUGH},
+    ],
+)
+def test_a_limit_on_moves_that_no_search_keeps_is_refused(more):
+    with pytest.raises(SpecError) as refused:
+        solve(asked(**{"limits": "{amplitude: 1, moves: 8}", **more}))
+    assert (refused.value.diagnostics[0].code, refused.value.diagnostics[0].key) == (
+        "not-supported",
+        "limits.moves",
+    )
+
+
+def test_no_move_at_all_is_no_experiment():
+    for limit, signal in (("{per_hour: 30}", ""), ("1", ", return: true")):
+        with pytest.raises(SpecError) as refused:
+            solve(asked(limits=f"{{amplitude: 1, moves: {limit}}}", signal=f"{{type: binary{signal}}}"))
+        assert refused.value.diagnostics[0].code == "out-of-range"
+
+
+@pytest.mark.parametrize("kind", ["filtered_noise", "multisine", "binary", "ternary", "prbs", "slewed"])
+@pytest.mark.parametrize("rate", ["", ", rate: 0.5"])
+def test_a_record_that_returns_ends_at_the_operating_point(kind, rate):
+    if kind == "slewed" and not rate:
+        pytest.skip("ramps need a rate")
+    spec = asked(
+        limits=f"{{amplitude: 1{rate}}}",
+        signal=f"{{type: {kind}, return: true, offset: 45, seconds: 0.2, candidates: 1}}",
+    )
+    results = solve(spec)
+    u = results.signal[:, 0] - 45.0
+    assert abs(u[-1]) < 1e-12
+    assert np.max(np.abs(u)) <= 1.0 + 1e-9
+    assert ratio(u) == pytest.approx(results.result["signal"]["worst_ratio"], rel=1e-3)
+    if rate:
+        assert np.max(np.abs(np.diff(u, prepend=0.0))) <= 0.5 + 1e-9
+
+
+def test_the_table_of_steps_gives_back_the_record(tmp_path):
+    results = solve(asked(signal="{type: binary, hold: 3, seconds: 0.2, export: [step_table]}"))
+    steps, u = results.tables["steps"].columns, results.signal[:, 0]
+    at = np.searchsorted(steps["time_s"], np.arange(60.0), side="right") - 1
+    assert np.array_equal(steps["u1"][at], u)
+    assert np.all(np.diff(steps["u1"]) != 0.0)
+
+
+@pytest.mark.parametrize(
+    ("pole", "samples", "hold"), [(0.98, 300, 4), (0.6, 300, 1), (0.99, 60, 1), (0.999, 500, 10)]
+)
+def test_the_hold_that_is_chosen_is_a_tenth_of_the_slowest_time_constant(pole, samples, hold):
+    """It divides the length, and at least fifty values are left."""
+    spec = asked(
+        plant=f"{{B: [0, 1], F: [1, -{pole}]}}",
+        experiment=f"{{samples: {samples}}}",
+        signal="{type: binary, hold: auto, seconds: 0.1}",
+        accuracy="{criterion: D}",
+    )
+    assert build_convex(spec).record.settings.hold == hold

@@ -7,7 +7,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.questions.building.demand import check_record, longest_record
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
+from inputdesign_cli.questions.building.system import build_cost, build_model, excitation_band, record_step
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest, least_period
 from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.limits import Bounds
@@ -23,6 +23,8 @@ _PATIENCE = 4  # times the number of candidates at most, if noise happens to fit
 _OPTIMISED = 4
 # Signals whose times of switching are searched take seconds.
 _SEARCHED = 2
+# Values in the slowest time constant, and in the record, where idesign chooses for how long they are held.
+_VALUES, _FEWEST_VALUES = 10.0, 50
 
 
 def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
@@ -33,7 +35,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     check_record(spec, parameters)
     step, limits, signal = record_step(spec), spec.limits, spec.signal
     lo, hi = excitation_band(spec)
-    stated = ("limits.amplitude", "limits.rate", "signal.quantisation")
+    stated = ("limits.amplitude", "limits.rate", "limits.moves", "signal.quantisation")
     return RecordRequest(
         settings=build_signal_settings(spec),
         bounds=build_bounds(spec),
@@ -46,11 +48,13 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         most_samples=limits.samples,
         longest=longest_record(parameters, spec.plant.outputs),
         stated_method=signal.type is not None,
-        others=tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
+        others=()
+        if limits.moves is not None
+        else tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
         limit_keys=tuple(key for key in stated if spec.at(*key.split(".")) is not None),
         delivery=Delivery(
             operating_points=None if signal.offset is None else operating_points(spec),
-            also=signal.also or (),
+            also=(*(signal.also or ()), *(signal.export or ())),
             full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),
             sampling_rate=sampling_rate(spec),
         ),
@@ -75,16 +79,31 @@ def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettin
         phases=phases,
         lines=signal.lines,
         periods=signal.periods or 1,
-        hold=signal.hold or 1,
+        hold=chosen_hold(spec),
         tolerance=signal.tolerance,
         seconds=signal.seconds,
         ramp=signal.ramp or 0,
+        returns=bool(signal.at("return")),
         bits=signal.bits,
         level=per_channel(signal.amplitudes, inputs),
         candidates=signal.candidates or candidates,
         most_candidates=signal.candidates or most,
         seed=signal.seed or 0,
     )
+
+
+def chosen_hold(spec: Spec) -> int:
+    """Return the samples for which values are held: as stated, or about a tenth of the slowest time constant.
+
+    A chosen number divides the length of the record, and leaves a tenth of it many values.
+    """
+    stated = spec.signal.hold
+    if stated is None or isinstance(stated, int):
+        return stated or 1
+    radius, samples = build_model(spec).radius, spec.signal_samples
+    slowest = -1.0 / np.log(radius) if 0.0 < radius < 1.0 else np.inf if radius >= 1.0 else 0.0
+    most = int(np.clip(slowest / _VALUES, 1, max(samples // _FEWEST_VALUES, 1)))
+    return max(hold for hold in range(1, most + 1) if samples % hold == 0)
 
 
 def stated_peaks(spec: Spec) -> tuple[Array | None, Array | None]:
@@ -104,7 +123,7 @@ def stated_moves(spec: Spec) -> Array | None:
     if rate is None:
         return None
     tighter = np.ones(rate.size, dtype=bool) if peak is None else rate < 2.0 * peak
-    return np.where(tighter, rate / np.sqrt(spec.signal.hold or 1), np.inf)
+    return np.where(tighter, rate / np.sqrt(chosen_hold(spec)), np.inf)
 
 
 def build_bounds(spec: Spec) -> Bounds:
@@ -113,7 +132,11 @@ def build_bounds(spec: Spec) -> Bounds:
     if amplitude is not None:
         amplitude = amplitude - np.abs(_offsets(spec) - operating_points(spec))
     rate = per_channel(spec.limits.rate, spec.plant.inputs)
-    return Bounds(amplitude=amplitude, rate=rate, output=output, quantisers=_quantisers(spec))
+    moves, hour = spec.limits.moves, None
+    if moves is not None and moves.per_hour is not None:
+        hour = 3600.0 / (spec.sample_time * SECONDS[spec.time_unit])
+    most = None if moves is None else moves.count or moves.per_hour
+    return Bounds(amplitude, rate, output, quantisers=_quantisers(spec), moves=most, moves_in=hour)
 
 
 def _offsets(spec: Spec) -> Array:
@@ -175,6 +198,7 @@ def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array
 
 
 _STEPS_ROUNDING = 1e-12
+_LEAST_WINDOWS = 4
 
 
 def check_signal(spec: Spec) -> None:
@@ -187,6 +211,7 @@ def check_signal(spec: Spec) -> None:
     if spec.goal != "shortest_experiment" or spec.signal.samples is not None:
         _check_length(spec, settings)
     _check_kind(spec, settings)
+    _check_moves(spec, settings)
     for channel in range(spec.plant.inputs):
         _check_level(spec, channel)
 
@@ -238,6 +263,26 @@ def _check_kind(spec: Spec, settings: SignalSettings) -> None:
     if "wav" in (spec.signal.also or ()) and (round(rate) < 1 or abs(rate - round(rate)) > 1e-9 * rate):
         message = f"a WAV file needs a whole number of samples a second; the sample time gives {rate:.6g}"
         raise spec.complain("no-sample-rate", message, hint="use mat, or signal.csv", key="signal.also")
+
+
+def _check_moves(spec: Spec, settings: SignalSettings) -> None:
+    """Refuse a limit on the number of moves where no search keeps it: it needs the bound over all records."""
+    most, least = build_bounds(spec).most_moves(spec.signal_samples), 2 if settings.returns else 1
+    if most is None:
+        return
+    if most < least:
+        message = f"limits.moves allows {most} moves in {spec.signal_samples} samples, and {least} are needed"
+        hint = "allow more, or make the record longer"
+        raise spec.complain("out-of-range", message, hint=hint, key="limits.moves")
+    kind, peak = kind_of(settings.method), stated_peaks(spec)[0]
+    searched = kind.few_levels and not kind.flat and settings.periods == 1 and settings.level is None
+    known = peak is not None and not spec.closed_loop and spec.goal != "shortest_experiment"
+    asked = spec.solver.any_spectrum and spec.solver.windows >= _LEAST_WINDOWS
+    whole = spec.signal_samples == spec.experiment.samples
+    if not (searched and known and asked and whole and "output" not in build_cost(spec)):
+        message = "limits.moves is kept by the search for the best record, which does not go with this spec"
+        hint = "use signal.type: binary, limits.amplitude, an open loop, a stated length and solver.windows"
+        raise spec.complain("not-supported", message, hint=hint, key="limits.moves")
 
 
 def _check_level(spec: Spec, channel: int) -> None:

@@ -157,7 +157,7 @@ def make_record(
         if not (missed or beyond or higher):
             if problem.goal != "samples" and searches(design, settings):
                 return _searched(request, design, record)
-            return record
+            return record if _few_moves(bounds, record) else replace(record, met=False)
         numbers += [*missed, *beyond]
         limiting += higher
 
@@ -193,12 +193,18 @@ def level_search(request: RecordRequest, design: Design) -> LevelSearch:
         powers = max(_power_share(plant, bounds.powers, samples) for plant in each)
         return powers <= MET and max(peak_share(plant, bounds, samples) for plant in each) <= MET
 
-    others = bounds.output is not None or bounds.rate is not None
+    others = any(one is not None for one in (bounds.output, bounds.rate, bounds.moves))
     depends = any(design.problem.experiment.depends_on_plant(kind) for kind, _, _ in bounds.powers)
     plain = not (others or depends or bounds.quantisers)
     amplitude = bounds.amplitude if plain and _affords(bounds) else None
     return LevelSearch(
-        design, request.settings, plants, cost, amplitude, allowed if others or depends else None
+        design,
+        request.settings,
+        plants,
+        cost,
+        amplitude,
+        allowed if others or depends else None,
+        bounds.most_moves,
     )
 
 
@@ -216,14 +222,22 @@ def _searched(request: RecordRequest, design: Design, record: Record) -> Record:
     search = level_search(request, design)
     samples = search.best(record.samples)
     found = of_samples(search, record, samples)
+    kept = _few_moves(request.bounds, record)
     if design.problem.goal == "factor" or found.worst_ratio > MET:
-        return found if found.worst_ratio < record.worst_ratio else record
+        if kept and record.worst_ratio <= found.worst_ratio:
+            return record
+        return replace(found, met=design.problem.goal == "factor")
     if not request.bounds.quantisers:
         level = least_level(lambda level: of_samples(search, record, level * samples).worst_ratio, 1.0)
         found = of_samples(search, record, min(level, 1.0) * samples)
     extra = search.cost(found.samples) / design_cost(design, request.cost) - 1.0
-    cheaper = not record.met or extra < record.extra_power
+    cheaper = not (kept and record.met) or extra < record.extra_power
     return replace(found, extra_power=extra, met=True) if cheaper else record
+
+
+def _few_moves(bounds: Bounds, record: Record) -> bool:
+    """Return whether a record has no more moves than allowed."""
+    return bounds.shares(record.samples).get("moves", 0.0) <= MET
 
 
 def of_samples(search: LevelSearch, record: Record, samples: Array) -> Record:

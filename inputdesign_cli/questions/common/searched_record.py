@@ -14,7 +14,7 @@ from inputdesign_cli.compute.time_limit import time_is_over
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal.evaluation import MET
-from inputdesign_cli.signal.flips import FlipSearch, PlantGoal
+from inputdesign_cli.signal.flips import FlipSearch, PlantGoal, with_few_moves
 from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.prbs import shifted_sequences
@@ -47,6 +47,7 @@ class LevelSearch:
         cost: returns the cost of samples (n, r).
         amplitude: of two-level records (r,); None if the first record has the levels.
         allowed: says whether samples (n, r) keep to the limits beside the amplitude; None if there is none.
+        most_moves: the largest number of changes of the inputs in a number of samples; None without a limit.
     """
 
     design: Design
@@ -55,6 +56,7 @@ class LevelSearch:
     cost: Callable[[Array], float]
     amplitude: Array | None = None
     allowed: Callable[[Array], bool] | None = None
+    most_moves: Callable[[int], int | None] = lambda _: None
 
     def __post_init__(self) -> None:
         """Begin to count the time that the search may take."""
@@ -104,16 +106,21 @@ class LevelSearch:
         self, record: Array, values: int, enough: float, over: Callable[[], bool]
     ) -> tuple[Array, float]:
         """Return the best record (n, r) found from a first one and from other starts, and its ratio."""
-        letters, hold = _levels(record), self.settings.hold
+        hold, returns = self.settings.hold, self.settings.returns
+        letters, most = _levels(record[:-hold] if returns else record), self.most_moves(values * hold)
         if self.amplitude is not None and len(letters) == 2:
             letters = np.array([-self.amplitude, self.amplitude])
         goals = [
             PlantGoal(plant, scenario.requirements)
             for plant, scenario in zip(self.plants(values * hold), self.design.problem.scenarios, strict=True)
         ]
-        search = FlipSearch(goals, letters, values, hold, self.allowed)
+        search = FlipSearch(goals, letters, values, hold, self.allowed, most_moves=most, returns=returns)
         own = _nearest(record[::hold], letters) if len(letters) == 2 else record[::hold]
         starts = [own, *(_nearest(start, letters) for start in self._starts(values))]
+        if most is not None:
+            starts = [with_few_moves(start, most - returns) for start in starts]
+        if returns:
+            starts = [np.append(start[:-1], 0.0 * start[:1], axis=0) for start in starts]
         starts = [start for start in starts if search.keeps(start)]
         starts = sorted(starts, key=search.ratio)[:_IMPROVED] if starts else [own]
         return search.best(starts, self._rng, enough=enough, over=over, changes=_CHANGES)
@@ -125,7 +132,9 @@ class LevelSearch:
         inputs = bound.best.shape[1]
         if len(bound.best) >= values:
             yield bound.best[:values]
-        for clock in _CLOCKS:
+        most = self.most_moves(values * self.settings.hold)
+        slow = () if most is None else (-(-values // (most + 1)), max(values // (2 * most), 1))
+        for clock in (*_CLOCKS, *slow):
             for bits in _REGISTERS:
                 if clock <= values and 2 ** (bits - 1) * clock <= 2 * values:
                     sequence = shifted_sequences(bits, -(-values // clock), inputs, self._rng)

@@ -14,6 +14,7 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.outcome import Signal
 from inputdesign_cli.outcome.curves import PredictedPanel, SignalCurves
+from inputdesign_cli.outcome.design import Moves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.signal_files import WRITERS
 from inputdesign_cli.outcome.units import Units
@@ -73,8 +74,33 @@ def signal_of(
         if delivery.operating_points is None or not made
         else _channels(delivery.operating_points),
         wav_full_scale=_full_scale(delivery, record) if "wav" in delivery.also else None,
-        details={"phases": request.settings.phases} if record.method == "multisine" else {},
+        moves=_moves(samples, units.sample_time) if made and _of_moves(request) else None,
+        details=_details(request, record),
     )
+
+
+def _details(request: RecordRequest, record: Record) -> dict[str, object]:
+    """Return further entries of a record: how its phases were chosen, and for how long values are held."""
+    found: dict[str, object] = {}
+    if record.method == "multisine":
+        found["phases"] = request.settings.phases
+    if record.method != "given" and request.settings.hold > 1:
+        found["hold"] = request.settings.hold
+    return found
+
+
+def _of_moves(request: RecordRequest) -> bool:
+    """Return whether an operator would make the moves of the record: they are held, or few."""
+    return request.settings.hold > 1 or request.bounds.moves is not None
+
+
+def _moves(samples: Array, sample_time: float) -> Moves:
+    """Return the changes of all inputs of a record (n, r) from rest, and the shortest time between two."""
+    changes = np.diff(samples, axis=0, prepend=0.0)
+    at = [np.append(np.flatnonzero(column), len(samples)) for column in changes.T]
+    shortest = min((int(np.diff(one).min()) for one in at if one.size > 1), default=len(samples))
+    largest = _channels(np.abs(changes).max(axis=0))
+    return Moves(int(np.count_nonzero(changes)), largest, shortest * sample_time)
 
 
 def _channels(values: Array) -> tuple[float, ...]:
@@ -119,8 +145,11 @@ def with_record(
         levels=around is not None and bool(np.any(around)),
     )
     tables = {"signal": Table(columns), "predicted_output": Table(predicted)}
-    # signal.mat, .npz and .h (time, u1 or r1, .., sample_time), and signal.wav (32-bit float up to 1).
     delivery = request.delivery
+    if "step_table" in delivery.also:  # the first value, and each that differs from the one before
+        moved = np.any(np.diff(record.samples, axis=0, prepend=np.nan) != 0.0, axis=1)
+        tables["steps"] = Table({name: values[moved] for name, values in columns.items()})
+    # signal.mat, .npz and .h (time, u1 or r1, .., sample_time), and signal.wav (32-bit float up to 1).
     endings = [ending for ending in WRITERS if ending in delivery.also]
     files = {f"signal.{ending}": WRITERS[ending](columns, units.sample_time) for ending in endings}
     if "wav" in delivery.also:

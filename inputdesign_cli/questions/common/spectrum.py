@@ -112,7 +112,8 @@ def with_periodogram(
 def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCurves] | None:
     """Return optimality.csv and its plot, the worth of the best direction over its price, or None.
 
-    By the bound over every spectrum it is at most one everywhere, and one where power pays.
+    By the bound over every spectrum it is at most one everywhere, and one where power pays. So it is by the
+    bound over all records, whose price grows where signals within the amplitude have no such autocovariances.
     """
     anything = design.any_spectrum
     if anything is None:
@@ -131,8 +132,13 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
     ratio, _ = best_directions(costs[seen], value.density(w)[seen])
     marks = distinct(np.maximum(support, w[0]), w[-1])
     frequency = w[seen] / units.frequency
-    table = Table({units.frequency_header: frequency, "ratio": ratio})
-    return table, OptimalityCurves(frequency, ratio, marks / units.frequency)
+    columns, within = {units.frequency_header: frequency, "ratio": ratio}, None
+    if design.any_record is not None:
+        known = design.any_record.result.certificate
+        if known.price is not None and known.value is not None:
+            within, _ = best_directions(known.price.density(w[seen]), known.value.density(w[seen]))
+            columns["ratio_records"] = within
+    return Table(columns), OptimalityCurves(frequency, ratio, marks / units.frequency, within)
 
 
 def described_spectrum(units: Units, basis: Basis, x: Array) -> Spectrum:

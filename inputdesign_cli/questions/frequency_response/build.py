@@ -278,7 +278,9 @@ def _check_supported(spec: Spec) -> None:
         **{f"accuracy.{name}": "keep one of them" for name in sorted(others)},
         "experiment.controller": "remove the controller",
         "experiment.prior": "remove it",
-        **dict.fromkeys(("limits.energy", "limits.spectrum"), "limit powers, amplitude or rate"),
+        **dict.fromkeys(
+            ("limits.energy", "limits.spectrum", "limits.moves"), "limit powers, amplitude or rate"
+        ),
         "limits.band": f"state {KEY}.band",
         "solver.method": "remove method",
         "signal.type": "use multisine",

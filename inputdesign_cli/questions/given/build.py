@@ -37,7 +37,7 @@ from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models import spectrum as stated_spectrum
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
-_OF_DESIGNS = ("limits.spectrum", "objective", "campaign")
+_OF_DESIGNS = ("limits.spectrum", "limits.moves", "objective", "campaign")
 # Keys of signals that mean something for a record that the tool makes.
 _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
 

@@ -246,7 +246,9 @@ def _check_supported(spec: Spec) -> None:
     mins = [f"limits.{kind}_power.min" for kind in POWER_KINDS]
     remedies = {
         **{f"accuracy.{name}": "keep one requirement" for name in spec.accuracy.requirements},
-        **dict.fromkeys(("limits.energy", "limits.spectrum", "limits.amplitude.output", *mins), limits),
+        **dict.fromkeys(
+            ("limits.energy", "limits.spectrum", "limits.moves", "limits.amplitude.output", *mins), limits
+        ),
         "spectrum.type": "use type: pointwise, which is best at every frequency",
         "experiment.controller": "remove the controller",
         "report.ellipses": "remove report",

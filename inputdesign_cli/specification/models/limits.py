@@ -81,6 +81,13 @@ class AmplitudeLimit(Section, some_of=(("input", "output"),)):
     )
 
 
+class MovesLimit(Section, one_of=(("count", "per_hour"),)):
+    """The largest number of changes of the inputs, in all or an hour."""
+
+    count: fields.Count | None = optional("In the whole record.")
+    per_hour: fields.Positive | None = optional("An hour.")
+
+
 class Limits(Section):
     """Bounds on the experiment; all are optional."""
 
@@ -94,6 +101,9 @@ class Limits(Section):
     )
     rate: fields.PerChannel[fields.Cap] | None = optional(
         "Largest change of u from one sample to the next; a number or one per input."
+    )
+    moves: Annotated[MovesLimit, Shorthand("count", {"type": "integer", "exclusiveMinimum": 0})] | None = (
+        optional("Largest number of changes of the inputs in the record: a number, or {per_hour}.")
     )
     energy: fields.Cap | None = optional("Power summed over the samples (trace R).")
     band: fields.Band | None = optional("The excitation vanishes outside these frequencies.")

@@ -6,12 +6,21 @@ from collections.abc import Iterator
 from typing import Annotated, Literal, cast
 
 from pydantic import BeforeValidator, Field, JsonValue
+from pydantic.fields import FieldInfo
 
 from inputdesign_cli.plugins import names, own
 from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.plant import TruePlant
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail, optional
+from inputdesign_cli.specification.models.section import (
+    PathDiagnostic,
+    Section,
+    Wording,
+    by_tag,
+    fail,
+    optional,
+    tag,
+)
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.wording import unknown_word
 
@@ -33,6 +42,12 @@ SignalType = Annotated[
     str,
     BeforeValidator(_registered),
     Field(json_schema_extra=lambda schema: schema.update(enum=cast(list[JsonValue], _names()))),
+]
+
+Hold = Annotated[
+    Annotated[Samples, tag("samples")]
+    | Annotated[Literal["auto"], Wording("auto", "write auto, or a number of samples"), tag("auto")],
+    by_tag(lambda value: "auto" if isinstance(value, str) else "samples"),
 ]
 
 # Settings that mean something for some types of signal only.
@@ -64,7 +79,9 @@ class Signal(Section):
         "Phases of a multisine; optimised: for a low crest factor."
     )
     periods: Samples | None = optional("Number of equal periods.")
-    hold: Samples | None = optional("Samples for which each value is held.")
+    hold: Hold | None = optional(
+        "Samples for which each value is held; auto: about a tenth of the slowest time constant."
+    )
     tolerance: fields.Fraction = Field(
         default=0.02,
         description="A search for the best record within limits.amplitude ends this near to its bound "
@@ -97,6 +114,9 @@ class Signal(Section):
     also: tuple[Literal["mat", "npz", "h", "wav"], ...] | None = optional(
         "Other files of the signal beside signal.csv: mat (MATLAB), npz (numpy), h (C), wav."
     )
+    export: tuple[Literal["step_table"], ...] | None = optional(
+        "Tables for a control system: step_table, the time and the values of each move in steps.csv."
+    )
     candidates: Annotated[fields.Count, SIZES["signal.candidates"]] | None = optional(
         "Number of random realisations to choose the best of."
     )
@@ -109,6 +129,12 @@ class Signal(Section):
                 message = f"{{key}} does not go with type: {self.type}"
                 hint = f"it belongs to type: {types[0]}; remove it, or change the type"
                 yield PathDiagnostic("unsuitable-key", message, hint, (key,), at_key=True)
+
+
+# `return` is a word of Python, which no attribute of a class body can be named.
+Signal.model_fields["return"] = FieldInfo.from_annotated_attribute(
+    fields.Flag | None, optional("Whether the record ends at the operating point.")
+)
 
 
 class Solver(Section):

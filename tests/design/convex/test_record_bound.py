@@ -206,3 +206,38 @@ def test_longer_windows_know_more() -> None:
     longer, face = short.longer(8).gauge(lags)
     assert longer >= multiple
     assert face.share == pytest.approx(longer, rel=1e-4)
+
+
+def output_error_plant(rng):
+    """A random plant with one or two poles of moduli up to 0.9."""
+    order = int(rng.integers(1, 3))
+    poles = rng.uniform(0.2, 0.9, order) * rng.choice([-1.0, 1.0], order)
+    if order == 2 and rng.random() < 0.5:
+        poles = poles[0] * np.exp(1j * rng.uniform(0.2, 2.8) * np.array([1.0, -1.0]))
+    return {"B": [0.0, *rng.standard_normal(order).tolist()], "F": np.real(np.poly(poles)).tolist()}
+
+
+@pytest.mark.slow
+def test_the_search_finds_the_best_of_all_records_of_most_plants():
+    """Of 2^11 records of twelve samples the best few on a grid are compared at every frequency."""
+    samples, found = 12, 0
+    every = np.array([(1.0, *rest) for rest in product((-1.0, 1.0), repeat=samples - 1)])
+    for seed in range(50):
+        plant = output_error_plant(np.random.default_rng(seed))
+        design = designed(plant, samples, ERROR)
+        bound = bound_over_records(design.problem, design.any_spectrum, samples, windows=10)
+        goal = worst_of(design, samples)
+        pulses = [goal.plant.gradient(np.eye(samples)[:, [k]]) for k in range(samples)]
+        psi = np.tensordot(every, np.array(pulses).reshape(samples, samples, -1), axes=1)
+        requirement = design.problem.requirements[0]
+        w = np.geomspace(0.02, 2.5, 100)
+        rough = [requirement.ratios(goal.plant.known + one.T @ one, w).max() for one in psi]
+        few = every[np.argsort(rough)[:20]]
+        best = min(goal.worst(goal.plant.information(u[:, None])) for u in few)
+        assert np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
+        rng = np.random.default_rng(seed)
+        starts = [bound.best, *(np.sign(rng.standard_normal((samples, 1))) for _ in range(8))]
+        search = FlipSearch([goal], np.array([[-1.0], [1.0]]), samples)
+        _, ratio = search.best(starts, rng, enough=0.0, over=lambda: False, changes=60)
+        found += ratio <= best * (1.0 + 1e-6)
+    assert found >= 45, found
