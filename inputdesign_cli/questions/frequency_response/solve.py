@@ -62,12 +62,9 @@ class ResponseTask:
         """Return the design, and beside its deviations the scatter of many simulated experiments."""
         terms, study = self.terms, self.simulation
         if study.runs < 2:
-            raise bad_spec(
-                "out-of-range",
-                "a single run has no standard deviation",
-                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
-                key="simulation.runs",
-            )
+            hint = "write simulation.runs: 1000, whose deviations are known to 2 %"
+            message = "a single run has no standard deviation"
+            raise bad_spec("out-of-range", message, hint=hint, key="simulation.runs")
         plan, results = self._solved()
         begun = time.perf_counter()
         records = {"design": (plan.applied, plan.record.samples)}
@@ -138,13 +135,11 @@ class ResponseTask:
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
                 length, factor = len(samples), rounded_up(scale * beyond, 4)
-                more = int(np.ceil(length * (scale * beyond) ** 2))
-                best = (
-                    f"meets the accuracy: that of the lowest peaks would have to be {factor} times as large"
-                )
-                hint = f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
-                hint += f"{factor} times as much, or write objective: shortest_experiment"
-                raise no_record(self.record, length, f"{best} as they allow", hint)
+                more = self.record.units.length(int(np.ceil(length * (scale * beyond) ** 2)))
+                best = f"meets the accuracy: its peaks are {factor} times as large as they allow"
+                hint = f"write {more}; raise the limits, admit {factor} times as much, or write "
+                hint += "objective: shortest_experiment"
+                raise no_record(self.record, length, best, hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
@@ -163,41 +158,24 @@ class ResponseTask:
         raised = (factor * one.bound**0.5 if one.implied else factor**2 * one.bound for one in limits)
         needed = (f"{one.key} to {rounded_up(to)}" for one, to in zip(limits, raised, strict=True))
         more, times = int(np.ceil(samples * factor**2)), rounded_up(factor, 4)
-        message = (
-            f"the limits buy standard deviations {times} times those admitted; the {exhausted} is exhausted"
-        )
-        hint = (
-            f"raise {' and '.join(needed)}, count {more} samples in place of {samples} "
-            f"({self.record.units.length(more).split(':')[0]}), or admit {times} times as much"
-        )
+        message = f"the limits buy deviations {times} times those admitted; the {exhausted} is exhausted"
+        longer = f"count {more} samples in place of {samples}"
+        hint = f"raise {' and '.join(needed)}, {longer}, or admit {times} times as much"
         details = {"factor": factor}
         return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
 
     def _length(self, counted: int) -> int:
-        """Return the length of a record, transient included.
-
-        Raises:
-            InfeasibleError: the shortest experiment is longer than it may be.
-            SpecError: `too-large`.
-        """
+        """Return the length of a record with its transient; raise `too-long` or `too-large`."""
         periods, most = self.terms.periods, self.terms.most_samples
         length = counted + periods.blocks * periods.skip * periods.period
         if self.terms.goal == "samples" and most is not None and length > most:
-            limit = self.record.units.length(length, "limits")
-            raise InfeasibleError.because(
-                "too-long",
-                f"the shortest record of whole periods takes {length} samples, transient included, and "
-                f"{most} are allowed",
-                f"write {limit}, allow more power, or ask for less accuracy",
-                limit.split(":")[0],
-            )
+            limit, takes = self.record.units.length(length, "limits"), f"{length} samples, transient included"
+            message = f"the shortest record of whole periods takes {takes}, and {most} are allowed"
+            hint = f"write {limit}, allow more power, or ask for less accuracy"
+            raise InfeasibleError.because("too-long", message, hint, limit.split(":")[0])
         if length > self.record.longest:
-            raise bad_spec(
-                "too-large",
-                f"the record has {length} samples, and at most {self.record.longest} are computed",
-                hint="ask for less accuracy, or allow more power",
-                key=KEY,
-            )
+            message = f"the record has {length} samples, and at most {self.record.longest} are computed"
+            raise bad_spec("too-large", message, hint="ask for less accuracy, or allow more power", key=KEY)
         return length
 
     def _best(self, powers: NDArray[np.float64], length: int) -> Array:
