@@ -155,8 +155,8 @@ def check_mapping(tree: Tree) -> None:
     code, message = "not-a-mapping", 'a spec is a mapping of keys ("plant: ..", "noise: ..")'
     if tree.data is None:
         code, message = "empty-file", "the spec is empty"
-    files = [Location(file, 1, 1) for file, _ in tree.places.sources]
-    location = tree.places.location(tree.places.mark(())) or next(iter(files), None)
+    first = [Location(file, 1, 1) for file in tree.places.files[:1]]
+    location = tree.places.at(()) or (first[0] if first else None)
     hint = "`idesign init` writes a spec to start from"
     raise SpecError.because(code, message, hint, location=location)
 
@@ -251,7 +251,7 @@ def _with_defaults(spec: Spec) -> Spec:
 
 def _reported(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
     """Return the first diagnostics, in the order of file and overrides; the last one counts the others."""
-    order = {file: i for i, (file, _) in enumerate(places.sources)}
+    order = {file: i for i, file in enumerate(places.files)}
 
     def place(diagnostic: Diagnostic) -> tuple[int, int, int]:
         at = diagnostic.location

@@ -78,8 +78,7 @@ def keep_inside(tree: Tree, folder: FilePath, confine: FilePath) -> None:
     """Make a diagnostic of the tree of every file that lies outside `confine`."""
     for path, name in named_files(tree.data):
         if is_outside(folder / name, confine):
-            location = tree.places.location(tree.places.mark(path))
-            tree.diagnostics.append(outside(name, confine, format_key(path), location))
+            tree.diagnostics.append(outside(name, confine, format_key(path), tree.places.at(path)))
 
 
 @cache

@@ -47,9 +47,8 @@ class PathDiagnostic:
     def placed(self, places: Places, whole: str) -> Diagnostic:
         """Return the diagnostic with its line; `whole` names the file in place of an empty key."""
         key = format_key(self.path)
-        location = places.location(places.mark(self.path, at_key=self.at_key))
         message, hint = (text.replace("{key}", key or whole) for text in (self.message, self.hint))
-        return Diagnostic(self.code, message, hint, key, location)
+        return Diagnostic(self.code, message, hint, key, places.at(self.path, at_key=self.at_key))
 
 
 def carry(*diagnostics: PathDiagnostic) -> PydanticCustomError:

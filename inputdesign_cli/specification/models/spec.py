@@ -189,8 +189,7 @@ class Spec(Section):
 
     def locate(self, key: str) -> Location | None:
         """Return where a key (`plant.F`, `plant.B[1]`) is written, or its deepest ancestor that is."""
-        places = self._source.places
-        return places.location(places.mark(parse_key(key)))
+        return self._source.places.at(parse_key(key))
 
     def resolve_path(self, name: str) -> Path:
         """Return the path of a file that the spec names: relative names start in the folder of the spec."""
