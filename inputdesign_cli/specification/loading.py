@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification.checks.question import related, run_checks
+from inputdesign_cli.specification.checks import related, run_checks
 from inputdesign_cli.specification.models.experiment import Cost, Estimated
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.section import PathDiagnostic
