@@ -41,32 +41,29 @@ def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
 
     An experiment without a length takes all that limits allow, unless the shortest one is asked for.
     """
-    step = data.get("sample_time", 1.0)
-    for name in ("experiment", "limits"):
-        section = data.get(name)
+
+    def positive(value: Plain) -> bool:
+        return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e40
+
+    step, limits, experiment = data.get("sample_time", 1.0), data.get("limits"), data.get("experiment", {})
+    for name, section in (("experiment", experiment), ("limits", limits)):
         if not isinstance(section, dict) or "duration" not in section:
             continue
         duration, path = section["duration"], (name, "duration")
         if "samples" in section:
             message = "{key} and samples state the same"
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", path, at_key=True)
-        elif _positive(duration) and _positive(step):
-            samples = int(duration / step + _WHOLE)
-            if samples >= 1:
-                section["samples"] = samples
-            else:
+        elif positive(duration) and positive(step):
+            section["samples"] = samples = int(duration / step + _WHOLE)
+            if samples < 1:
+                del section["samples"]
                 message = f"{{key}} is {show(float(duration))}, less than sample_time"
                 yield PathDiagnostic("out-of-range", message, "look at sample_time and time_unit", path)
-    limits, experiment = data.get("limits"), data.get("experiment", {})
     most = limits.get("samples") if isinstance(limits, dict) else None
     stated = not isinstance(experiment, dict) or {"samples", "duration"} & experiment.keys()
-    whole = isinstance(most, int) and _positive(most)
+    whole = isinstance(most, int) and positive(most)
     if whole and not stated and data.get("objective") != "shortest_experiment":
         data["experiment"] = {**experiment, "samples": most}
-
-
-def _positive(value: Plain) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e40
 
 
 # Sections in place of ones that could not be read, so that the rest can still be checked.
@@ -155,10 +152,9 @@ def check_mapping(tree: Tree) -> None:
     code, message = "not-a-mapping", 'a spec is a mapping of keys ("plant: ..", "noise: ..")'
     if tree.data is None:
         code, message = "empty-file", "the spec is empty"
-    first = [Location(file, 1, 1) for file in tree.places.files[:1]]
-    location = tree.places.at(()) or (first[0] if first else None)
+    first = next((Location(file, 1, 1) for file in tree.places.files), None)
     hint = "`idesign init` writes a spec to start from"
-    raise SpecError.because(code, message, hint, location=location)
+    raise SpecError.because(code, message, hint, location=tree.places.at(()) or first)
 
 
 def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:
@@ -251,11 +247,12 @@ def _with_defaults(spec: Spec) -> Spec:
 
 def _reported(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
     """Return the first diagnostics, in the order of file and overrides; the last one counts the others."""
-    order = {file: i for i, file in enumerate(places.files)}
 
     def place(diagnostic: Diagnostic) -> tuple[int, int, int]:
-        at = diagnostic.location
-        return (order.get(at.file, len(order)), at.line, at.column) if at else (-1, 0, 0)
+        at, files = diagnostic.location, places.files
+        if at is None:
+            return -1, 0, 0
+        return files.index(at.file) if at.file in files else len(files), at.line, at.column
 
     found = sorted(dict.fromkeys(diagnostics), key=place)
     left = len(found) - _MOST_REPORTED
@@ -351,7 +348,7 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         found = error.diagnostics[0]
         hint = found.hint or "paths are relative to the folder of the spec"
         raise spec.complain(found.code, found.message, hint=hint, key=key) from error
-    said = ""
+    block, said = None, ""
     try:
         data = read(text, name).data
         block = data.get("estimate") if isinstance(data, dict) else None
@@ -364,9 +361,10 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         hint = "name a model.yaml with estimate: {parameters: {..}, covariance: [[..]]}, positive definite"
         raise spec.complain("bad-model-file", message, hint=hint, key=key) from error
     step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
-    other = unit != spec.time_unit
     # Older files have no sample time.
-    if isinstance(step, int | float) and (other or not isclose(step, spec.sample_time, rel_tol=_SAME)):
+    if isinstance(step, int | float) and not (
+        unit == spec.time_unit and isclose(step, spec.sample_time, rel_tol=_SAME)
+    ):
         here = f"sample_time is {spec.sample_time:g} {spec.time_unit} here"
         message = f"{name} is an estimate from samples {step:g} {unit} apart, and {here}"
         hint = f"write sample_time: {step!r} and time_unit: {unit}, or take them by include: {name}"
