@@ -29,7 +29,7 @@ from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.schema import keep_inside, named_files
 from inputdesign_cli.specification.yaml.files import is_outside, read_text
 from inputdesign_cli.specification.yaml.overrides import KEY, apply_includes, apply_overrides
-from inputdesign_cli.specification.yaml.places import Path, Places, Source, format_key
+from inputdesign_cli.specification.yaml.places import Path, Places, format_key
 from inputdesign_cli.specification.yaml.plain import Plain, fingerprint
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
@@ -86,10 +86,8 @@ def load_spec(
     an analysis, that can be answered; None: only if it has some key of a design. Raises `SpecError`, with
     everything that is wrong in the order of the file.
     """
-    folder = FilePath(path).parent
-    return parse_spec(
-        read_text(path), os.fspath(path), overrides, folder=folder, confine=confine, design=design
-    )
+    text, folder = read_text(path), FilePath(path).parent
+    return parse_spec(text, os.fspath(path), overrides, folder=folder, confine=confine, design=design)
 
 
 def parse_spec(
@@ -105,29 +103,28 @@ def parse_spec(
 
     `file` is its name in diagnostics; paths in it are relative to `folder`, by default the current one.
     """
-    folder = folder or FilePath()
-    return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
+    return build(_read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), design)
 
 
-def build(tree: Tree, folder: FilePath | None = None, design: bool | None = True) -> Spec:
+def build(tree: Tree, design: bool | None = True) -> Spec:
     """Return the spec of plain data, checked as a whole; arguments and errors as for `load_spec`."""
     install()
-    check_mapping(tree)
+    _check_mapping(tree)
     design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
         raise SpecError(_reported(diagnostics, tree.places))
     spec = _with_defaults(spec)
-    spec._source, spec._design = Source(tree.data, tree.places, folder or FilePath()), design
+    spec._source, spec._design = tree, design
     return spec
 
 
 Spec.build = build
 
 
-def read_tree(
-    text: str, file: str, overrides: Sequence[str], folder: FilePath, confine: FilePath | None = None
+def _read_tree(
+    text: str, file: str, overrides: Sequence[str], folder: FilePath | None, confine: FilePath | None
 ) -> Tree:
     """Return the plain data of a spec with included files and overrides, not yet checked.
 
@@ -135,17 +132,18 @@ def read_tree(
     a file cannot be included.
     """
     tree = read(text, file)
-    check_mapping(tree)
+    tree.folder = folder or FilePath()
+    _check_mapping(tree)
     first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
     apply_overrides(tree, first)
-    apply_includes(tree, folder, known=Spec.model_fields.keys(), confine=confine)
+    apply_includes(tree, Spec.model_fields.keys(), confine)
     apply_overrides(tree, [override for override in overrides if override not in first])
     if confine is not None:
-        keep_inside(tree, folder, confine)
+        keep_inside(tree, confine)
     return tree
 
 
-def check_mapping(tree: Tree) -> None:
+def _check_mapping(tree: Tree) -> None:
     """Raise `SpecError` (`empty-file`, `not-a-mapping`) unless the data of a spec are a mapping."""
     if isinstance(tree.data, dict):
         return
@@ -284,7 +282,7 @@ class SpecTemplate:
 
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
         """Return the plain data of one variant, without the `sweep` block; only overrides are checked."""
-        tree = Tree(copy.deepcopy(self.data), Places())
+        tree = Tree(copy.deepcopy(self.data))
         apply_overrides(tree, [*overrides, "sweep=null"])
         return tree.sound().data
 
@@ -322,9 +320,8 @@ def read_template(
     Raises `SpecError`: it is no mapping in YAML, or an override or an included file is wrong.
     """
     text, file = read_text(path) if text is None else text, os.fspath(path)
-    folder = FilePath(path).parent
-    tree = read_tree(text, file, overrides, folder, confine).sound()
-    return SpecTemplate(text, file, folder, tuple(overrides), tree.data, tuple(tree.included), confine)
+    tree = _read_tree(text, file, overrides, FilePath(path).parent, confine).sound()
+    return SpecTemplate(text, file, tree.folder, tuple(overrides), tree.data, tuple(tree.included), confine)
 
 
 def same_content(one: str, other: str) -> bool:

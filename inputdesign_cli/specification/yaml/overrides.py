@@ -18,7 +18,7 @@ _WHOLE = ("plant", "noise")
 _CLOCK = ("sample_time", "time_unit")
 
 
-def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], confine: FilePath | None) -> None:
+def apply_includes(tree: Tree, known: Collection[str], confine: FilePath | None) -> None:
     """Add the blocks of included files that the spec does not have; join other mappings key by key.
 
     A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
@@ -32,10 +32,10 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
         path: Path = (KEY, number) if isinstance(stated, list) else (KEY,)
         if not isinstance(name, str) or not name:
             raise _refused(tree, path, "{key} is not the name of a file", "write include: model.yaml")
-        if confine is not None and is_outside(folder / name, confine):
+        if confine is not None and is_outside(tree.folder / name, confine):
             location = tree.places.at(path, at_key=True)
             raise SpecError(outside(name, confine, format_key(path), location))
-        included = _read(tree, path, folder, name)
+        included = _read(tree, path, name)
         found = included.data if isinstance(included.data, dict) else {}
         if KEY in found or not known & found.keys():
             what = "includes others itself" if KEY in found else "holds no blocks of a spec"
@@ -49,15 +49,15 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
     tree.places.forget((KEY,))
 
 
-def _read(tree: Tree, path: Path, folder: FilePath, name: str) -> Tree:
-    file = folder / name
+def _read(tree: Tree, path: Path, name: str) -> Tree:
+    file = tree.folder / name
     try:
         return read(read_text(file), str(file))
     except SpecError as error:
         found = error.diagnostics[0]
         if found.code.startswith("file-") and found.code != "file-encoding":
             raise _refused(tree, path, found.message, found.hint) from error
-        if found.code == "file-encoding" or is_outside(file, folder):
+        if found.code == "file-encoding" or is_outside(file, tree.folder):
             line = f", line {found.location.line}," if found.location else ""
             what = f"{name}{line} is not YAML of a spec"
             raise _refused(tree, path, what, "name a file of blocks") from error

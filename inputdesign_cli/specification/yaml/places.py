@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 
 from inputdesign_cli.errors import Location
-from inputdesign_cli.specification.yaml.plain import Plain
 
 Path = tuple[str | int, ...]
 
@@ -79,12 +77,3 @@ class Places:
         for table in (self.keys, self.values):
             for known in [p for p in table if p[: len(path)] == path]:
                 del table[known]
-
-
-@dataclass
-class Source:
-    """The data, places and folder of a spec's file; empty for a spec that was built in Python."""
-
-    data: dict[str, Plain] = field(default_factory=dict)
-    places: Places = field(default_factory=Places)
-    folder: FilePath = field(default_factory=FilePath)

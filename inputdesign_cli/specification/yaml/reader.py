@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 
 import yaml
 
@@ -51,11 +52,12 @@ class Tree:
     """The nested dicts, lists and scalars of a text, their places, and what was wrong on the way.
 
     `diagnostics` did not stop the reading; `broken` are the paths where something is lost; `included` are the
-    files whose blocks it has, as it names them.
+    files whose blocks it has, as it names them: relative names start in the `folder`.
     """
 
-    data: Plain
-    places: Places
+    data: Plain = field(default_factory=dict)
+    places: Places = field(default_factory=Places)
+    folder: FilePath = field(default_factory=FilePath)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     broken: set[Path] = field(default_factory=set)
     included: list[str] = field(default_factory=list)
