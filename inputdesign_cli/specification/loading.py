@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification.checks.question import related, run_checks
+from inputdesign_cli.specification.checks import related, run_checks
 from inputdesign_cli.specification.models.experiment import Cost, Estimated
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.section import PathDiagnostic
@@ -29,7 +29,7 @@ from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.schema import keep_inside, named_files
 from inputdesign_cli.specification.yaml.files import is_outside, read_text
 from inputdesign_cli.specification.yaml.overrides import KEY, apply_includes, apply_overrides
-from inputdesign_cli.specification.yaml.places import Path, Places, Source, format_key
+from inputdesign_cli.specification.yaml.places import Path, Places, format_key
 from inputdesign_cli.specification.yaml.plain import Plain, fingerprint
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
@@ -41,32 +41,29 @@ def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
 
     An experiment without a length takes all that limits allow, unless the shortest one is asked for.
     """
-    step = data.get("sample_time", 1.0)
-    for name in ("experiment", "limits"):
-        section = data.get(name)
+
+    def positive(value: Plain) -> bool:
+        return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e40
+
+    step, limits, experiment = data.get("sample_time", 1.0), data.get("limits"), data.get("experiment", {})
+    for name, section in (("experiment", experiment), ("limits", limits)):
         if not isinstance(section, dict) or "duration" not in section:
             continue
         duration, path = section["duration"], (name, "duration")
         if "samples" in section:
             message = "{key} and samples state the same"
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", path, at_key=True)
-        elif _positive(duration) and _positive(step):
-            samples = int(duration / step + _WHOLE)
-            if samples >= 1:
-                section["samples"] = samples
-            else:
+        elif positive(duration) and positive(step):
+            section["samples"] = samples = int(duration / step + _WHOLE)
+            if samples < 1:
+                del section["samples"]
                 message = f"{{key}} is {show(float(duration))}, less than sample_time"
                 yield PathDiagnostic("out-of-range", message, "look at sample_time and time_unit", path)
-    limits, experiment = data.get("limits"), data.get("experiment", {})
     most = limits.get("samples") if isinstance(limits, dict) else None
     stated = not isinstance(experiment, dict) or {"samples", "duration"} & experiment.keys()
-    whole = isinstance(most, int) and _positive(most)
+    whole = isinstance(most, int) and positive(most)
     if whole and not stated and data.get("objective") != "shortest_experiment":
         data["experiment"] = {**experiment, "samples": most}
-
-
-def _positive(value: Plain) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e40
 
 
 # Sections in place of ones that could not be read, so that the rest can still be checked.
@@ -89,10 +86,8 @@ def load_spec(
     an analysis, that can be answered; None: only if it has some key of a design. Raises `SpecError`, with
     everything that is wrong in the order of the file.
     """
-    folder = FilePath(path).parent
-    return parse_spec(
-        read_text(path), os.fspath(path), overrides, folder=folder, confine=confine, design=design
-    )
+    text, folder = read_text(path), FilePath(path).parent
+    return parse_spec(text, os.fspath(path), overrides, folder=folder, confine=confine, design=design)
 
 
 def parse_spec(
@@ -108,29 +103,28 @@ def parse_spec(
 
     `file` is its name in diagnostics; paths in it are relative to `folder`, by default the current one.
     """
-    folder = folder or FilePath()
-    return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
+    return build(_read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), design)
 
 
-def build(tree: Tree, folder: FilePath | None = None, design: bool | None = True) -> Spec:
+def build(tree: Tree, design: bool | None = True) -> Spec:
     """Return the spec of plain data, checked as a whole; arguments and errors as for `load_spec`."""
     install()
-    check_mapping(tree)
+    _check_mapping(tree)
     design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
         raise SpecError(_reported(diagnostics, tree.places))
     spec = _with_defaults(spec)
-    spec._source, spec._design = Source(tree.data, tree.places, folder or FilePath()), design
+    spec._source, spec._design = tree, design
     return spec
 
 
 Spec.build = build
 
 
-def read_tree(
-    text: str, file: str, overrides: Sequence[str], folder: FilePath, confine: FilePath | None = None
+def _read_tree(
+    text: str, file: str, overrides: Sequence[str], folder: FilePath | None, confine: FilePath | None
 ) -> Tree:
     """Return the plain data of a spec with included files and overrides, not yet checked.
 
@@ -138,27 +132,27 @@ def read_tree(
     a file cannot be included.
     """
     tree = read(text, file)
-    check_mapping(tree)
+    tree.folder = folder or FilePath()
+    _check_mapping(tree)
     first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
     apply_overrides(tree, first)
-    apply_includes(tree, folder, known=Spec.model_fields.keys(), confine=confine)
+    apply_includes(tree, Spec.model_fields.keys(), confine)
     apply_overrides(tree, [override for override in overrides if override not in first])
     if confine is not None:
-        keep_inside(tree, folder, confine)
+        keep_inside(tree, confine)
     return tree
 
 
-def check_mapping(tree: Tree) -> None:
+def _check_mapping(tree: Tree) -> None:
     """Raise `SpecError` (`empty-file`, `not-a-mapping`) unless the data of a spec are a mapping."""
     if isinstance(tree.data, dict):
         return
     code, message = "not-a-mapping", 'a spec is a mapping of keys ("plant: ..", "noise: ..")'
     if tree.data is None:
         code, message = "empty-file", "the spec is empty"
-    files = [Location(file, 1, 1) for file, _ in tree.places.sources]
-    location = tree.places.location(tree.places.mark(())) or next(iter(files), None)
+    first = next((Location(file, 1, 1) for file in tree.places.files), None)
     hint = "`idesign init` writes a spec to start from"
-    raise SpecError.because(code, message, hint, location=location)
+    raise SpecError.because(code, message, hint, location=tree.places.at(()) or first)
 
 
 def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:
@@ -251,11 +245,12 @@ def _with_defaults(spec: Spec) -> Spec:
 
 def _reported(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
     """Return the first diagnostics, in the order of file and overrides; the last one counts the others."""
-    order = {file: i for i, (file, _) in enumerate(places.sources)}
 
     def place(diagnostic: Diagnostic) -> tuple[int, int, int]:
-        at = diagnostic.location
-        return (order.get(at.file, len(order)), at.line, at.column) if at else (-1, 0, 0)
+        at, files = diagnostic.location, places.files
+        if at is None:
+            return -1, 0, 0
+        return files.index(at.file) if at.file in files else len(files), at.line, at.column
 
     found = sorted(dict.fromkeys(diagnostics), key=place)
     left = len(found) - _MOST_REPORTED
@@ -287,7 +282,7 @@ class SpecTemplate:
 
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
         """Return the plain data of one variant, without the `sweep` block; only overrides are checked."""
-        tree = Tree(copy.deepcopy(self.data), Places())
+        tree = Tree(copy.deepcopy(self.data))
         apply_overrides(tree, [*overrides, "sweep=null"])
         return tree.sound().data
 
@@ -325,9 +320,8 @@ def read_template(
     Raises `SpecError`: it is no mapping in YAML, or an override or an included file is wrong.
     """
     text, file = read_text(path) if text is None else text, os.fspath(path)
-    folder = FilePath(path).parent
-    tree = read_tree(text, file, overrides, folder, confine).sound()
-    return SpecTemplate(text, file, folder, tuple(overrides), tree.data, tuple(tree.included), confine)
+    tree = _read_tree(text, file, overrides, FilePath(path).parent, confine).sound()
+    return SpecTemplate(text, file, tree.folder, tuple(overrides), tree.data, tuple(tree.included), confine)
 
 
 def same_content(one: str, other: str) -> bool:
@@ -351,7 +345,7 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         found = error.diagnostics[0]
         hint = found.hint or "paths are relative to the folder of the spec"
         raise spec.complain(found.code, found.message, hint=hint, key=key) from error
-    said = ""
+    block, said = None, ""
     try:
         data = read(text, name).data
         block = data.get("estimate") if isinstance(data, dict) else None
@@ -364,9 +358,10 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         hint = "name a model.yaml with estimate: {parameters: {..}, covariance: [[..]]}, positive definite"
         raise spec.complain("bad-model-file", message, hint=hint, key=key) from error
     step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
-    other = unit != spec.time_unit
     # Older files have no sample time.
-    if isinstance(step, int | float) and (other or not isclose(step, spec.sample_time, rel_tol=_SAME)):
+    if isinstance(step, int | float) and not (
+        unit == spec.time_unit and isclose(step, spec.sample_time, rel_tol=_SAME)
+    ):
         here = f"sample_time is {spec.sample_time:g} {spec.time_unit} here"
         message = f"{name} is an estimate from samples {step:g} {unit} apart, and {here}"
         hint = f"write sample_time: {step!r} and time_unit: {unit}, or take them by include: {name}"

@@ -74,12 +74,11 @@ def named_files(data: Plain, path: Path = ()) -> Iterator[tuple[Path, str]]:
         yield from named_files(value, (*path, step))
 
 
-def keep_inside(tree: Tree, folder: FilePath, confine: FilePath) -> None:
+def keep_inside(tree: Tree, confine: FilePath) -> None:
     """Make a diagnostic of the tree of every file that lies outside `confine`."""
     for path, name in named_files(tree.data):
-        if is_outside(folder / name, confine):
-            location = tree.places.location(tree.places.mark(path))
-            tree.diagnostics.append(outside(name, confine, format_key(path), location))
+        if is_outside(tree.folder / name, confine):
+            tree.diagnostics.append(outside(name, confine, format_key(path), tree.places.at(path)))
 
 
 @cache

@@ -141,13 +141,13 @@ def _of_file(file: Path) -> Answers:
     tree = read(read_text(file), str(file))
     if tree.diagnostics:
         raise SpecError(tree.diagnostics)
-    begins = tree.places.location(tree.places.mark(())) or Location(str(file), 1, 1)
+    begins = tree.places.at(()) or Location(str(file), 1, 1)
     if not isinstance(tree.data, dict):
         message = "answers are a mapping of questions to texts"
         raise SpecError.because("bad-answer", message, _ALL, location=begins)
     answers = Answers(places=dict.fromkeys((one.key for one in QUESTIONS if one.default is None), begins))
     for key, value in tree.data.items():
-        answers.places[key] = tree.places.location(tree.places.mark((key,))) or begins
+        answers.places[key] = tree.places.at((key,)) or begins
         if isinstance(value, dict | list):
             what = "a mapping" if isinstance(value, dict) else "a list"
             message, hint = f"the answer to {key} is {what}", 'an answer is one text: put it in quotes ("..")'

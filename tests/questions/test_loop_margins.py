@@ -186,22 +186,16 @@ def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "margin",
-    [
-        "phase_margin: 50",
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ("max_sensitivity_db: 3", "gain_margin: 4")),
-    ],
-)
-def test_a_weaker_margin_is_named_as_the_margin_was_stated(margin):
+@pytest.mark.parametrize("margin", ["phase_margin: 50", "max_sensitivity_db: 3", "gain_margin: 4"])
+def test_a_margin_that_the_loop_lacks_is_refused_with_what_it_has(margin):
     """The first value is one at which the nominal plant just keeps it, the second is one to work with."""
-    key, stated = margin.split(": ")[0], "accuracy={loop: {tuning: {simc: {tau_c: 30}}, MARGIN}}"
+    stated = "accuracy={loop: {tuning: {simc: {tau_c: 30}}, MARGIN}}"
     with pytest.raises(SpecError) as caught:
         solve(parse_spec(TEXT, overrides=[stated.replace("MARGIN", margin)]))
     hint = caught.value.diagnostics[0].hint
-    edge, roomy = (float(found) for found in re.findall(rf"{key}: ([\d.]+)", hint))
-    spec = parse_spec(TEXT, overrides=[stated.replace("MARGIN", f"{key}: {roomy}")])
+    edge, roomy = (float(found) for found in re.findall(r"max_sensitivity_db: ([\d.]+).* ([\d.]+)", hint)[0])
+    spec = parse_spec(TEXT, overrides=[stated.replace("MARGIN", f"max_sensitivity_db: {roomy}")])
     assert solve(spec).result["status"] == "optimal"
     reached = float(re.search(r"reaches ([\d.]+)", caught.value.diagnostics[0].message)[1])
-    assert reached <= LoopMargin(**{key: edge}).peak * (1.0 + 1e-4) <= 1.003 * reached
-    assert LoopMargin(**{key: roomy}).peak == pytest.approx(1.2 * reached, rel=3e-3)
+    assert reached <= LoopMargin(max_sensitivity_db=edge).peak * (1.0 + 1e-4) <= 1.003 * reached
+    assert LoopMargin(max_sensitivity_db=roomy).peak == pytest.approx(1.2 * reached, rel=3e-3)

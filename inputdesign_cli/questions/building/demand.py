@@ -36,9 +36,15 @@ def check_model(spec: Spec, model: Model) -> None:
     """Refuse models whose gradients do not fit into memory. It raises `SpecError` (`too-large`)."""
     channels = model.outputs * model.inputs
     room = _MOST_BYTES // (16 * _NODES * channels)
-    if len(model.names) > room:
-        what = f"a model of {len(model.names)} parameters and {channels} entries"
-        raise _too_large(spec, "plant", what, f"{room} parameters")
+    what = f"a model of {len(model.names)} parameters and {channels} entries"
+    _check_fits(spec, "plant", what, len(model.names), room, "parameters")
+
+
+def _check_fits(spec: Spec, key: str, what: str, size: int, room: int, things: str) -> None:
+    if size > room:
+        message = f"{what} takes more than {_MOST_BYTES / 2**30:.0f} GiB of memory"
+        hint = f"at most {room} {things} fit: lower the orders"
+        raise spec.complain("too-large", message, hint=hint, key=key)
 
 
 def check_effects(spec: Spec, experiment: Experiment) -> None:
@@ -66,27 +72,23 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
 
     A program has a matrix inequality for each frequency that binds. Raises `SpecError`: `too-large`.
     """
-    size = experiment.size
-    if basis.size * size**2 * 8 > _MOST_BYTES:
-        known = f"a spectrum of {basis.size} unknowns for a model of {size} parameters"
-        raise _too_large(spec, "spectrum", known, f"{_MOST_BYTES // (8 * size**2)} unknowns")
-    accuracy = spec.accuracy
+    size, accuracy = experiment.size, spec.accuracy
+    known = f"a spectrum of {basis.size} unknowns for a model of {size} parameters"
+    _check_fits(spec, "spectrum", known, basis.size, _MOST_BYTES // (8 * size**2), "unknowns")
     inequalities = len(accuracy.standard_deviation or ()) + (_CRITERION if accuracy.criterion else 0)
     if accuracy.error is not None or accuracy.weighted_variance is not None:
         inequalities += _CUTS
 
-    def seconds(parameters: int) -> float:
-        entries = parameters * (parameters + 1) / 2
-        step = inequalities * (_FACTORINGS * parameters**3 + entries**2)
-        step += entries**2 * _UNKNOWNS
+    def seconds(k: int) -> float:
+        entries = k * (k + 1) / 2
+        step = inequalities * (_FACTORINGS * k**3 + entries**2) + entries**2 * _UNKNOWNS
         return step * _STEPS * _ROUNDS / _PER_SECOND
 
-    # Anything below a second is tried.
-    limit = max(spec.solver.time_limit, 1.0)
-    if seconds(size) > limit:
-        fits = max(k for k in range(size) if seconds(k) <= limit)
-        need = f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more"
-        longer = f"solver.time_limit: {float(f'{_GENEROUS * seconds(size):.2g}'):.0f} or more"
+    limit, takes = spec.solver.time_limit, seconds(size)
+    if takes > max(limit, 1.0):  # anything below a second is tried
+        fits = max(k for k in range(size) if seconds(k) <= max(limit, 1.0))
+        need = f"a design for a model of {size} parameters would take {takes:.0f} seconds or more"
+        longer = f"solver.time_limit: {float(f'{_GENEROUS * takes:.2g}'):.0f} or more"
         hint = f"{fits} parameters fit: lower the orders, or write {longer}"
         raise spec.complain("too-large", f"{need}; solver.time_limit is {limit:g}", hint=hint, key="plant")
 
@@ -108,11 +110,6 @@ def longest_record(parameters: int, outputs: int) -> int:
     return min(_MOST_BYTES // (8 * _COPIES * parameters * outputs), most("signal.samples"))
 
 
-def _too_large(spec: Spec, key: str, what: str, fits: str) -> Exception:
-    message = f"{what} takes more than {_MOST_BYTES / 2**30:.0f} GiB of memory"
-    return spec.complain("too-large", message, hint=f"at most {fits} fit: lower the orders", key=key)
-
-
 # Poles nearer to zero are poles at zero; poles of gradients are of no higher order.
 _AT_ZERO, _HIGHEST = 1e-7, 8
 # With this number of points on half the distance to the next pole, the sums are exact to rounding.
@@ -129,38 +126,36 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     Near a pole at z = 1 outside a loop, gradient and information of any power have no bound. Raises
     `SpecError`: `infinite-information`, `infinite-output`.
     """
-    source = experiment.model if experiment.loop is None else experiment.loop
-    if not experiment.model.continuous:
-        unbounded = _growing(experiment, source.noise_gradient)
-        if unbounded:
-            first = unbounded.split(", ")[0]
-            part, other = "noise", "say noise: {drift: true}, and leave that root out of D"
-            if experiment.model.in_plant[experiment.model.names.index(first)]:
-                part, other = "plant", "in q^-1 let it be a root of A, through which the noise passes, too"
-            hint = f"list it in {part}.known: [{first}], or {other}"
-            if any(spec.noise.drifts) and not all(spec.noise.drifts):
-                hint = "let every output drift (noise: {drift: true}): the inputs wander with each drift"
-            through = "integrated" if experiment.loop is None else "integrated and fed back"
-            message = f"the noise alone, {through}, gives infinite information about {unbounded}"
-            raise spec.complain("infinite-information", message, hint=hint, key=part)
-    lo, hi = experiment.band
-    grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
-    model = experiment.model
+    model, loop, (lo, hi) = experiment.model, experiment.loop, experiment.band
+    noise = model.noise_gradient if loop is None else loop.noise_gradient
+    if not model.continuous and (unbounded := _growing(experiment, noise)):
+        first = unbounded[0]
+        part, other = "noise", "say noise: {drift: true}, and leave that root out of D"
+        if model.in_plant[model.names.index(first)]:
+            part, other = "plant", "in q^-1 let it be a root of A, through which the noise passes, too"
+        hint = f"list it in {part}.known: [{first}], or {other}"
+        if any(spec.noise.drifts) and not all(spec.noise.drifts):
+            hint = "let every output drift (noise: {drift: true}): the inputs wander with each drift"
+        through = "integrated" if loop is None else "integrated and fed back"
+        message = f"the noise alone, {through}, gives infinite information about {', '.join(unbounded)}"
+        raise spec.complain("infinite-information", message, hint=hint, key=part)
+    grown = [] if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
     # Outputs have no bound at frequency zero, while drifting noise keeps the information finite.
-    wanders = lo == 0.0 and experiment.loop is None and not model.continuous
+    wanders = lo == 0.0 and loop is None and not model.continuous
     if not grown and not (wanders and np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None]))):
         return experiment
     lowest = _lowest_line(spec, hi)
     if lowest is not None and lowest > 0.0:
         return replace(experiment, band=(0.5 * lowest, hi))
     unit = build_units(spec).frequency
-    integrates = "" if experiment.loop is None else " that integrates"
+    integrates = "" if loop is None else " that integrates"
     # A FIR spectrum has power everywhere.
     fir = spec.plant.sampled and (spec.spectrum is None or spec.spectrum.type == "fir")
     other = "spectrum: {type: free} with " if fir else ""
-    what = f"gives infinite information about {grown}" if grown else "makes the outputs drift without bound"
+    code, what = "infinite-output", "makes the outputs drift without bound"
+    if grown:
+        code, what = "infinite-information", f"gives infinite information about {', '.join(grown)}"
     band = f"limits: {{band: [{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}"
-    code = "infinite-information" if grown else "infinite-output"
     avoid = f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}{band}"
     hint = f"{avoid}; or make the experiment in closed loop, under a controller{integrates}"
     key = "spectrum" if spec.spectrum is not None else "plant"
@@ -168,10 +163,10 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     raise spec.complain(code, message, hint=hint, key=key)
 
 
-def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
+def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> list[str]:
     """Return the names of the parameters whose gradient (n, k, ..) has a pole at frequency zero."""
     grows = _grows(experiment, gradient)
-    return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
+    return [name for name, one in zip(experiment.model.names, grows, strict=True) if one]
 
 
 def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]) -> NDArray[np.bool_]:

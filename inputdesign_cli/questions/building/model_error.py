@@ -149,11 +149,10 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
     stated = spec.accuracy.loop
     if stated is None or not isinstance(admissible, accuracy.Sensitivity):
         return None
-    peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
-    message = (
-        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most"
-    )
-    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
+    peak = float(np.max(admissible.nominal(made.grid)))
+    message = f"|S| of the nominal loop reaches {peak:.4g}, and the margin asks for {stated.peak:.4g} at most"
+    edge, roomy = (rounded_up(20.0 * np.log10(factor * peak), 4) for factor in (1.0, 1.2))
+    less = f"max_sensitivity_db: {edge} (the nearer, the longer), for example {roomy}"
     hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
     return spec.complain("admissible-not-positive", message, hint=hint, key=_LOOP)
 

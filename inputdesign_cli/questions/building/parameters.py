@@ -11,9 +11,8 @@ from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
-from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.specification import Spec, load_estimate
-from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
+from inputdesign_cli.specification.models.plant import ContinuousPlant, NamedPlant
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
@@ -26,9 +25,7 @@ def delays_of(plant: ContinuousPlant) -> Rows:
     return rows if any(entry.size for row in rows for entry in row) else ()
 
 
-def reparametrised(
-    spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, model: Listed
-) -> Model:
+def reparametrised(spec: Spec, plant: NamedPlant, model: Listed) -> Model:
     """Return the model in the named parameters of the spec, without the known ones.
 
     Raises `SpecError`: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
@@ -55,15 +52,16 @@ def reparametrised(
     return Reparametrised(model, found, words)
 
 
-def _of_named(
-    spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameters: Sequence[Parameter]
-) -> Parametrisation:
+def _of_named(spec: Spec, plant: NamedPlant, parameters: Sequence[Parameter]) -> Parametrisation:
     """Return the parametrisation by the named parameters of the plant, then the noise coefficients."""
     named = plant.named_parameters
     noise = [p for p in parameters if p.letter in "cd"]
     # Names of parameters of the plant are in ASCII: these differ from all of them.
     symbols = {p.name: f"\N{GREEK SMALL LETTER EPSILON}{i}" for i, p in enumerate(noise)}
-    terms = [Expression(symbols[p.name]) if p.letter in "cd" else _term(plant, p) for p in parameters]
+    terms = [
+        Expression(symbols[p.name]) if p.letter in "cd" else plant.expression(p.letter, *p.places[0], p.power)
+        for p in parameters
+    ]
     labels = (*(one.label for one in named), *symbols)
     fixed = [one.label in (plant.known or ()) for one in named]
     fixed += [name in (spec.noise.known or ()) for name in symbols]
@@ -80,20 +78,6 @@ def _of_named(
             hint = "look for a factor that is zero there, or a leading coefficient that vanishes"
             raise spec.complain("unused-parameter", message, hint=hint, key="plant.parameters")
     return replace(made, free=~np.array(fixed))
-
-
-def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> Expression:
-    """Return a coefficient of the model as an expression in the named parameters of the plant."""
-    letter, (i, j) = parameter.letter, parameter.places[0]
-    if plant.kind == "state_space":
-        return plant.term(letter, i, j)
-    if plant.kind == "polynomial":
-        return plant.coefficients(letter, i, j)[parameter.power]
-    if letter == DELAY:
-        return plant.terms.delay[i][j]
-    below = plant.terms.denominator[i][j]
-    entry = plant.terms.numerator[i][j] if letter == "b" else below
-    return entry[-1 - parameter.power] / below[0]
 
 
 def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:

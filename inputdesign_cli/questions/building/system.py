@@ -51,7 +51,7 @@ def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> 
     shapes = {"D": (plant.outputs, plant.inputs), "K": (len(stated.A), plant.outputs)}
     given = {letter: np.array(stated.at(letter), dtype=float) for letter in stated.stated(*"ABCDK")}
     places = [(letter, *ij) for letter, matrix in given.items() for ij in np.ndindex(matrix.shape)]
-    free = [place for place in (*places, (DELAY, 0, 0)) if plant.term(*place).names]
+    free = [place for place in (*places, (DELAY, 0, 0)) if plant.expression(*place).names]
     zeros = {letter: np.zeros(shape) for letter, shape in shapes.items()}
     step = spec.sample_time if plant.sample is not None else None
     model = StateSpaceModel(Matrices(**zeros | given, delay=stated.delay), tuple(free), covariance, step)

@@ -56,14 +56,15 @@ def check_every_direction_counts(spec: Spec, question: Question) -> None:
     size = np.sqrt(np.einsum("naa->na", density).real)
     unit = np.where(size > 0.0, size, 1.0)
     correlation = density / (unit[:, :, None] * unit[:, None, :])
-    if np.linalg.eigvalsh(correlation)[:, 0].max() <= _SINGULAR:
-        silent = np.flatnonzero(np.all(size == 0.0, axis=0))
-        which = f"the power of input {silent[0] + 1}" if silent.size else "a combination of the inputs"
-        if spec.goal == "least_cost":
-            hint = "give input_power a weight for every input, however small"
-            raise spec.complain("no-cost", f"{which} costs nothing", hint=hint, key="cost")
-        hint = "add limits.input_power, or limits.excitation_power in closed loop"
-        raise spec.complain("needs-limits", f"nothing limits {which}", hint=hint, key="limits")
+    if np.linalg.eigvalsh(correlation)[:, 0].max() > _SINGULAR:
+        return
+    silent = np.flatnonzero(np.all(size == 0.0, axis=0))
+    which = f"the power of input {silent[0] + 1}" if silent.size else "a combination of the inputs"
+    if spec.goal == "least_cost":
+        hint = "give input_power a weight for every input, however small"
+        raise spec.complain("no-cost", f"{which} costs nothing", hint=hint, key="cost")
+    hint = "add limits.input_power, or limits.excitation_power in closed loop"
+    raise spec.complain("needs-limits", f"nothing limits {which}", hint=hint, key="limits")
 
 
 def check_reach(spec: Spec, question: Question) -> Reach:
@@ -75,39 +76,34 @@ def check_reach(spec: Spec, question: Question) -> Reach:
     if found is None:
         return Reach()
     frequencies, unbounded, reached = found
-    units = build_units(spec)
-    places = " and ".join(units.named(w) for w in frequencies)
+    (lo, hi), goal, family = question.experiment.band, question.goal, question.basis
+    section, code, add = "limits", "needs-limits", "add"
     keys = dict.fromkeys(limit.key for limit in question.limits if limit.upper)
-    uncounted = "costs nothing" if question.goal == "cost" else f"is not limited by {', '.join(keys)}"
+    uncounted = f"is not limited by {', '.join(keys)}"
+    if goal == "cost":
+        section, code, add = "cost", "no-cost", "give a weight, however small, to"
+        uncounted = "costs nothing"
+    places = " and ".join(map(build_units(spec).named, frequencies))
     free = f"excitation at {places} informs about the parameters and {uncounted}"
-    section = "cost" if question.goal == "cost" else "limits"
-    others, (lo, hi) = f"{section}.excitation_power", question.experiment.band
+    others = f"{section}.excitation_power"
     if spec.experiment.controller is None:
         others = f"{section}.input_power"
     elif "output" not in {kind for kind, _, _ in priced_powers(question) or []}:
         others = f"{section}.output_power or {others}"  # at a pole in the loop only outputs have power
-    avoid = "leave it out by limits.band"
-    off = 2.0 * _OFF * hi
-    ends = [any(abs(w - end) < off for w in frequencies) for end in (lo, hi)]
+    off, avoid = 2.0 * _OFF * hi, "leave it out by limits.band"
     # Lines are kept off an end of the band; they close in on a frequency inside it from both sides.
-    inside = question.goal == "factor" and any(lo + off <= w <= hi - off for w in frequencies)
-    on_it = question.goal == "factor" and reached and not question.basis.free
+    inside = goal == "factor" and any(lo + off <= w <= hi - off for w in frequencies)
     approached = "the best is approached with power ever nearer to it"
-    outcome = _OUTCOMES[question.goal] if unbounded else approached
-    if reached and (unbounded or inside or on_it):
-        add, code = "add", "needs-limits"
-        if section == "cost":
-            add, code = "give a weight, however small, to", "no-cost"
+    outcome = _OUTCOMES[goal] if unbounded else approached
+    if reached and (unbounded or inside or (goal == "factor" and not family.free)):
+        hint = f"{add} {others}; or {avoid if family.free else 'choose other lines'}"
         message = f"{free}: {outcome}, and no spectrum is the best"
-        hint = f"{add} {others}; or {avoid if question.basis.free else 'choose other lines'}"
         raise spec.complain(code, message, hint=hint, key=section)
     if unbounded or inside:
         return Reach(bounded=False, note=f"{free}, so that {outcome}; with {others} there is one")
-    inner = (lo + ends[0] * _OFF * hi, hi - ends[1] * _OFF * hi)
-    if not question.basis.free:
-        return Reach(attained=False, band=inner)
+    below, above = (_OFF * hi * any(abs(w - end) < off for w in frequencies) for end in (lo, hi))
     note = f"{free}: {approached}, which no record can follow; add {others}, or {avoid}"
-    return Reach(attained=False, band=inner, note=note)
+    return Reach(attained=False, band=(lo + below, hi - above), note=note if family.free else None)
 
 
 def free_information(question: Question) -> tuple[tuple[float, ...], bool, bool] | None:
@@ -121,9 +117,17 @@ def free_information(question: Question) -> tuple[tuple[float, ...], bool, bool]
     if priced is None or question.others:
         return None
     experiment = question.experiment.whitened(1.0)
-    found = [
-        (w, gain) for w in _free_frequencies(experiment, priced) if (gain := _gain(experiment, priced, w))
-    ]
+    grid = graded_grid(
+        np.concatenate([experiment.singularities, experiment.model.singularities]), *experiment.band
+    )
+    typical = float(np.median(np.linalg.eigvalsh(price_density(experiment, priced, grid))[:, -1]))
+
+    def cheapness(w: Array) -> Array:
+        least = np.linalg.eigvalsh(price_density(experiment, priced, w))[:, 0]
+        return np.asarray(-np.log10(np.maximum(least / typical, np.finfo(float).tiny)))
+
+    cheap = local_maxima(cheapness, grid, cheapness(grid), above=_ZERO)[0].tolist()
+    found = [(w, gain) for w in cheap if (gain := _gain(experiment, priced, w))]
     if not found:
         return None
     places = tuple(w for w, _ in found)
@@ -136,11 +140,10 @@ def free_information(question: Question) -> tuple[tuple[float, ...], bool, bool]
     gained = level(np.eye(experiment.size) + before) - level(np.eye(experiment.size) + after)
     # The determinant of all k parameters gains the k-th part of the gain of one direction.
     grown = float(np.log(np.trace(after) / np.trace(before)))
-    basis = question.basis
-    reached = basis.free
+    basis, reached = question.basis, question.basis.free
     if not reached and not basis.has_density:
-        lines = basis.lines(basis.even)[0]
-        reached = bool(np.any(np.abs(lines[:, None] - np.array(places)) <= _ON * experiment.band[1]))
+        away = np.abs(basis.lines(basis.even)[0][:, None] - np.array(places))
+        reached = bool(np.any(away <= _ON * experiment.band[1]))
     return places, gained > 0.5 * grown / experiment.size, reached
 
 
@@ -162,19 +165,6 @@ def price_density(experiment: Experiment, priced: list[PricedPower], w: Array) -
         weight * matrices(experiment.power_density(kind, w, channel)) for kind, channel, weight in priced
     ]
     return np.asarray(np.sum(parts, axis=0))
-
-
-def _free_frequencies(experiment: Experiment, priced: list[PricedPower]) -> list[float]:
-    """Return frequencies at which some direction of the excitation costs nothing."""
-    near = np.concatenate([experiment.singularities, experiment.model.singularities])
-    grid = graded_grid(near, *experiment.band)
-    typical = float(np.median(np.linalg.eigvalsh(price_density(experiment, priced, grid))[:, -1]))
-
-    def cheapness(w: Array) -> Array:
-        least = np.linalg.eigvalsh(price_density(experiment, priced, w))[:, 0]
-        return np.asarray(-np.log10(np.maximum(least / typical, np.finfo(float).tiny)))
-
-    return local_maxima(cheapness, grid, cheapness(grid), above=_ZERO)[0].tolist()
 
 
 def _gain(experiment: Experiment, priced: list[PricedPower], place: float) -> tuple[Array, Array] | None:

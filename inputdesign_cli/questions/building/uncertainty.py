@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Paid
@@ -70,13 +69,68 @@ class UncertainPlant:
         `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, `wrong-estimate`.
         Or `DataError`: a record cannot be used.
         """
-        if self.stated.intervals is not None:
-            return self._box(self.stated.intervals)
-        covariance = self._covariance()
-        varied = np.flatnonzero(np.diag(covariance) > 0.0)
-        columns = np.zeros((len(covariance), varied.size))
-        columns[varied] = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
-        return Knowledge(self.nominal.theta, columns, box=False)
+        if self.stated.intervals is None:
+            covariance = self._covariance()
+            varied = np.flatnonzero(np.diag(covariance) > 0.0)
+            columns = np.zeros((len(covariance), varied.size))
+            columns[varied] = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
+            return Knowledge(self.nominal.theta, columns, box=False)
+        centre, columns = (
+            self.nominal.theta.copy(),
+            np.zeros((self.experiment.size, len(self.stated.intervals))),
+        )
+        for column, (name, (low, high)) in enumerate(self.stated.intervals.items()):
+            key = f"{KEY}.intervals.{name}"
+            row = self._row(name, key)
+            if not low <= centre[row] <= high:
+                message = f"{name} is {centre[row]:.6g} in the plant, outside of [{low:g}, {high:g}]"
+                hint = "widen the interval, or move the plant into it"
+                raise self.spec.complain("bad-interval", message, hint=hint, key=key)
+            centre[row], columns[row, column] = 0.5 * (low + high), 0.5 * (high - low)
+        return Knowledge(centre, columns, box=True)
+
+    def _row(self, name: str, key: str) -> int:
+        """Return the index of a parameter; `SpecError` (`unknown-parameter`)."""
+        check_known(self.spec, self.nominal.names, name, key)
+        return self.nominal.names.index(name)
+
+    def _covariance(self) -> Array:
+        """Return the covariance (k, k) of the parameters, zero for known ones."""
+        spec, names, (letter, *_) = self.spec, self.nominal.names, self.stated.stated(*SOURCES)
+        key, source, listed = f"{KEY}.{letter}", self.stated.at(letter), self.stated.parameters
+        if isinstance(source, str) and source.endswith((".yaml", ".yml")):
+            return self._of_model_file(source, key)
+        if isinstance(source, str):
+            record = system.read_excitation_record(spec, source, key)
+            matrix = system.information_in(spec, replace(self.experiment, prior=None), record)
+            letter, listed = "information", None
+        else:
+            matrix = np.array(source, dtype=float)
+        if letter == "information":
+            try:
+                matrix = inverse(matrix)
+            except np.linalg.LinAlgError:
+                message = "the information matrix is singular: no plants can be drawn of some parameters"
+                hint = "name the parameters that it is about, or take an experiment that informs about all"
+                raise spec.complain("not-positive-definite", message, hint=hint, key=key) from None
+        return embedded(spec, names, matrix, listed, key)
+
+    def _of_model_file(self, source: str, key: str) -> Array:
+        """Return the covariance (k, k) of an estimate of this plant; `SpecError` (`wrong-estimate`)."""
+        found = load_estimate(self.spec, source, key)
+        covariance = np.array(found.covariance, dtype=float)
+        full = embedded(self.spec, self.nominal.names, covariance, tuple(found.parameters), key)
+        apart = zip(self.nominal.names, self.nominal.theta, _AWAY * np.sqrt(np.diag(full)), strict=True)
+        both = ", ".join(
+            f"{name} is {found.parameters[name]:.4g} there and {nominal:.4g} here"
+            for name, nominal, most_apart in apart
+            if name in found.parameters and abs(found.parameters[name] - nominal) > most_apart
+        )
+        if both:
+            message = f"{source} is an estimate of another plant: {both}, over {_AWAY:g} deviations apart"
+            hint = f"take plant and noise from the same file: include: {source}"
+            raise self.spec.complain("wrong-estimate", message, hint=hint, key=key)
+        return full
 
     def region(self, confidence: float) -> Knowledge:
         """Return the region of the draws: the ellipsoid of a confidence, or the box of all intervals."""
@@ -87,64 +141,10 @@ class UncertainPlant:
 
     def moved(self, values: Mapping[str, float], key: str) -> Array:
         """Return the nominal parameters (k,) with other values; `SpecError` (`unknown-parameter`)."""
-        names, theta = list(self.nominal.names), self.nominal.theta.copy()
+        theta = self.nominal.theta.copy()
         for name, value in values.items():
-            check_known(self.spec, names, name, key)
-            theta[names.index(name)] = value
+            theta[self._row(name, key)] = value
         return theta
-
-    def _box(self, intervals: Mapping[str, tuple[float, float]]) -> Knowledge:
-        names, nominal = list(self.nominal.names), self.nominal.theta
-        centre, columns = nominal.copy(), np.zeros((nominal.size, len(intervals)))
-        for column, (name, (low, high)) in enumerate(intervals.items()):
-            key = f"{KEY}.intervals.{name}"
-            check_known(self.spec, names, name, key)
-            row = names.index(name)
-            if not low <= nominal[row] <= high:
-                message = f"{name} is {nominal[row]:.6g} in the plant, outside of [{low:g}, {high:g}]"
-                hint = "widen the interval, or move the plant into it"
-                raise self.spec.complain("bad-interval", message, hint=hint, key=key)
-            centre[row], columns[row, column] = 0.5 * (low + high), 0.5 * (high - low)
-        return Knowledge(centre, columns, box=True)
-
-    def _covariance(self) -> Array:
-        """Return the covariance (k, k) of the parameters, zero for known ones."""
-        stated, names = self.stated, self.nominal.names
-        key = f"{KEY}.{stated.stated(*SOURCES)[0]}"
-        source = stated.covariance if stated.covariance is not None else stated.information
-        if isinstance(source, str):
-            if not source.endswith((".yaml", ".yml")):
-                record = system.read_excitation_record(self.spec, source, key)
-                earlier = replace(self.experiment, prior=None)
-                return self._inverted(system.information_in(self.spec, earlier, record), key)
-            found = load_estimate(self.spec, source, key)
-            covariance, listed = np.array(found.covariance, dtype=float), tuple(found.parameters)
-            full = embedded(self.spec, names, covariance, listed, key)
-            apart = np.sqrt(np.diag(full)) * _AWAY
-            both = ", ".join(
-                f"{name} is {found.parameters[name]:.4g} there and {nominal:.4g} here"
-                for name, nominal, most_apart in zip(names, self.nominal.theta, apart, strict=True)
-                if name in found.parameters and abs(found.parameters[name] - nominal) > most_apart
-            )
-            if both:
-                message = (
-                    f"{source} is an estimate of another plant: {both}, more than {_AWAY:g} deviations apart"
-                )
-                hint = f"take plant and noise from the same file: include: {source}"
-                raise self.spec.complain("wrong-estimate", message, hint=hint, key=key)
-            return full
-        matrix = np.array(source, dtype=float)
-        if stated.covariance is None:
-            matrix = self._inverted(matrix, key)
-        return embedded(self.spec, names, matrix, stated.parameters, key)
-
-    def _inverted(self, information: Array, key: str) -> Array:
-        try:
-            return inverse(information)
-        except np.linalg.LinAlgError:
-            message = "the information matrix is singular: no plants can be drawn of some parameters"
-            hint = "name the parameters that it is about, or take an experiment that informs about all"
-            raise self.spec.complain("not-positive-definite", message, hint=hint, key=key) from None
 
     @cached_property
     def _radius(self) -> float:
@@ -174,14 +174,15 @@ class UncertainPlant:
             raise spec.complain(found.code, f"{where}: {found.message}", hint=found.hint, key=KEY) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
-        model, controller = self.nominal.at(theta), self.spec.experiment.controller
+        model, loop, controller = self.nominal.at(theta), None, self.spec.experiment.controller
         if model.flaw is not None:
             raise _NoPlantError("not-a-plant", model.flaw)
-        lost = self._acting(self.nominal) & ~self._acting(model)
-        if np.any(lost):
-            output, input = np.argwhere(lost)[0] + 1
+        # An entry acts if it is other than zero at some of a few frequencies.
+        lo, hi = self.experiment.band
+        w = lo + (hi - lo) * _PROBES
+        before, after = (np.any(one.plant_at(w) != 0.0, axis=0) for one in (self.nominal, model))
+        for output, input in np.argwhere(before & ~after)[:1] + 1:
             raise _NoPlantError("not-a-plant", f"output {output} does not depend on input {input}")
-        loop = None
         if controller is not None:
             try:
                 loop = system.build_loop(self.spec, model, controller)
@@ -191,11 +192,6 @@ class UncertainPlant:
             what = f"{'the plant' if loop is None else 'the loop'} has a pole, or C a root"
             raise _NoPlantError("no-stable-plant", f"{what}, on or beyond the unit circle")
         return model, loop
-
-    def _acting(self, model: Model) -> NDArray[np.bool_]:
-        """Return whether each entry (p, r) of G is other than zero at some of a few frequencies."""
-        lo, hi = self.experiment.band
-        return np.any(model.plant_at(lo + (hi - lo) * _PROBES) != 0.0, axis=0)
 
     def _named(self, theta: Array) -> str:
         return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self.nominal.names, theta, strict=True))
@@ -207,15 +203,14 @@ class UncertainPlant:
         farthest = max((self.experiment.loop or self.nominal).radius, 1.0 - _ON_CIRCLE)
         for number, values in enumerate(scenarios):
             key = f"{KEY}.scenarios[{number}]"
-            theta = self.moved(values, key)
+            thetas.append(self.moved(values, key))
             try:
-                plants.append(self.at(theta, farthest))
+                plants.append(self.at(thetas[-1], farthest))
             except _NoPlantError as error:
                 code, what = error.args
-                message = f"at the scenario {self._named(theta)} {what}"
+                message = f"at the scenario {self._named(thetas[-1])} {what}"
                 hint = "leave the scenario out, or mend its parameters"
                 raise self.spec.complain(code, message, hint=hint, key=key) from error
-            thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
 
     def possible(self, theta: Array) -> Alternative | None:
@@ -229,9 +224,9 @@ class UncertainPlant:
         """Draw sound plants; raises `SpecError` (`no-stable-plant`) if hardly any draw gives one."""
         radius, known, size = self._radius, self.spread, self.spread.columns.shape[1]
         thetas, plants = list[Array](), list[Alternative]()
-        most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
+        drawn, last = 0, ""
         while len(plants) < number:
-            if drawn >= most_draws:
+            if drawn >= max(_TRIES * number, _LEAST_TRIES):
                 few = f"only {len(plants)} of {drawn} plants drawn are sound"
                 message = f"{few}, in their loop if there is one, with poles within {radius:.6g}{last}"
                 hint = "the uncertainty reaches far beyond what is possible: state it more tightly"
@@ -240,10 +235,9 @@ class UncertainPlant:
             theta, drawn = np.asarray(known.centre + known.columns @ z), drawn + 1
             try:
                 plants.append(self.at(theta, radius))
+                thetas.append(theta)
             except _NoPlantError as error:
                 last = f"; at the last one, {self._named(theta)}, {error.args[1]}"
-                continue
-            thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), drawn)
 
 
@@ -304,10 +298,9 @@ def _needed(spec: Spec, risk: float | None, unknowns: int | None) -> int:
         message = "how many plants a risk takes depends on the number of unknowns: a free spectrum has none"
         hint = "write scenarios: 200 in place of risk, or choose spectrum: {type: fir}"
         raise spec.complain("not-supported", message, hint=hint, key=f"{KEY}.risk")
-    needed = samples_for(risk, 1.0 - CONFIDENCE, unknowns)
-    if needed > most("uncertainty.scenarios"):
-        takes = f"a risk of {risk:g} with {unknowns} unknowns takes {needed} plants"
-        message = f"{takes}, and at most {most('uncertainty.scenarios')} are taken"
+    needed, largest = samples_for(risk, 1.0 - CONFIDENCE, unknowns), most("uncertainty.scenarios")
+    if needed > largest:
+        message = f"a risk of {risk:g} with {unknowns} unknowns takes {needed} plants, {largest} at most"
         hint = "allow more risk, or lower the order of the spectrum"
         raise spec.complain("too-large", message, hint=hint, key=f"{KEY}.risk")
     return needed

@@ -29,124 +29,24 @@ from inputdesign_cli.specification.models.sizes import most
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
-# Periods up to so many times as long are tried for a hint, and how many of them.
-_LONGEST, _TRIED = 1e3, 400
+# Periods of a block after the transient, if none are stated: their scatter shows the noise.
+_COUNTED = 4
 _SIGNAL = (
     *("hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "scale", "order"),
     *("samples", "start"),
 )
-# Periods of a block after the transient, if none are stated: their scatter shows the noise.
-_COUNTED = 4
-
-
-def build_periods(spec: Spec, stated: FrequencyResponse) -> Periods:
-    """Return the repetition of the record; raise `bad-period` unless whole periods fit into it."""
-    blocks, samples = spec.plant.inputs, spec.experiment.samples
-    skip, shortest = stated.transient, spec.designs and spec.goal == "shortest_experiment"
-    if stated.period is not None:
-        period = stated.period
-        times = samples // (blocks * period)
-        if spec.signal.periods is not None and spec.signal.periods != blocks * times and not shortest:
-            raise bad_spec(
-                "conflicting-keys",
-                f"signal.periods is {spec.signal.periods}, and {samples} samples hold {blocks * times} "
-                f"periods of {period}",
-                hint="give one of signal.periods and accuracy.frequency_response.period",
-                key="signal.periods",
-            )
-    elif shortest:
-        message = "the length of the experiment is sought, so that the period of its lines must be given"
-        hint = f"add {KEY}.period: the time that resolves the lines, in samples"
-        raise bad_spec("missing-key", message, hint=hint, key=KEY)
-    else:
-        times = (spec.signal.periods or blocks * (skip + _COUNTED)) // blocks
-        period = samples // (blocks * max(times, 1))
-    if not shortest and times <= skip:
-        each = f" for each of {blocks} inputs" if blocks > 1 else ""
-        raise bad_spec(
-            "bad-period",
-            f"the record has {times} periods{each}, and {skip} are left to the transient: none counts",
-            hint=f"take {blocks * (skip + 2) * max(period, 3)} samples or more, or a shorter period",
-            key=f"{KEY}.period" if stated.period is not None else "experiment.samples",
-        )
-    if period < 3:
-        message = f"a period of {period} samples has no harmonic between 0 and the Nyquist frequency"
-        hint = "take more samples, or fewer periods"
-        raise bad_spec("bad-period", message, hint=hint, key="experiment.samples")
-    longest = most("signal.samples")
-    if not shortest and blocks * times * period > longest:
-        message = f"the record has {blocks * times * period} samples, and at most {longest} are computed"
-        hint = f"write experiment.samples: {longest} or less"
-        raise bad_spec("too-large", message, hint=hint, key="experiment.samples")
-    return Periods(period, blocks, skip)
-
-
-def build_grid(spec: Spec, stated: FrequencyResponse, period: int) -> harmonic_grid.HarmonicGrid:
-    """Return the lines and the silent ones; raise `SpecError` (`too-few-lines`, `out-of-range`)."""
-    step, unit, odd = spec.sample_time, f"rad/{spec.time_unit}", stated.detection is not None
-    if stated.frequencies is None:
-        return harmonic_grid.HarmonicGrid.of(period, _in_band(spec, stated, period), watched=odd)
-    wanted, half = np.array(stated.frequencies), np.pi / (period * step)
-    lowest, highest = half * (1 - 1e-9), spec.nyquist - half * (1 - 1e-9)
-    for at in np.flatnonzero((wanted < lowest) | (wanted > highest)).tolist():
-        raise bad_spec(
-            "out-of-range",
-            f"{wanted[at]:.6g} {unit} is nearest to no harmonic of a period of {period} samples between 0 "
-            "and the Nyquist frequency",
-            hint=f"lines lie between {2 * half:.4g} and {spec.nyquist - half:.4g} {unit}; a longer period "
-            "begins lower",
-            key=f"{KEY}.frequencies[{at}]",
-        )
-    chosen = harmonic_grid.nearest_harmonics(period, wanted * step, odd=odd)
-    for at in np.flatnonzero(np.diff(chosen) == 0).tolist():
-        apart = (2 if odd else 1) * 2.0 * np.pi / (period * step)
-        raise bad_spec(
-            "too-few-lines",
-            f"{wanted[at]:.6g} and {wanted[at + 1]:.6g} {unit} are the same line: with a period of {period} "
-            f"samples lines are {apart:.3g} {unit} apart",
-            hint="take a longer period, or drop one of the two",
-            key=f"{KEY}.frequencies[{at + 1}]",
-        )
-    return harmonic_grid.HarmonicGrid.of(period, chosen, watched=odd)
-
-
-def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.int_]:
-    """Return the lines that are asked for, or all harmonics but the silent ones; raise `too-few-lines`."""
-    (lo, hi), step, group = spec.clip_band(stated.band), spec.sample_time, stated.detection
-    candidates = stated.lines
-    if group is not None and candidates is not None:
-        candidates += (candidates - 1) // (group - 1)
-    band, odd = (lo * step, hi * step), group is not None
-    try:
-        found = harmonic_grid.harmonics_between(period, band, candidates, odd=odd)
-    except harmonic_grid.TooFewHarmonicsError as error:
-        kind = "odd harmonics" if group is not None else "harmonics"
-        asked = "at least one is" if candidates is None else f"{candidates} are"
-        left_out = ", with the silent lines that show a nonlinearity" if candidates != stated.lines else ""
-        raise bad_spec(
-            "too-few-lines",
-            f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
-            f"asked for{left_out}",
-            hint="take a longer period (more samples, or fewer periods"
-            f"{_longer(spec, period, band, candidates, odd=odd)}), fewer lines, or a higher end of the band",
-            key=f"{KEY}.lines" if candidates is not None else f"{KEY}.band",
-        ) from None
-    if group is None:
-        return found
-    return harmonic_grid.thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
-
-
-def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
-    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
-    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
-        try:
-            harmonic_grid.harmonics_between(longer, band, lines, odd=odd)
-        except harmonic_grid.TooFewHarmonicsError:
-            continue
-        whole = longer * max(spec.experiment.samples // period, 1)
-        lasts = whole * spec.sample_time
-        return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
-    return ""
+_REMEDIES = {
+    "experiment.controller": "remove the controller",
+    "experiment.prior": "remove it",
+    **dict.fromkeys(("limits.energy", "limits.spectrum"), "limit powers, amplitude or rate"),
+    "limits.band": f"state {KEY}.band",
+    "solver.method": "remove method",
+    "signal.type": "use multisine",
+    **{f"signal.{name}": "remove it" for name in _SIGNAL},
+    "report.ellipses": "remove report",
+    "uncertainty": ONE_PLANT,
+}
+_HANDLED = {"solver.method": ("exchange",), "signal.type": ("multisine",)}
 
 
 def build_response_task(spec: Spec) -> ResponseTask:
@@ -155,25 +55,23 @@ def build_response_task(spec: Spec) -> ResponseTask:
     assert stated is not None
     _check_supported(spec)
     goal: Goal = "given" if not spec.designs else _GOALS[spec.goal]
-    periods = build_periods(spec, stated)
+    periods = _periods(spec, stated, shortest=goal == "samples")
     model = build_model(spec)
-    grid = build_grid(spec, stated, periods.period)
-    # The counted length is found where the shortest is asked for; all else is per sample of it.
-    counted = (
-        1 if goal == "samples" else periods.blocks * periods.kept(spec.experiment.samples) * periods.period
-    )
+    grid = _grid(spec, stated, periods.period)
     G = model.plant_at(grid.frequencies)
-    if stated.noise is None:
-        noise: NDArray[np.float64] = NoiseSpectrum.of(model).at(grid.period, grid.excited)
-    else:
-        noise = _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
-    lines = ResponseLines(G, noise, _admitted(spec, stated, grid.frequencies, G), stated.relative)
-    experiment = Experiment(model, counted)
+    noise: NDArray[np.float64] = (
+        NoiseSpectrum.of(model).at(grid.period, grid.excited)
+        if stated.noise is None
+        else _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
+    )
+    # The counted length is found where the shortest is asked for; all else is per sample of it.
+    counted = periods.blocks * periods.kept(spec.experiment.samples) * periods.period
+    experiment = Experiment(model, 1 if goal == "samples" else counted)
     terms = ResponseTerms(
         header=build_header(spec),
         experiment=experiment,
         grid=grid,
-        lines=lines,
+        lines=ResponseLines(G, noise, _admitted(spec, stated, grid, G), stated.relative),
         periods=periods,
         goal=goal,
         cost=build_cost(spec),
@@ -199,24 +97,128 @@ def build_measurement(spec: Spec) -> Measurement:
     )
 
 
-def _admitted(spec: Spec, stated: FrequencyResponse, w: Array, response: ComplexArray) -> NDArray[np.float64]:
+def _check_supported(spec: Spec) -> None:
+    """Refuse keys that are not supported for a frequency response, rather than ignore them."""
+    others = {*spec.accuracy.requirements, *spec.accuracy.goals} - {"frequency_response"}
+    if not spec.plant.sampled:
+        raise refuse("plant", what="measure lines of a plant that is not sampled", hint="add sample: zoh")
+    if any(spec.noise.drifts):
+        hint = "write a root of D inside the unit circle"
+        raise refuse("noise.drift", what="measure lines in noise that drifts", hint=hint)
+    if spec.spectrum is not None and spec.designs:
+        hint = "remove spectrum: the lines follow from the accuracy"
+        raise refuse("spectrum", what="take a family of spectra here", hint=hint)
+    remedies = {**{f"accuracy.{name}": "keep one of them" for name in sorted(others)}, **_REMEDIES}
+    refuse_unhandled(spec, "frequency_response", remedies, _HANDLED)
+
+
+def _periods(spec: Spec, stated: FrequencyResponse, *, shortest: bool) -> Periods:
+    """Return the repetition of the record; raise `bad-period` unless whole periods fit into it."""
+    blocks, samples, repeated = spec.plant.inputs, spec.experiment.samples, spec.signal.periods
+    if stated.period is None and shortest:
+        message = "the length of the experiment is sought, so that the period of its lines must be given"
+        hint = f"add {KEY}.period: the time that resolves the lines, in samples"
+        raise bad_spec("missing-key", message, hint=hint, key=KEY)
+    if stated.period is None:
+        times = (repeated or blocks * (stated.transient + _COUNTED)) // blocks
+        period = samples // (blocks * max(times, 1))
+    else:
+        period, times = stated.period, samples // (blocks * stated.period)
+        if repeated is not None and repeated != blocks * times and not shortest:
+            held = f"{samples} samples hold {blocks * times} periods of {period}"
+            message = f"signal.periods is {repeated}, and {held}"
+            hint = f"give one of signal.periods and {KEY}.period"
+            raise bad_spec("conflicting-keys", message, hint=hint, key="signal.periods")
+    if not shortest and times <= stated.transient:
+        each = f" for each of {blocks} inputs" if blocks > 1 else ""
+        left = f"{stated.transient} are left to the transient: none counts"
+        enough = blocks * (stated.transient + 2) * max(period, 3)
+        key = f"{KEY}.period" if stated.period is not None else "experiment.samples"
+        hint = f"take {enough} samples or more, or a shorter period"
+        raise bad_spec("bad-period", f"the record has {times} periods{each}, and {left}", hint=hint, key=key)
+    if period < 3:
+        message = f"a period of {period} samples has no harmonic between 0 and the Nyquist frequency"
+        hint = "take more samples, or fewer periods"
+        raise bad_spec("bad-period", message, hint=hint, key="experiment.samples")
+    longest = most("signal.samples")
+    if not shortest and blocks * times * period > longest:
+        message = f"the record has {blocks * times * period} samples, and at most {longest} are computed"
+        hint = f"write experiment.samples: {longest} or less"
+        raise bad_spec("too-large", message, hint=hint, key="experiment.samples")
+    return Periods(period, blocks, stated.transient)
+
+
+def _grid(spec: Spec, stated: FrequencyResponse, period: int) -> harmonic_grid.HarmonicGrid:
+    """Return the lines and the silent ones; raise `SpecError` (`too-few-lines`, `out-of-range`)."""
+    step, unit, odd = spec.sample_time, f"rad/{spec.time_unit}", stated.detection is not None
+    if stated.frequencies is None:
+        return harmonic_grid.HarmonicGrid.of(period, _in_band(spec, stated, period), watched=odd)
+    wanted, half = np.array(stated.frequencies), np.pi / (period * step)
+    for at in np.flatnonzero(np.abs(wanted - 0.5 * spec.nyquist) > 0.5 * spec.nyquist - half * (1 - 1e-9)):
+        between = f"no harmonic of a period of {period} samples between 0 and the Nyquist frequency"
+        ends = f"{2 * half:.4g} and {spec.nyquist - half:.4g} {unit}"
+        hint = f"lines lie between {ends}; a longer period begins lower"
+        message = f"{wanted[at]:.6g} {unit} is nearest to {between}"
+        raise bad_spec("out-of-range", message, hint=hint, key=f"{KEY}.frequencies[{at}]")
+    chosen = harmonic_grid.nearest_harmonics(period, wanted * step, odd=odd)
+    for at in np.flatnonzero(np.diff(chosen) == 0):
+        apart = f"lines are {(2 if odd else 1) * 2.0 * half:.3g} {unit} apart"
+        same = f"{wanted[at]:.6g} and {wanted[at + 1]:.6g} {unit} are the same line"
+        message = f"{same}: with a period of {period} samples {apart}"
+        hint = "take a longer period, or drop one of the two"
+        raise bad_spec("too-few-lines", message, hint=hint, key=f"{KEY}.frequencies[{at + 1}]")
+    return harmonic_grid.HarmonicGrid.of(period, chosen, watched=odd)
+
+
+def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.int_]:
+    """Return the lines that are asked for, or all harmonics but the silent ones; raise `too-few-lines`."""
+    (lo, hi), step, group, lines = (
+        spec.clip_band(stated.band),
+        spec.sample_time,
+        stated.detection,
+        stated.lines,
+    )
+    if group is not None and lines is not None:
+        lines += (lines - 1) // (group - 1)  # with the silent ones
+    try:
+        found = harmonic_grid.harmonics_between(period, (lo * step, hi * step), lines, odd=group is not None)
+    except harmonic_grid.TooFewHarmonicsError as error:
+        there = (
+            f"{error.there} {'odd ' if group is not None else ''}harmonics of a period of {period} samples"
+        )
+        asked = "at least one is" if lines is None else f"{lines} are"
+        silent = ", with the silent lines that show a nonlinearity" if lines != stated.lines else ""
+        message = f"the band holds {there}, and {asked} asked for{silent}"
+        hint = (
+            "take a longer period (more samples, or fewer periods), fewer lines, or a higher end of the band"
+        )
+        key = f"{KEY}.band" if lines is None else f"{KEY}.lines"
+        raise bad_spec("too-few-lines", message, hint=hint, key=key) from None
+    if group is None:
+        return found
+    return harmonic_grid.thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
+
+
+def _admitted(
+    spec: Spec, stated: FrequencyResponse, grid: harmonic_grid.HarmonicGrid, response: ComplexArray
+) -> NDArray[np.float64]:
     """Return r_adm (L, p, r), infinite where G is zero; raise `SpecError` (`admissible-not-positive`)."""
-    G = np.abs(response)
+    w, G = grid.frequencies, np.abs(response)
     if stated.absolute is not None:
         return np.full(G.shape, stated.absolute)
     if stated.table is not None:
         return _tabulated(spec, stated.table, w, "r_adm", G.shape[1:]).reshape(G.shape)
     assert stated.relative is not None
-    units, found = build_units(spec), stated.relative * G
-    largest = G.max(axis=0)
+    units, found, largest = build_units(spec), stated.relative * G, G.max(axis=0)
     found[:, largest <= _ZERO * largest.max()] = np.inf
-    for n, i, j in np.argwhere((_ZERO * largest >= G) & np.isfinite(found)).tolist():
+    message = ""
+    for n, i, j in np.argwhere((_ZERO * largest >= G) & np.isfinite(found))[:1]:
         message = f"G{units.entry(i, j)} vanishes at {units.named(w[n])}: no share of it can be met"
         hint = f"leave the line out, or write {KEY}.absolute"
-        raise bad_spec("admissible-not-positive", message, hint=hint, key=f"{KEY}.relative")
-    if np.any(np.all(np.isinf(found), axis=(0, 1))):
+    if not message and np.any(np.all(np.isinf(found), axis=(0, 1))):
         message = "an input moves no output, so that a share of |G| says nothing of its lines"
         hint = f"drop the input, or write {KEY}.absolute"
+    if message:
         raise bad_spec("admissible-not-positive", message, hint=hint, key=f"{KEY}.relative")
     return found
 
@@ -224,69 +226,32 @@ def _admitted(spec: Spec, stated: FrequencyResponse, w: Array, response: Complex
 def _tabulated(spec: Spec, name: str, w: Array, column: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return a column of a file at the lines (L, entries), or one column for each output or entry."""
     key = f"{KEY}.{'table' if column == 'r_adm' else 'noise'}"
+    places = list(np.ndindex(*shape))
+    single = len(places) == 1 or not has_column(spec.resolve_path(name), f"{column}_", key=key)
+    suffixes = [""] if single else ["_" + "".join(str(i + 1) for i in place) for place in places]
     band = (float(w[0]), float(w[-1]))
-    entries = int(np.prod(shape))
-    single = entries == 1 or not has_column(spec.resolve_path(name), f"{column}_", key=key)
-    if single:
-        return np.repeat(positive_table(spec, name, band, column, key).at(w)[:, None], entries, axis=1)
-    suffixes = ["_" + "".join(str(i + 1) for i in place) for place in np.ndindex(*shape)]
-    return np.stack([positive_table(spec, name, band, f"{column}{s}", key).at(w) for s in suffixes], axis=1)
+    values = [positive_table(spec, name, band, f"{column}{suffix}", key).at(w) for suffix in suffixes]
+    return np.broadcast_to(np.stack(values, axis=1), (w.size, len(places)))
 
 
 def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
     """Return the powers (L, 1) of a given multisine at the lines, or None; raise `SpecError`."""
-    given = spec.given
+    given, unit = spec.given, f"rad/{spec.time_unit}"
     if given is None:
         return None
     if given.type != "multisine" or spec.plant.inputs > 1:
         what = "compute the deviations of a frequency response by this excitation"
         hint = "give {type: multisine, frequencies, amplitudes} of one input"
         raise refuse("spectrum.given", what=what, hint=hint)
-    powers = np.zeros(grid.excited.size)
-    for n, (frequency, amplitude) in enumerate(zip(given.frequencies, given.rows[0], strict=True)):
-        place = frequency * spec.sample_time * grid.period / (2.0 * np.pi)
-        if abs(place - np.rint(place)) > 1e-6 * place:
-            raise bad_spec(
-                "bad-period",
-                f"{frequency:.6g} rad/{spec.time_unit} is no harmonic of a period of {grid.period} samples",
-                hint="choose multiples of 2 pi over the duration of a period",
-                key=f"spectrum.given.frequencies[{n}]",
-            )
-        powers[grid.excited == int(np.rint(place))] = 0.5 * amplitude**2
-    silent = np.flatnonzero(powers <= 0.0)
-    if silent.size:
-        at = grid.frequencies[silent[0]] / spec.sample_time
-        message = f"the given multisine has no power at the line {at:.6g} rad/{spec.time_unit}"
+    places = np.array(given.frequencies) * spec.sample_time * grid.period / (2.0 * np.pi)
+    for n in np.flatnonzero(np.abs(places - np.rint(places)) > 1e-6 * places):
+        message = f"{given.frequencies[n]:.6g} {unit} is no harmonic of a period of {grid.period} samples"
+        hint = "choose multiples of 2 pi over the duration of a period"
+        raise bad_spec("bad-period", message, hint=hint, key=f"spectrum.given.frequencies[{n}]")
+    of = dict(zip(np.rint(places).astype(int).tolist(), 0.5 * np.square(given.rows[0]), strict=True))
+    powers = np.array([of.get(harmonic, 0.0) for harmonic in grid.excited.tolist()])
+    for at in grid.frequencies[powers <= 0.0] / spec.sample_time:
+        message = f"the given multisine has no power at the line {at:.6g} {unit}"
         hint = f"add it to spectrum.given, or leave it out of {KEY}"
         raise bad_spec("not-exciting", message, hint=hint, key="spectrum.given.frequencies")
     return powers[:, None]
-
-
-def _check_supported(spec: Spec) -> None:
-    """Refuse keys that are not supported for a frequency response, rather than ignore them."""
-    others = {*spec.accuracy.requirements, *spec.accuracy.goals} - {"frequency_response"}
-    if not spec.plant.sampled:
-        what = "measure lines of a plant that is not sampled"
-        raise refuse("plant", what=what, hint="add sample: zoh")
-    if any(spec.noise.drifts):
-        what = "measure lines in noise that drifts"
-        raise refuse("noise.drift", what=what, hint="write a root of D inside the unit circle")
-    if spec.spectrum is not None and spec.designs:
-        what, hint = "take a family of spectra here", "remove spectrum: the lines follow from the accuracy"
-        raise refuse("spectrum", what=what, hint=hint)
-    remedies = {
-        **{f"accuracy.{name}": "keep one of them" for name in sorted(others)},
-        "experiment.controller": "remove the controller",
-        "experiment.prior": "remove it",
-        **dict.fromkeys(
-            ("limits.energy", "limits.spectrum", "limits.moves"), "limit powers, amplitude or rate"
-        ),
-        "limits.band": f"state {KEY}.band",
-        "solver.method": "remove method",
-        "signal.type": "use multisine",
-        **dict.fromkeys((f"signal.{name}" for name in _SIGNAL), "remove it"),
-        "report.ellipses": "remove report",
-        "uncertainty": ONE_PLANT,
-    }
-    handled = {"solver.method": ("exchange",), "signal.type": ("multisine",)}
-    refuse_unhandled(spec, "frequency_response", remedies, handled)

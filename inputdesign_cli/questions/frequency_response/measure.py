@@ -17,7 +17,6 @@ from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings import frequency_responses as responses
-from inputdesign_cli.findings.frequency_responses import Distorted, distorted
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.identification import FrequencyResponse, frequency_response, response_delays
 from inputdesign_cli.identification.faults import period_spikes
@@ -32,14 +31,13 @@ from inputdesign_cli.identification.periodic_response import (
     periodic_response,
 )
 from inputdesign_cli.outcome import Assessment, Identification, Outcome, RequirementMet
-from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.estimate import SilentLine
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.outcome import response_of_data
-from inputdesign_cli.questions.common.delivery import results_of
+from inputdesign_cli.questions.common.delivery import adding, results_of
 from inputdesign_cli.questions.frequency_response.outcome import ResponseTerms, deviation_curves
 from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
@@ -48,6 +46,31 @@ from inputdesign_cli.specification.models.sizes import most
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
 _SURE = 0.95
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Holds data that count, their periods, the number of records of equal length, and the data left out."""
+
+    data: Record
+    periods: Periods
+    repeats: int
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def kept(self) -> int:
+        """Return the number of periods of one phase that count, in all records."""
+        return self.repeats * self.periods.kept(self.data.lengths[0])
+
+    @property
+    def samples(self) -> int:
+        """Return the number of samples that count."""
+        return self.kept * self.periods.blocks * self.periods.period
+
+    def response(self, harmonics: NDArray[np.int_]) -> PeriodicResponse | None:
+        """Return the response at harmonics (L,); None if the inputs are alike there."""
+        data = self.data
+        return periodic_response(data.u, data.y, self.periods, harmonics, repeats=self.repeats)
 
 
 @dataclass(frozen=True)
@@ -61,19 +84,17 @@ class Judged:
     """
 
     grid: HarmonicGrid
-    periods: Periods
     lines: ResponseLines
     expected: NDArray[np.float64]
     found: NDArray[np.float64]
     least: Array
     largest: Array
-    counted: int
     asked: int
     differing: float
     times: float
     noise: NDArray[np.float64]
     moved: Array
-    distorted: Distorted | None = None
+    distorted: responses.Distorted | None = None
     scattered: tuple[Finding, ...] = ()
     silent: Mapping[str, SilentLines] = field(default_factory=dict)
 
@@ -99,202 +120,20 @@ class Judged:
         sure = self.least / (1.0 + (self.lines.share or 0.0) * (self.moved + bent))
         return not self.scattered and bool(np.any(sure > 1.0))
 
-    @property
-    def periods_needed(self) -> int | None:
-        """Return the periods (of each block) that would have to count; None if more are no remedy."""
-        samples = self.times * self.counted
-        # Of inputs that do not repeat the mean of the periods falls as the noise does.
-        if self.differing > responses.UNLIKE or samples > most("signal.samples"):
-            return None
-        return int(np.ceil(samples / (self.periods.blocks * self.grid.period)))
+    def remedy(self, counted: Counted) -> tuple[int | None, str]:
+        """Return the periods (of each block) that would have to count, and the remedy in words.
 
-    @property
-    def remedy(self) -> str:
-        """Return the number of periods that would do, or the remedy where more would not, in words."""
-        if self.periods_needed is not None:
-            blocks = "" if self.periods.blocks == 1 else f" in each of {self.periods.blocks} blocks"
-            return f"about {self.periods_needed} periods that count{blocks} would do"
-        why = "do not repeat" if self.differing > responses.UNLIKE else "are too weak at some lines"
-        return f"more periods of this signal are no remedy, as the inputs {why}: {responses.REMEDY}"
-
-
-def _measured_results(
-    question: Measurement,
-    data: Record,
-    found: FrequencyResponse,
-    judged: Judged | None,
-    findings: Sequence[Finding],
-    seconds: float,
-    *,
-    assess: bool,
-) -> Results:
-    """Return the outcome, frequency_response.csv and its figure; with lines also their deviations."""
-    header, units = question.header, question.header.units
-    by_reference = data.r is not None and judged is None
-    table, curve, response = response_of_data(units, question.model, found, by_reference=by_reference)
-    tables, curves = {"frequency_response": table}, dict[str, Curves](frequency_response=curve)
-    assessment, blocks = None, 1
-    if judged is not None:
-        w, blocks = judged.grid.frequencies / units.frequency, judged.periods.blocks
-        listed = {"deviation": judged.expected, "deviation_data": judged.found}
-        drawn = ("deviation_data", "these data")
-        columns, curves["deviations"] = deviation_curves(units, w, judged.lines, listed, drawn)
-        tables["deviations"] = Table(columns)
-        silent, moved = silent_entry(judged.silent), judged.distorted
-        if moved is not None:
-            at, cubed = float(w[moved.line]), moved.cubed or None
-            silent["odd"] = replace(silent["odd"], worst_ratio=moved.share, frequency=at, cubed=cubed)
-        response = replace(
-            response,
-            lines=int(w.size),
-            asked=judged.asked,
-            period=judged.periods.period,
-            periods=judged.periods.each(data.lengths[0]),
-            records=len(data.lengths),
-            transient=judged.periods.skip,
-            counted=judged.counted,
-            worst_ratio=float(judged.ratios[judged.worst]),
-            worst_frequency=float(w[judged.worst]),
-            worst_ratio_limits=judged.limits,
-            nonlinearity=silent or None,
-        )
-        # Spikes, drifts and a nonlinearity.
-        bent = responses.nonlinear_response(units, judged.distorted, w, decided=judged.missed)
-        doubts = [*judged.scattered, *bent]
-        if assess:
-            assessment, doubts = _assessment(units, judged, w, doubts)
-        findings = [*findings, *responses.silent_lines_answer(judged.silent), *doubts]
-    outcome = Outcome(
-        title=header.title,
-        status="measured" if assessment is None else assessment.verdict,
-        samples=len(data.y),
-        identification=Identification(method=response.method),
-        frequency_response=replace(response, blocks=blocks),
-        assessment=assessment,
-        findings=data.findings or None,
-        notes=data.notes or None,
-        timing_s={"measurement": seconds},
-    )
-    return results_of(header, outcome.saying(findings), tables, curves)
-
-
-def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
-    """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
-    return {
-        kind: SilentLine(
-            one.lines,
-            tuple(one.over_noise.tolist()),
-            tuple(one.probability.tolist()),
-            tuple(one.rms.tolist()),
-        )
-        for kind, one in silent.items()
-    }
-
-
-def _assessment(
-    units: Units, judged: Judged, w: Array, doubts: list[Finding]
-) -> tuple[Assessment, list[Finding]]:
-    """Return the verdict with the periods that would settle it, and the findings that it rests on."""
-    ratio, at = float(judged.ratios[judged.worst]), float(w[judged.worst])
-    met, periods, no_top_up = judged.limits[1] <= 1.0, None, None
-    doubted = not trusted(doubts)
-    if judged.missed and doubted:
-        no_top_up = "more periods alone are no remedy: the notes say why"
-    elif not met and not doubted:
-        periods = judged.periods_needed
-        if judged.missed:
-            no_top_up = judged.remedy if periods is None else f"repeat the record: {judged.remedy}"
-        else:
-            doubts = [*doubts, responses.within_chance(units, ratio, judged.limits, at, judged.remedy)]
-    answer, why = verdict(doubts, met=met), reasons(doubts)
-    return Assessment(
-        verdict=answer,
-        met=answer == "met",
-        requirements=(RequirementMet("frequency_response", ratio, at),),
-        undecided=tuple(one.message for those in why.values() for one in those) or None,
-        causes=tuple(why) or None,
-        no_top_up=no_top_up,
-        periods=periods,
-    ), doubts
-
-
-@dataclass(frozen=True)
-class Counted:
-    """Holds data that count, their periods, the number of records of equal length, and the data left out."""
-
-    data: Record
-    periods: Periods
-    repeats: int
-    findings: tuple[Finding, ...] = ()
-
-    @property
-    def kept(self) -> int:
-        """Return the number of periods of one phase that count, in all records."""
-        return self.repeats * self.periods.kept(self.data.lengths[0])
-
-    def response(self, harmonics: NDArray[np.int_]) -> PeriodicResponse | None:
-        """Return the response at harmonics (L,); None if the inputs are alike there."""
-        data = self.data
-        return periodic_response(data.u, data.y, self.periods, harmonics, repeats=self.repeats)
-
-
-def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Counted:
-    """Return the data that count, or raise `DataError` (`bad-period`, `too-few-samples`).
-
-    Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
-    periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
-    the one with the most periods. The sample time `step` is in the unit of the times of the data.
-    """
-    lengths, length = set(data.lengths), data.lengths[0]
-    whole = stated.blocks * stated.period
-    if len(lengths) == 1 and len(data.files) == len(data.lengths):
-        if stated.blocks == 1 or length % whole == 0:
-            _check(stated.kept(length), stated.kept(length) * len(data.lengths), stated, name)
-            return Counted(
-                data, stated, len(data.lengths), tuple(responses.samples_before_periods(length, stated))
-            )
-    elif stated.blocks == 1:
-        return _from_pieces(stated, data, name, step)
-    what = " and ".join(str(one) for one in sorted(lengths))
-    raise DataError.because(
-        "bad-period",
-        f"{name} has stretches of {what} samples, and the design has {stated.blocks} blocks of "
-        f"whole periods of {stated.period}",
-        hint="cut every record to the length of signal.csv (--skip, --range), and close gaps",
-    )
-
-
-def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> Counted:
-    """Return one record of the periods without a gap."""
-    period = stated.period
-    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
-    # The number of samples between the begin of a file and each of its samples.
-    places = np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
-    transient = stated.skip * period
-    follow = np.ones(len(places), dtype=bool)
-    follow[np.cumsum(data.lengths)[:-1]] = False
-    gaps = np.cumsum(~follow)
-    last = np.arange(len(places)) + period - 1
-    begins = np.flatnonzero((last < len(places)) & (places >= transient))
-    begins = begins[gaps[last[begins]] == gaps[begins]]
-    phases = places[begins] % period
-    taken = begins[phases == np.argmax(np.bincount(phases, minlength=1))]
-    _check(taken.size, taken.size, stated, name)
-    samples = (taken[:, None] + np.arange(period)).ravel()
-    kept = data.at(samples, (len(samples),))
-    left_out = responses.periods_between_gaps(len(data.lengths), taken.size, period)
-    return Counted(kept, replace(stated, skip=0), 1, (left_out,))
-
-
-def _check(each: int, together: int, stated: Periods, name: str) -> None:
-    """Raise `DataError` (`too-few-samples`) unless enough periods count, in a block and in all records."""
-    if each < 1 or together < 2:
-        raise DataError.because(
-            "too-few-samples",
-            f"{name} has {max(each, 0)} whole periods of {stated.period} samples after {stated.skip} that "
-            "are transient: the noise is estimated from the scatter of two or more",
-            hint="record more periods, or give several records",
-        )
+        There is no number where more do not help: the mean of inputs that do not repeat falls as noise does.
+        """
+        samples, blocks = self.times * counted.samples, counted.periods.blocks
+        unlike = self.differing > responses.UNLIKE
+        if unlike or samples > most("signal.samples"):
+            why = "do not repeat" if unlike else "are too weak at some lines"
+            no = f"more periods of this signal are no remedy, as the inputs {why}: {responses.REMEDY}"
+            return None, no
+        periods = int(np.ceil(samples / (blocks * self.grid.period)))
+        each = "" if blocks == 1 else f" in each of {blocks} blocks"
+        return periods, f"about {periods} periods that count{each} would do"
 
 
 @dataclass(frozen=True)
@@ -314,23 +153,161 @@ def measure(
     question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
 ) -> Results:
     """Return the response with its confidence, compared with what a spec asks of its lines."""
-    started = time.perf_counter()
-    units, terms, name = question.header.units, question.terms, paths[0].name
-    results = partial(_measured_results, question, assess=assess)
+    started, header, terms = time.perf_counter(), question.header, question.terms
+    units, name, model = header.units, paths[0].name, question.model
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
-    if terms is None:
-        delays = partial(response_delays, question.model, step=units.step)
+    counted = None if terms is None else whole_periods(terms.periods, data, name, units.sample_time)
+    if terms is None or counted is None:
+        delays = partial(response_delays, model, step=units.step)
         response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
         if response is None:
             message = f"{name} excites no frequency enough for a response without a model"
             hint = "record longer, or excite more frequencies"
-            raise DataError.because("too-few-samples", message, hint=hint)
-        return results(data, response, None, (), time.perf_counter() - started)
-    counted = whole_periods(terms.periods, data, name, units.sample_time)
+            raise DataError.because("too-few-samples", message, hint)
+    else:
+        data = counted.data
+        response, judged, seen = _at_lines(question, terms, counted, name, assess=assess)
+    by_reference = data.r is not None and terms is None
+    table, curve, lines = response_of_data(units, model, response, by_reference=by_reference)
+    outcome = Outcome(
+        title=header.title,
+        status="measured",
+        samples=len(data.y),
+        identification=Identification(method=lines.method),
+        frequency_response=replace(lines, blocks=1),
+        findings=data.findings or None,
+        notes=data.notes or None,
+        timing_s={"measurement": time.perf_counter() - started},
+    )
+    results = results_of(header, outcome, {"frequency_response": table}, {"frequency_response": curve})
+    if counted is None:
+        return results
+    return _compared(units, results, counted, judged, seen, assess=assess)
+
+
+def _compared(
+    units: Units, results: Results, counted: Counted, judged: Judged, found: list[Finding], *, assess: bool
+) -> Results:
+    """Return the results with the comparison with r_adm and the figure of the deviations."""
+    outcome, w, periods = results.outcome, judged.grid.frequencies / units.frequency, counted.periods
+    silent, bent = silent_entry(judged.silent), judged.distorted
+    if bent is not None:
+        at, cubed = float(w[bent.line]), bent.cubed or None
+        silent["odd"] = replace(silent["odd"], worst_ratio=bent.share, frequency=at, cubed=cubed)
+    assert outcome.frequency_response is not None
+    lines = replace(
+        outcome.frequency_response,
+        blocks=periods.blocks,
+        lines=int(w.size),
+        asked=judged.asked,
+        period=periods.period,
+        periods=periods.each(counted.data.lengths[0]),
+        records=len(counted.data.lengths),
+        transient=periods.skip,
+        counted=counted.samples,
+        worst_ratio=float(judged.ratios[judged.worst]),
+        worst_frequency=float(w[judged.worst]),
+        worst_ratio_limits=judged.limits,
+        nonlinearity=silent or None,
+    )
+    outcome = replace(outcome, frequency_response=lines)
+    doubts = [*judged.scattered, *responses.nonlinear_response(units, bent, w, decided=judged.missed)]
+    if assess:
+        assessment, doubts = _assessment(units, counted, judged, w, doubts)
+        outcome = replace(outcome, assessment=assessment, status=assessment.verdict)
+    listed, drawn = (
+        {"deviation": judged.expected, "deviation_data": judged.found},
+        ("deviation_data", "these data"),
+    )
+    columns, deviations = deviation_curves(units, w, judged.lines, listed, drawn)
+    found = [*found, *responses.silent_lines_answer(judged.silent), *doubts]
+    return adding(results, outcome, found, {"deviations": Table(columns)}, {"deviations": deviations})
+
+
+def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
+    """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
+    return {
+        kind: SilentLine(one.lines, *(tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms)))
+        for kind, one in silent.items()
+    }
+
+
+def _assessment(
+    units: Units, counted: Counted, judged: Judged, w: Array, doubts: list[Finding]
+) -> tuple[Assessment, list[Finding]]:
+    """Return the verdict with the periods that would settle it, and the findings that it rests on."""
+    ratio, at = float(judged.ratios[judged.worst]), float(w[judged.worst])
+    met, periods, no_top_up = judged.limits[1] <= 1.0, None, None
+    doubted = not trusted(doubts)
+    if judged.missed and doubted:
+        no_top_up = "more periods alone are no remedy: the notes say why"
+    elif not met and not doubted:
+        periods, remedy = judged.remedy(counted)
+        if judged.missed:
+            no_top_up = remedy if periods is None else f"repeat the record: {remedy}"
+        else:
+            doubts = [*doubts, responses.within_chance(units, ratio, judged.limits, at, remedy)]
+    answer, why = verdict(doubts, met=met), reasons(doubts)
+    return Assessment(
+        verdict=answer,
+        met=answer == "met",
+        requirements=(RequirementMet("frequency_response", ratio, at),),
+        undecided=tuple(one.message for those in why.values() for one in those) or None,
+        causes=tuple(why) or None,
+        no_top_up=no_top_up,
+        periods=periods,
+    ), doubts
+
+
+def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Counted:
+    """Return the data that count, or raise `DataError` (`bad-period`, `too-few-samples`).
+
+    Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
+    periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
+    the one with the most periods. The sample time `step` is in the unit of the times of the data.
+    """
+    lengths, length = sorted(set(data.lengths)), data.lengths[0]
+    period, blocks, pieces = stated.period, stated.blocks, len(data.lengths)
+    whole = len(lengths) == 1 and len(data.files) == pieces
+    if blocks > 1 and not (whole and length % (blocks * period) == 0):
+        held = f"stretches of {' and '.join(map(str, lengths))} samples"
+        message = f"{name} has {held}, and the design has {blocks} blocks of whole periods of {period}"
+        hint = "cut every record to the length of signal.csv (--skip, --range), and close gaps"
+        raise DataError.because("bad-period", message, hint)
+    begins = np.zeros(0, dtype=int) if whole else _longest_phase(stated, data, step)
+    each = stated.kept(length) if whole else begins.size
+    if each < 1 or each * (pieces if whole else 1) < 2:
+        after = f"{max(each, 0)} whole periods of {period} samples after {stated.skip} that are transient"
+        message = f"{name} has {after}: the noise is estimated from the scatter of two or more"
+        raise DataError.because("too-few-samples", message, "record more periods, or give several records")
+    if whole:
+        return Counted(data, stated, pieces, tuple(responses.samples_before_periods(length, stated)))
+    samples = (begins[:, None] + np.arange(period)).ravel()
+    left_out = responses.periods_between_gaps(pieces, begins.size, period)
+    return Counted(data.at(samples, (len(samples),)), replace(stated, skip=0), 1, (left_out,))
+
+
+def _longest_phase(stated: Periods, data: Record, step: float) -> NDArray[np.int_]:
+    """Return the first samples of the periods without a gap, of the phase that has the most."""
+    period = stated.period
+    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
+    # The number of samples between the begin of a file and each of its samples.
+    places = np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
+    piece = np.repeat(np.arange(len(data.lengths)), data.lengths)
+    begins = np.flatnonzero(places[: max(len(places) - period + 1, 0)] >= stated.skip * period)
+    begins = begins[piece[begins + period - 1] == piece[begins]]
+    phases = places[begins] % period
+    return begins[phases == np.argmax(np.bincount(phases, minlength=1))]
+
+
+def _at_lines(
+    question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
+) -> tuple[FrequencyResponse, Judged, list[Finding]]:
+    """Return the response at the lines of the spec that the data excite, its comparison, and findings."""
     data, periods = counted.data, counted.periods
     excited = excited_lines(data.u, periods, terms.grid.excited, repeats=counted.repeats)
-    missing = responses.unexcited_lines(units, terms.grid.frequencies, excited)
+    missing = responses.unexcited_lines(question.header.units, terms.grid.frequencies, excited)
     found = counted.response(terms.grid.excited[excited])
     if found is None or (assess and missing):
         why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
@@ -340,7 +317,7 @@ def measure(
     # Periods of outputs differ if the inputs do not repeat.
     if judged.differing <= responses.UNLIKE:
         judged = _doubted(question, terms, found, counted, judged)
-    return results(data, of_periods(found, periods.period), judged, seen, time.perf_counter() - started)
+    return of_periods(found, periods.period), judged, seen
 
 
 def _doubted(
@@ -348,10 +325,9 @@ def _doubted(
 ) -> Judged:
     """Return the comparison with spikes, drifts, and, without spikes, a nonlinearity by the silent lines."""
     units, data, periods, repeats = question.header.units, counted.data, counted.periods, counted.repeats
-    spikes = period_spikes(data.y, periods, repeats=repeats)
-    if spikes:
+    if spikes := period_spikes(data.y, periods, repeats=repeats):
         where = [places(units, data, one.samples) for one in spikes]
-        spiked = list(responses.spiked_periods(units, spikes, where, len(data.y), counted.kept))
+        spiked = responses.spiked_periods(units, spikes, where, len(data.y), counted.kept)
         return replace(judged, scattered=tuple(spiked))
     # The noise of the data near frequency zero; noise of the spec may go on rising below the lowest line.
     lowest = int(np.argmin(judged.grid.frequencies))
@@ -361,7 +337,8 @@ def _doubted(
         noise = np.maximum(noise, noise / judged.lines.noise[lowest] * known)
     drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)
     if drift is not None:
-        counted = replace(counted, data=replace(data, y=data.y - drift.curve))
+        data = replace(data, y=data.y - drift.curve)
+        counted = replace(counted, data=data)
         without = counted.response(found.harmonics)
         if without is not None:
             scatter = np.abs(found.deviation**2 - without.deviation**2)
@@ -374,13 +351,15 @@ def _doubted(
     if "odd" not in judged.silent:
         return judged
     # The change of the response by a nonlinearity, by power at silent lines and by cubes.
-    odd, data = terms.grid.odd, counted.data
+    odd = terms.grid.odd
     error = response_error(found, periods.period, counted.kept, judged.silent["odd"], odd)
-    nominal = [question.model.plant_at(terms.grid.at(lines)) for lines in (found.harmonics, odd)]
-    shape = _between(terms.grid.at(odd), terms.grid.frequencies, terms.lines.noise)
-    cube = cubes(found, data.u, data.y, periods, odd, (nominal[0], nominal[1]), shape, repeats=repeats)
-    ratios = judged.lines.ratios
-    bent = distorted(judged.silent, ratios(error), cube, lambda y: ratios(cube.error * y[:, None]))
+    even, uneven = (question.model.plant_at(terms.grid.at(lines)) for lines in (found.harmonics, odd))
+    cube = cubes(found, data.u, data.y, periods, odd, (even, uneven), _noise(terms, odd), repeats=repeats)
+
+    def moved_by(outputs: Array) -> Array:
+        return judged.lines.ratios(cube.error * outputs[:, None])
+
+    bent = responses.distorted(judged.silent, judged.lines.ratios(error), cube, moved_by)
     return replace(judged, distorted=bent)
 
 
@@ -394,19 +373,16 @@ def judge_lines(
     if np.any(found.noise <= 0.0):
         message = "the periods do not differ at all, so that their noise is not known"
         hint = "give records of a real plant, not of one period that was repeated"
-        raise DataError.because("noise-free-data", message, hint=hint)
-    periods, repeats = counted.periods, counted.repeats
-    lines = terms.lines.where(excited).at(found.G)
+        raise DataError.because("noise-free-data", message, hint)
+    lines, size = terms.lines.where(excited).at(found.G), len(found.harmonics)
     expected = found.deviation * np.sqrt(lines.noise / found.noise)[:, :, None]
-    window = min(max(-(-_FREEDOM // found.freedom), 1), len(found.harmonics))
+    window = min(max(-(-_FREEDOM // found.freedom), 1), size)
+    means = np.lib.stride_tricks.sliding_window_view(found.noise / lines.noise, window, axis=0).mean(axis=-1)
     # Means over neighbours, at the ends over the nearest ones.
-    first = np.clip(np.arange(len(lines.noise)) - window // 2, 0, len(lines.noise) - window)
-    sums = np.cumsum(np.pad(found.noise / lines.noise, ((1, 0), (0, 0))), axis=0)
-    excess = (sums[first + window] - sums[first]) / window
+    excess = means[np.clip(np.arange(size) - window // 2, 0, size - window)]
     smooth = expected * np.sqrt(excess)[:, :, None]
     freedom = 2 * found.freedom * window
-    tests = max(len(found.harmonics) // window, 1) * found.noise.shape[1]
-    rare = 0.5 * (1.0 - _SURE) / tests
+    rare = 0.5 * (1.0 - _SURE) / (max(size // window, 1) * found.noise.shape[1])
     chances = np.array([1.0 - rare, rare])
     low, high = np.sqrt(freedom / (2.0 * scipy.special.gammaincinv(0.5 * freedom, chances))).tolist()
     # If r_adm is a share of |G|, it is known as well as |G| is.
@@ -419,35 +395,28 @@ def judge_lines(
     needed = np.max(lines.ratios(smooth)) * (high + far * (lines.share or 0.0)) * anew
     return Judged(
         grid=replace(terms.grid, excited=found.harmonics),
-        asked=excited.size,
-        differing=differing(counted.data.u, periods, repeats=repeats),
-        times=float(needed) ** 2,
-        periods=periods,
         lines=lines,
         expected=expected,
         found=smooth,
         least=low * at_most.ratios(smooth),
         largest=high * at_least.ratios(smooth),
-        counted=counted.kept * periods.blocks * periods.period,
+        asked=excited.size,
+        differing=differing(counted.data.u, counted.periods, repeats=counted.repeats),
+        times=float(needed) ** 2,
         noise=lines.noise * excess,
-        moved=np.zeros(len(found.harmonics)),
+        moved=np.zeros(size),
     )
 
 
 def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
     """Return the outputs at lines of the design that are not excited, by kind: odd and even."""
-    found = {}
-    for kind, harmonics in (("odd", terms.grid.odd), ("even", terms.grid.even)):
-        parts = np.split(counted.data.y, counted.repeats)
-        records = [counted.periods.transforms(one)[:, :, harmonics] for one in parts]
-        shape = _between(terms.grid.at(harmonics), terms.grid.frequencies, terms.lines.noise)
-        lines = silent_lines(np.concatenate(records, axis=1), shape)
-        if lines is not None:
-            found[kind] = lines
-    return found
+    transforms = counted.periods.transforms(counted.data.y, counted.repeats)
+    silent = {"odd": terms.grid.odd, "even": terms.grid.even}
+    found = {kind: silent_lines(transforms[:, :, at], _noise(terms, at)) for kind, at in silent.items()}
+    return {kind: lines for kind, lines in found.items() if lines is not None}
 
 
-def _between(w: Array, lines: Array, values: Array) -> Array:
-    """Return values (L, p) at lines (L,) between them, at w (n,), linear in both logarithms."""
-    logs = [np.interp(np.log(w), np.log(lines), np.log(column)) for column in values.T]
-    return np.exp(np.stack(logs, axis=1))
+def _noise(terms: ResponseTerms, harmonics: NDArray[np.int_]) -> Array:
+    """Return the noise (n, p) at harmonics (n,) between the lines, linear in both logarithms."""
+    w, lines = np.log(terms.grid.at(harmonics)), np.log(terms.grid.frequencies)
+    return np.exp(np.stack([np.interp(w, lines, np.log(one)) for one in terms.lines.noise.T], axis=1))

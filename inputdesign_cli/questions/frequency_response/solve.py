@@ -21,7 +21,7 @@ from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
-from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.delivery import timing, with_study
@@ -43,7 +43,11 @@ _STREAM = 0x5EED
 
 @dataclass(frozen=True)
 class ResponseTask:
-    """Designs lines, or analyses `given` ones with powers (L, r), and studies them."""
+    """Designs lines, or analyses given ones, and studies them.
+
+    Attributes:
+        given: (L, r) powers that are not designed.
+    """
 
     terms: ResponseTerms
     given: Array | None
@@ -58,15 +62,14 @@ class ResponseTask:
         """Return the design, and beside its deviations the scatter of many simulated experiments."""
         terms, study = self.terms, self.simulation
         if study.runs < 2:
-            message = "a single run has no standard deviation"
             hint = "write simulation.runs: 1000, whose deviations are known to 2 %"
+            message = "a single run has no standard deviation"
             raise bad_spec("out-of-range", message, hint=hint, key="simulation.runs")
         plan, results = self._solved()
         begun = time.perf_counter()
         records = {"design": (plan.applied, plan.record.samples)}
-        if study.compare:  # equal lines with the power of the record in each input
-            flat = np.broadcast_to(plan.applied.mean(axis=0), plan.powers.shape)
-            records["white"] = (flat, self._best(flat, plan.length))
+        if study.compare:
+            records["white"] = (plan.flat, self._best(plan.flat, plan.length))
         nominal, power = terms.experiment, results.outcome.power
         if study.truth is not None and power is not None:
             nominal = study.truth.experiment(nominal, power.output or ())
@@ -78,13 +81,22 @@ class ResponseTask:
         inputs = {
             name: outcome.tried_lines(terms, plan, records[name][0], found) for name, found in studies.items()
         }
-        name, units, lines = "deviation_simulated", terms.header.units, terms.lines
-        listed = {**outcome.deviations_of(terms, plan), name: studies["design"].deviation}
-        shown = (name, f"{study.runs} simulated experiments")
-        columns, curves = outcome.deviation_curves(units, terms.frequency, lines, listed, shown)
-        table = Table({**results.tables["deviations"].columns, **columns})
+        table, curves = outcome.studied_deviations(terms, plan, results, studies["design"])
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
         return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
+
+    def _designed(self) -> tuple[ResponseDesign, int]:
+        """Return the powers and the samples that count."""
+        terms, samples = self.terms, self.terms.experiment.samples
+        problem = terms.problem(samples)
+        if self.given is not None:
+            flat = self.given.ravel()
+            return ResponseDesign(flat, float(problem.price @ flat), float(problem.price @ flat)), samples
+        try:
+            design = cheapest(problem) if terms.goal == "cost" else most_accurate(problem)
+        except UnreachableError as error:
+            raise self._unreachable(error, samples) from error
+        return design, self._whole(1.0 / design.value) if terms.goal == "samples" else samples
 
     def _whole(self, samples: float) -> int:
         """Return a number of samples rounded up to whole periods."""
@@ -92,23 +104,11 @@ class ResponseTask:
         return whole * int(np.ceil(samples / whole * (1.0 - 1e-12)))
 
     def _solved(self) -> tuple[Planned, Results]:
-        """Return the record of the designed or given lines, and its results, reread and checked."""
-        started, terms = time.perf_counter(), self.terms
-        counted = terms.experiment.samples
-        problem = terms.problem(counted)
-        if self.given is not None:
-            cost = float(problem.price @ self.given.ravel())
-            design = ResponseDesign(self.given.ravel(), cost, cost)
-        else:
-            try:
-                design = cheapest(problem) if terms.goal == "cost" else most_accurate(problem)
-            except UnreachableError as error:
-                raise self._unreachable(error, counted) from error
-        if terms.goal == "samples":
-            counted = self._whole(1.0 / design.value)
+        started = time.perf_counter()
+        design, counted = self._designed()
         solved = time.perf_counter()
         plan = self._planned(design, counted)
-        terms = replace(terms, experiment=replace(terms.experiment, samples=plan.counted))
+        terms = replace(self.terms, experiment=replace(self.terms.experiment, samples=plan.counted))
         results = outcome.response_results(terms, plan, self.record, timing(started, solved))
         audit_response(terms, plan, results)
         return plan, results
@@ -135,15 +135,10 @@ class ResponseTask:
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
                 length, factor = len(samples), rounded_up(scale * beyond, 4)
-                more = int(np.ceil(length * (scale * beyond) ** 2))
-                best = (
-                    f"meets the accuracy: that of the lowest peaks would have to be {factor} times as large "
-                    "as they allow"
-                )
-                hint = (
-                    f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
-                    f"{factor} times as much, or write objective: shortest_experiment"
-                )
+                more = self.record.units.length(int(np.ceil(length * (scale * beyond) ** 2)))
+                best = f"meets the accuracy: its peaks are {factor} times as large as they allow"
+                hint = f"write {more}; raise the limits, admit {factor} times as much, or write "
+                hint += "objective: shortest_experiment"
                 raise no_record(self.record, length, best, hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
@@ -163,33 +158,24 @@ class ResponseTask:
         raised = (factor * one.bound**0.5 if one.implied else factor**2 * one.bound for one in limits)
         needed = (f"{one.key} to {rounded_up(to)}" for one, to in zip(limits, raised, strict=True))
         more, times = int(np.ceil(samples * factor**2)), rounded_up(factor, 4)
-        message = (
-            f"the limits buy standard deviations {times} times those admitted; the {exhausted} is exhausted"
-        )
-        hint = (
-            f"raise {' and '.join(needed)}, count {more} samples in place of {samples} "
-            f"({self.record.units.length(more).split(':')[0]}), or admit {times} times as much"
-        )
+        message = f"the limits buy deviations {times} times those admitted; the {exhausted} is exhausted"
+        longer = f"count {more} samples in place of {samples}"
+        hint = f"raise {' and '.join(needed)}, {longer}, or admit {times} times as much"
         details = {"factor": factor}
         return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
 
     def _length(self, counted: int) -> int:
-        """Return the length of a record, transient included; raise `too-long` or `too-large`."""
+        """Return the length of a record with its transient; raise `too-long` or `too-large`."""
         periods, most = self.terms.periods, self.terms.most_samples
         length = counted + periods.blocks * periods.skip * periods.period
         if self.terms.goal == "samples" and most is not None and length > most:
-            limit = self.record.units.length(length, "limits")
-            raise InfeasibleError.because(
-                "too-long",
-                f"the shortest record of whole periods takes {length} samples, transient included, and "
-                f"{most} are allowed",
-                f"write {limit}, allow more power, or ask for less accuracy",
-                limit.split(":")[0],
-            )
+            limit, takes = self.record.units.length(length, "limits"), f"{length} samples, transient included"
+            message = f"the shortest record of whole periods takes {takes}, and {most} are allowed"
+            hint = f"write {limit}, allow more power, or ask for less accuracy"
+            raise InfeasibleError.because("too-long", message, hint, limit.split(":")[0])
         if length > self.record.longest:
             message = f"the record has {length} samples, and at most {self.record.longest} are computed"
-            hint = "ask for less accuracy, or allow more power"
-            raise bad_spec("too-large", message, hint=hint, key=KEY)
+            raise bad_spec("too-large", message, hint="ask for less accuracy, or allow more power", key=KEY)
         return length
 
     def _best(self, powers: NDArray[np.float64], length: int) -> Array:

@@ -48,7 +48,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
             message = "{key} needs time_constant, or damping and natural_frequency"
             yield PathDiagnostic("missing-key", message, f"add {missing[0]}", keys=missing)
         for key in second:
-            yield from self.at_most_one("time_constant", key)
+            yield from self.choose(("time_constant", key))
         size = [len(row) for row in self.grid("gain")]
         for name in self.stated(*QUANTITIES):
             if [len(row) for row in self.grid(name)] != size or len(set(size)) > 1:

@@ -75,6 +75,10 @@ class NamedPlant(Section):
         """Return the numbers of outputs and inputs."""
         raise NotImplementedError
 
+    def expression(self, letter: str, row: int, column: int, power: int = 0) -> Expression:
+        """Return a parameter of the model as an expression in the named parameters."""
+        raise NotImplementedError
+
     @property
     def outputs(self) -> int:
         """Return the number of outputs."""
@@ -181,12 +185,12 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         """Return the numbers of outputs and inputs."""
         return transfer.size_of(self.B)
 
-    def coefficients(self, letter: str, output: int, input: int) -> named.Terms:
-        """Return A, B or F of an entry as expressions in the named parameters."""
+    def expression(self, letter: str, row: int, column: int, power: int = 0) -> Expression:
+        """Return a coefficient of an entry of A, B or F as an expression in the named parameters."""
         written = named.expressed(self.written[letter.upper()])
         if letter == "a":
-            return written[output] if fields.depth(written) == 2 else written
-        return transfer.as_matrix(written)[output][input]
+            return (written[row] if fields.depth(written) == 2 else written)[power]
+        return transfer.as_matrix(written)[row][column][power]
 
     @property
     def B_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (the paper's symbol)
@@ -234,7 +238,15 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
         yield from transfer.check_gain(self.terms.numerator, *path)
         if self.continuous.kind == "rational":
             below, levels = self.continuous.denominator_matrix, fields.depth(self.continuous.numerator)
-            yield from transfer.check_each_proper(self.terms.numerator, below, levels, *path)
+            yield from transfer.check_proper(self.terms.numerator, below, levels, *path)
+
+    def expression(self, letter: str, row: int, column: int, power: int = 0) -> Expression:
+        """Return a coefficient of an entry, monic below, or its dead time, in the named parameters."""
+        if letter == "delay":
+            return self.terms.delay[row][column]
+        below = self.terms.denominator[row][column]
+        entry = self.terms.numerator[row][column] if letter == "b" else below
+        return entry[-1 - power] / below[0]
 
     @cached_property
     def terms(self) -> named.CoefficientTerms:
@@ -267,7 +279,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         elif not continuous and self.sample is not None:
             message = "{key} is for matrices in continuous time, and time is discrete here"
             yield PathDiagnostic("unsuitable-key", message, "remove it", ("sample",), at_key=True)
-        if not continuous and self.term("delay", 0, 0).present:
+        if not continuous and self.expression("delay", 0, 0).present:
             message = "{key} is in continuous time, but time is discrete here"
             path = ("state_space", "delay")
             yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
@@ -277,7 +289,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         """Return the numbers of outputs and inputs."""
         return len(self.state_space.C), len(self.state_space.B[0])
 
-    def term(self, letter: str, row: int, column: int) -> Expression:
+    def expression(self, letter: str, row: int, column: int, power: int = 0) -> Expression:
         """Return an entry of a matrix, or the dead time, as an expression in the named parameters."""
         written = self.written["state_space"]
         value = written.get("delay", 0.0) if letter == "delay" else written[letter][row][column]

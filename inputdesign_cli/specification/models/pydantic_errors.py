@@ -44,14 +44,11 @@ class Declared:
     @property
     def alternatives(self) -> dict[str, Declared]:
         """Return the types of a union by their tags; a type without a tag has an empty one."""
-        parts = [declared(part) for part in typing.get_args(self.type)] if _is_union(self.type) else []
-        return {part.tag: part for part in parts}
-
-    @property
-    def tag(self) -> str:
-        """Return the tag that distinguishes this type from the other alternatives of a union."""
-        own = TAG + self.section.phrase if self.section else ""
-        return next((m.tag for m in self.metadata if isinstance(m, Tag)), own)
+        found = {}
+        for part in map(declared, typing.get_args(self.type) if _is_union(self.type) else ()):
+            own = TAG + part.section.phrase if part.section else ""
+            found[next((m.tag for m in part.metadata if isinstance(m, Tag)), own)] = part
+        return found
 
     @property
     def section(self) -> type[Section] | None:

@@ -47,9 +47,8 @@ class PathDiagnostic:
     def placed(self, places: Places, whole: str) -> Diagnostic:
         """Return the diagnostic with its line; `whole` names the file in place of an empty key."""
         key = format_key(self.path)
-        location = places.location(places.mark(self.path, at_key=self.at_key))
         message, hint = (text.replace("{key}", key or whole) for text in (self.message, self.hint))
-        return Diagnostic(self.code, message, hint, key, location)
+        return Diagnostic(self.code, message, hint, key, places.at(self.path, at_key=self.at_key))
 
 
 def carry(*diagnostics: PathDiagnostic) -> PydanticCustomError:
@@ -133,29 +132,21 @@ class Section(BaseModel):
             return inner.at(*path[1:]) if isinstance(inner, Section) else None
         return inner
 
-    def exactly_one(self, *keys: str) -> Iterator[PathDiagnostic]:
-        """Check that exactly one of the keys is given."""
-        yield from self.at_least_one(*keys)
-        yield from self.at_most_one(*keys)
-
-    def at_least_one(self, *keys: str) -> Iterator[PathDiagnostic]:
-        """Check that one or more of the keys are given."""
-        if not self.stated(*keys):
+    def choose(self, keys: _Keys, least: int = 0, *, several: bool = False) -> Iterator[PathDiagnostic]:
+        """Check that at least this many of the keys are given, and at most one, or `several`."""
+        given = self.stated(*keys)
+        if len(given) < least:
             needs = f"{{key}} needs one of {choices(keys)}"
             yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
-
-    def at_most_one(self, *keys: str) -> Iterator[PathDiagnostic]:
-        """Check that no two of the keys are given."""
-        given = self.stated(*keys)
-        for extra in given[1:]:
+        for extra in () if several else given[1:]:
             message = f"{{key}} stands beside {given[0]}; give only one of {choices(keys)}"
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", (extra,), at_key=True)
 
     @model_validator(mode="after")
     def _checked(self) -> Self:
-        found = [*self.check()]
-        rules = zip((self.exactly_one, self.at_least_one, self.at_most_one), self.groups, strict=True)
-        found += [one for rule, groups in rules for keys in groups for one in rule(*keys)]
+        found, one_of, some_of, not_both = [*self.check()], *self.groups
+        found += [one for keys in (*one_of, *not_both) for one in self.choose(keys, int(keys in one_of))]
+        found += [one for keys in some_of for one in self.choose(keys, 1, several=True)]
         if found:
             raise carry(*found)
         return self

@@ -30,7 +30,7 @@ from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.specification.yaml.overrides import replace_values
-from inputdesign_cli.specification.yaml.places import Places, Source, parse_key
+from inputdesign_cli.specification.yaml.places import parse_key
 from inputdesign_cli.specification.yaml.plain import fingerprint, plain, to_yaml
 from inputdesign_cli.specification.yaml.reader import Tree
 
@@ -94,11 +94,11 @@ class Spec(Section):
 
     phrase: ClassVar[str] = "a spec"
 
-    _source: Source = PrivateAttr(default_factory=Source)
+    _source: Tree = PrivateAttr(default_factory=Tree)
     _design: bool = PrivateAttr(default=True)
 
     # Checks the tree of a whole spec; `specification.loading`, which needs this class, sets it.
-    build: ClassVar[Callable[[Tree, Path | None, bool | None], Spec]]
+    build: ClassVar[Callable[[Tree, bool | None], Spec]]
 
     @classmethod
     def from_dict(
@@ -112,7 +112,7 @@ class Spec(Section):
         """
         if folder is not None and not isinstance(folder, Path):
             raise bad_spec("bad-argument", "folder must be a pathlib.Path", hint="Path(..)", key="folder")
-        return cls.build(Tree(plain(data), Places()), folder, design)
+        return cls.build(Tree(plain(data), folder=folder or Path()), design)
 
     def with_(self, **changes: object) -> Spec:
         """Return the spec with other values: `spec.with_(**{"experiment.samples": 600})`; None removes a key.
@@ -131,9 +131,9 @@ class Spec(Section):
         for key in changes:
             if "=" in key:
                 raise bad_spec("bad-argument", f"{key!r} is no key", hint="no key has =", key=key)
-        tree = Tree(copy.deepcopy(self.content), self._source.places.copy())
+        tree = Tree(copy.deepcopy(self.content), self._source.places.copy(), self._source.folder)
         replace_values(tree, {key: plain(value, key) for key, value in changes.items()}, file)
-        return type(self).build(tree, self._source.folder, self._design if design is None else design)
+        return type(self).build(tree, self._design if design is None else design)
 
     @property
     def goal(self) -> Objective:
@@ -189,8 +189,7 @@ class Spec(Section):
 
     def locate(self, key: str) -> Location | None:
         """Return where a key (`plant.F`, `plant.B[1]`) is written, or its deepest ancestor that is."""
-        places = self._source.places
-        return places.location(places.mark(parse_key(key)))
+        return self._source.places.at(parse_key(key))
 
     def resolve_path(self, name: str) -> Path:
         """Return the path of a file that the spec names: relative names start in the folder of the spec."""

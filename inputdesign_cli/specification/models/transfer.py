@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal, cast
 
+import numpy as np
 from pydantic import Field
 
 from inputdesign_cli.specification.models import fields
-from inputdesign_cli.specification.models.named import TermMatrix, Terms, expressed, leading
+from inputdesign_cli.specification.models.named import TermMatrix, expressed, leading
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -35,14 +36,6 @@ def check_each(
     for indices, polynomial in with_paths(value):
         if found := check(polynomial):
             yield replace(found, path=(*path, *indices))
-
-
-def denominators_of(numerator: tuple, denominator: tuple) -> fields.PolynomialMatrix:
-    """Return denominators as rows of columns, common ones repeated and factors multiplied out."""
-    if fields.depth(denominator) == 3:
-        return as_matrix(denominator)
-    common = fields.product(factor for _, factor in with_paths(denominator))
-    return tuple(tuple(common for _ in row) for row in as_matrix(numerator))
 
 
 def with_paths(value: tuple) -> list[tuple[tuple[int, ...], fields.Polynomial]]:
@@ -81,13 +74,18 @@ def shape_words(value: tuple) -> str:
     return f"{rows} x {columns} lists of coefficients"
 
 
-def check_proper(numerator: Terms, degree: int, *path: str | int) -> Iterator[PathDiagnostic]:
-    """Check that the numerator has at most the degree of the denominator, `degree` (descending in s)."""
-    above = len(numerator) - leading(numerator) - 1
-    if above > degree:
-        message = f"{{key}} has degree {above} in s, more than its denominator ({degree}): it is not proper"
-        hint = "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other"
-        yield PathDiagnostic("improper-transfer", message, hint, path)
+def check_proper(
+    above: TermMatrix, below: fields.PolynomialMatrix, levels: int, *path: str
+) -> Iterator[PathDiagnostic]:
+    """Check that no entry has a numerator of higher degree (descending in s), written in nested `levels`."""
+    for (i, j), terms in ((at, above[at[0]][at[1]]) for at in np.ndindex(size_of(below))):
+        high, low = len(terms) - leading(terms) - 1, len(below[i][j]) - 1
+        if high > low:
+            message = f"{{key}} has degree {high} in s, more than its denominator ({low}): it is not proper"
+            hint = "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other"
+            yield PathDiagnostic(
+                "improper-transfer", message, hint, (*path, *((i, j) if levels == 3 else ()))
+            )
 
 
 class Ratio(Section):
@@ -123,7 +121,8 @@ class ContinuousRatio(Ratio):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that the transfer function is proper."""
-        yield from check_proper(expressed(self.numerator), len(self.denominator_polynomial) - 1, "numerator")
+        above, below = ((expressed(self.numerator),),), ((self.denominator_polynomial,),)
+        yield from check_proper(above, below, 1, "numerator")
 
 
 class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time transfer function"):
@@ -138,9 +137,9 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 class TransferMatrix(Section):
     """numerator / denominator entry by entry, in s or in q^-1."""
 
-    numerator: fields.GainMatrix = Field(description="Coefficients; rows (outputs) of columns (inputs).")
+    numerator: fields.RowsMatrix = Field(description="Rows (outputs) of columns (inputs) of coefficients.")
     denominator: fields.ContinuousDenominator = Field(
-        description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
+        default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -156,7 +155,10 @@ class TransferMatrix(Section):
     @property
     def denominator_matrix(self) -> fields.PolynomialMatrix:
         """Return the denominators as rows of columns, factors multiplied out."""
-        return denominators_of(self.numerator, self.denominator)
+        if fields.depth(self.denominator) == 3:
+            return as_matrix(self.denominator)
+        common = fields.product(factor for _, factor in with_paths(self.denominator))
+        return tuple(tuple(common for _ in row) for row in self.numerator_matrix)
 
 
 class DiscreteMatrix(TransferMatrix, family="transfer", phrase="a transfer matrix in q^-1"):
@@ -164,44 +166,19 @@ class DiscreteMatrix(TransferMatrix, family="transfer", phrase="a transfer matri
 
     kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
 
-    numerator: fields.RowsMatrix = Field(description="Rows of columns of coefficients.")
-    denominator: fields.ContinuousDenominator = Field(
-        default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
-    )
-
-
-def check_each_proper(
-    above: TermMatrix, below: fields.PolynomialMatrix, levels: int, *path: str
-) -> Iterator[PathDiagnostic]:
-    """Check that every entry of a matrix in s is proper; `levels` is the nesting of the written numerator."""
-    for i, row in enumerate(above):
-        for j, entry in enumerate(row):
-            where = (i, j) if levels == 3 else ()
-            yield from check_proper(entry, len(below[i][j]) - 1, *path, *where)
-
-
-class ContinuousTarget(TransferMatrix):
-    """A stable transfer matrix in s that is written as one, coefficients in descending powers."""
-
-    numerator: fields.RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """Check that shapes agree, the poles lie in the left half plane, and every entry is proper."""
-        if shapes := list(super().check()):
-            yield from shapes
-            return
-        yield from check_each(self.denominator, fields.check_left_half_plane, "denominator")
-        above = expressed(self.numerator_matrix)
-        yield from check_each_proper(above, self.denominator_matrix, 3, "numerator")
-
 
 class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):
     """A transfer matrix in s, sampled with a zero-order hold."""
 
     kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
 
-    continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
+    continuous: TransferMatrix = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = optional("How it is sampled: zoh.")
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Check that every entry is proper."""
+        above, below = expressed(self.continuous.numerator_matrix), self.continuous.denominator_matrix
+        yield from check_proper(above, below, 3, "continuous", "numerator")
 
 
 def transfer_kind(value: dict[str, Plain]) -> str:
@@ -239,9 +216,9 @@ Target = Annotated[
 
 
 def check_stable(transfer: Target, *path: str) -> Iterator[PathDiagnostic]:
-    """Check that the poles of the transfer function at `path` are stable; a matrix in s has its own check."""
-    if transfer.kind == "continuous":
+    """Check that the poles of the transfer function at `path` are stable."""
+    if transfer.kind == "continuous" or transfer.kind == "continuous_matrix":
         inside = (*path, "continuous", "denominator")
         yield from check_each(transfer.continuous.denominator, fields.check_left_half_plane, *inside)
-    elif transfer.kind != "continuous_matrix":
+    else:
         yield from check_each(transfer.denominator, fields.check_delay_stable, *path, "denominator")

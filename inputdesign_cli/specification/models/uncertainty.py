@@ -94,7 +94,7 @@ class Uncertainty(Section, not_both=(SOURCES,)):
                 message = "{key} is for plants that are drawn, and these are listed one by one"
                 yield PathDiagnostic("conflicting-keys", message, f"remove {extra}", (extra,), at_key=True)
         else:
-            yield from self.at_most_one("scenarios", "risk")
+            yield from self.choose(("scenarios", "risk"))
         if not listed and not self.stated(*SOURCES):
             hint = "add one of them, or list the plants: scenarios: [{b1: 3.2}, {b1: 4.0}]"
             keys = (*SOURCES, "scenarios")

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 
 from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.specification.yaml.files import is_outside, outside, read_text
-from inputdesign_cli.specification.yaml.places import Mark, Path, Places, format_key, parse_key
+from inputdesign_cli.specification.yaml.places import Path, Places, format_key, parse_key
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import MAX_DEPTH, Tree, read
 
@@ -18,7 +18,7 @@ _WHOLE = ("plant", "noise")
 _CLOCK = ("sample_time", "time_unit")
 
 
-def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], confine: FilePath | None) -> None:
+def apply_includes(tree: Tree, known: Collection[str], confine: FilePath | None) -> None:
     """Add the blocks of included files that the spec does not have; join other mappings key by key.
 
     A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
@@ -28,21 +28,20 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
     if not isinstance(tree.data, dict) or KEY not in tree.data:
         return
     stated = tree.data.pop(KEY)
-    names = stated if isinstance(stated, list) else [stated]
-    for number, name in enumerate(names):
+    for number, name in enumerate(stated if isinstance(stated, list) else [stated]):
         path: Path = (KEY, number) if isinstance(stated, list) else (KEY,)
         if not isinstance(name, str) or not name:
             raise _refused(tree, path, "{key} is not the name of a file", "write include: model.yaml")
-        if confine is not None and is_outside(folder / name, confine):
-            location = tree.places.location(tree.places.mark(path, at_key=True))
+        if confine is not None and is_outside(tree.folder / name, confine):
+            location = tree.places.at(path, at_key=True)
             raise SpecError(outside(name, confine, format_key(path), location))
-        included = _read(tree, path, folder, name)
+        included = _read(tree, path, name)
         found = included.data if isinstance(included.data, dict) else {}
         if KEY in found or not known & found.keys():
             what = "includes others itself" if KEY in found else "holds no blocks of a spec"
             raise _refused(tree, path, f"{name} {what}", "name a file with plant: and noise:")
         tree.included.append(name)
-        tree.places.sources.append(included.places.sources[0])
+        tree.places.files += included.places.files
         tree.diagnostics.extend(included.diagnostics)
         tree.broken |= included.broken
         for key, value in found.items():
@@ -50,15 +49,15 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
     tree.places.forget((KEY,))
 
 
-def _read(tree: Tree, path: Path, folder: FilePath, name: str) -> Tree:
-    file = folder / name
+def _read(tree: Tree, path: Path, name: str) -> Tree:
+    file = tree.folder / name
     try:
-        return read(read_text(file), str(file), source=len(tree.places.sources))
+        return read(read_text(file), str(file))
     except SpecError as error:
         found = error.diagnostics[0]
         if found.code.startswith("file-") and found.code != "file-encoding":
             raise _refused(tree, path, found.message, found.hint) from error
-        if found.code == "file-encoding" or is_outside(file, folder):
+        if found.code == "file-encoding" or is_outside(file, tree.folder):
             line = f", line {found.location.line}," if found.location else ""
             what = f"{name}{line} is not YAML of a spec"
             raise _refused(tree, path, what, "name a file of blocks") from error
@@ -75,7 +74,7 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
         for inner, item in value.items():
             _join(tree, included, (*path, inner), item)
     elif not (key in _CLOCK and holder[key] == value):
-        where = tree.places.location(included.places.mark(path, at_key=True))
+        where = included.places.at(path, at_key=True)
         place = f"{where.file}, line {where.line}" if where else "the included file"
         message = f"{{key}} stands here and in {place}"
         hint = "remove one of them: the spec and what it includes are put together"
@@ -87,8 +86,7 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
 
 
 def _refused(tree: Tree, path: Path, message: str, hint: str) -> SpecError:
-    key = format_key(path)
-    location = tree.places.location(tree.places.mark(path, at_key=True))
+    key, location = format_key(path), tree.places.at(path, at_key=True)
     return SpecError.because("bad-include", message.replace("{key}", key), hint, key, location)
 
 
@@ -98,16 +96,19 @@ def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
     A wrong override becomes a diagnostic of the tree. Missing mappings are created.
     """
     for override in overrides:
+        key, equals, text = override.partition("=")
         try:
-            _apply(tree, override)
+            where = _resolve(tree.data, key if equals else "", override)
+            if not text.strip():
+                hint = f"write {key.strip()}=VALUE, or {key.strip()}=null to remove the key"
+                raise _error(override, f"no value is given for {key.strip()}", hint, len(key) + 2)
+            value = read(text, f"--set {override}", before=key + equals, at=where)
         except SpecError as error:
             tree.diagnostics.extend(error.diagnostics)
-
-
-def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError:
-    """Return the error of an override, at a column of its text."""
-    location = Location(f"--set {override}", 1, column, override.partition("\n")[0])
-    return SpecError.because("bad-override", message, hint, location=location)
+            continue
+        _put(tree, where, value)
+        tree.diagnostics.extend(value.diagnostics)
+        tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
 
 
 def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
@@ -115,25 +116,14 @@ def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
 
     Raises `SpecError` (`bad-override`): a key leads nowhere.
     """
-    mark = Mark(len(tree.places.sources), 1, 1)
-    tree.places.sources.append((file, []))
     for key, value in changes.items():
-        _put(tree, _resolve(tree.data, key, f"{key}=.."), Tree(value, Places()), mark)
+        _put(tree, _resolve(tree.data, key, f"{key}=.."), Tree(value, Places([file])))
 
 
-def _apply(tree: Tree, override: str) -> None:
-    key, equals, text = override.partition("=")
-    name = key.strip()
-    where = _resolve(tree.data, key if equals else "", override)
-    if not text.strip():
-        hint = f"write {name}=VALUE, or {name}=null to remove the key"
-        raise _error(override, f"no value is given for {name}", hint, len(key) + 2)
-    number = len(tree.places.sources)
-    value = read(text, f"--set {override}", source=number, before=key + equals, at=where)
-    tree.places.sources.append(value.places.sources[0])
-    _put(tree, where, value, Mark(number, 1, 1))
-    tree.diagnostics.extend(value.diagnostics)
-    tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
+def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError:
+    """Return the error of an override, at a column of its text."""
+    location = Location(f"--set {override}", 1, column, override.partition("\n")[0])
+    return SpecError.because("bad-override", message, hint, location=location)
 
 
 def _resolve(data: Plain, key: str, override: str) -> Path:
@@ -163,21 +153,24 @@ def _resolve(data: Plain, key: str, override: str) -> Path:
     return tuple(found)
 
 
-def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
-    if not isinstance(tree.data, dict):
-        tree.data = {}
-    places = tree.places
-    node: Plain = tree.data
+def _put(tree: Tree, path: Path, value: Tree) -> None:
+    """Put the data of `value` at a path; all that is new has the first place of its text."""
+    places, (file, *_) = tree.places, value.places.files
+    root = value.places.values.get(path)
+    place = Location(file, 1, 1, root.text if root else "")
+    places.files.append(file)
+    node: Plain = tree.data if isinstance(tree.data, dict) else {}
+    tree.data = node
     for depth, step in enumerate(path[:-1], start=1):
         child = node.get(step) if isinstance(node, dict) else node[step]
         if child is None:
             child = node[step] = {}
-            places.keys[path[:depth]] = places.values[path[:depth]] = mark
+            places.keys[path[:depth]] = places.values[path[:depth]] = place
         node = child
     places.forget(path)
     if value.data is None and isinstance(node, dict):
         node.pop(path[-1], None)
         return
     node[path[-1]] = value.data
-    places.keys[path] = places.values[path] = mark
+    places.keys[path] = places.values[path] = place
     places.adopt(value.places, path)

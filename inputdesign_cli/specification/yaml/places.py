@@ -5,11 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
-from typing import NamedTuple
 
 from inputdesign_cli.errors import Location
-from inputdesign_cli.specification.yaml.plain import Plain
 
 Path = tuple[str | int, ...]
 
@@ -42,72 +39,41 @@ def parse_key(key: str) -> Path:
     return tuple(steps)
 
 
-class Mark(NamedTuple):
-    """A place: the number of its source (0 is the spec file), line and column from 1."""
-
-    source: int
-    line: int
-    column: int
-
-
 @dataclass
 class Places:
-    """The marks of every key and value, by path.
+    """The locations of every key and value, by path; `files` are the texts read so far, in their order.
 
     `keys` holds where a key is written. `values` holds where a diagnostic about its value points: to the
     value, and for a mapping to its key, because a block mapping begins on the line below.
     """
 
-    sources: list[tuple[str, list[str]]] = field(default_factory=list)
-    keys: dict[Path, Mark] = field(default_factory=dict)
-    values: dict[Path, Mark] = field(default_factory=dict)
+    files: list[str] = field(default_factory=list)
+    keys: dict[Path, Location] = field(default_factory=dict)
+    values: dict[Path, Location] = field(default_factory=dict)
 
-    def mark(self, path: Path, *, at_key: bool = False) -> Mark | None:
-        """Return the mark of `path`, or of its deepest ancestor that was written."""
-        found = self._known(path)
-        if at_key and found == path and found in self.keys:
-            return self.keys[found]
-        return self.values.get(found)
-
-    def location(self, mark: Mark | None) -> Location | None:
-        """Return the mark as a `Location` with its file and the text of its line."""
-        if mark is None or mark.source >= len(self.sources):
-            return None
-        file, lines = self.sources[mark.source]
-        text = lines[mark.line - 1] if 0 < mark.line <= len(lines) else ""
-        return Location(file, mark.line, mark.column, text)
+    def at(self, path: Path, *, at_key: bool = False) -> Location | None:
+        """Return the location of `path`, or of its deepest ancestor that was written."""
+        known: Path = ()
+        for step in path:
+            places = (step, int(step) if isinstance(step, str) and step.isdecimal() else step)
+            found = next((one for one in places if (*known, one) in self.values), None)
+            if found is None:
+                at_key = False
+                break
+            known = (*known, found)
+        return self.keys[known] if at_key and known in self.keys else self.values.get(known)
 
     def copy(self) -> Places:
         """Return places that may change while these stay."""
-        return Places(list(self.sources), dict(self.keys), dict(self.values))
+        return Places(list(self.files), dict(self.keys), dict(self.values))
 
     def adopt(self, other: Places, path: Path) -> None:
-        """Take over the marks of `path` and of all below it."""
+        """Take over the locations of `path` and of all below it."""
         for mine, theirs in ((self.keys, other.keys), (self.values, other.values)):
-            mine.update({p: mark for p, mark in theirs.items() if p[: len(path)] == path})
+            mine.update({p: place for p, place in theirs.items() if p[: len(path)] == path})
 
     def forget(self, path: Path) -> None:
-        """Drop the marks of `path` and of all below it (an override has replaced them)."""
+        """Drop the locations of `path` and of all below it (an override has replaced them)."""
         for table in (self.keys, self.values):
             for known in [p for p in table if p[: len(path)] == path]:
                 del table[known]
-
-    def _known(self, path: Path) -> Path:
-        known: Path = ()
-        for step in path:
-            if (*known, step) in self.values:
-                known = (*known, step)
-            elif isinstance(step, str) and step.isdecimal() and (*known, int(step)) in self.values:
-                known = (*known, int(step))
-            else:
-                break
-        return known
-
-
-@dataclass
-class Source:
-    """The data, places and folder of a spec's file; empty for a spec that was built in Python."""
-
-    data: dict[str, Plain] = field(default_factory=dict)
-    places: Places = field(default_factory=Places)
-    folder: FilePath = field(default_factory=FilePath)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 
 import yaml
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
-from inputdesign_cli.specification.yaml.places import Mark, Path, Places, format_key
+from inputdesign_cli.specification.yaml.places import Path, Places, format_key
 from inputdesign_cli.specification.yaml.plain import FORBIDDEN_IN_TEXT, Plain
 from inputdesign_cli.specification.yaml.scalars import clip, resolve
 
@@ -51,11 +52,12 @@ class Tree:
     """The nested dicts, lists and scalars of a text, their places, and what was wrong on the way.
 
     `diagnostics` did not stop the reading; `broken` are the paths where something is lost; `included` are the
-    files whose blocks it has, as it names them.
+    files whose blocks it has, as it names them: relative names start in the `folder`.
     """
 
-    data: Plain
-    places: Places
+    data: Plain = field(default_factory=dict)
+    places: Places = field(default_factory=Places)
+    folder: FilePath = field(default_factory=FilePath)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     broken: set[Path] = field(default_factory=set)
     included: list[str] = field(default_factory=list)
@@ -67,26 +69,25 @@ class Tree:
         return self
 
 
-def read(text: str, file: str, *, source: int = 0, before: str = "", at: Path = ()) -> Tree:
+def read(text: str, file: str, *, before: str = "", at: Path = ()) -> Tree:
     """Read one YAML document; the tree has the diagnostics of single keys.
 
-    Its marks carry the number `source` (see `Places`). `before` stands before the text on its first line,
-    as `key=` of an override. `at` is the path of its root in a larger tree. Raises `SpecError`: it is not
-    YAML, too deep or too large.
+    `before` stands before the text on its first line, as `key=` of an override. `at` is the path of its root
+    in a larger tree. Raises `SpecError`: it is not YAML, too deep or too large.
     """
-    lines = (before + text).splitlines()
-    tree = Tree(None, Places(sources=[(file, lines)]))
-    document = _Document(file, lines, len(before), source, tree)
+    tree = Tree(None, Places([file]))
+    document = _Document(file, (before + text).splitlines(), len(before), tree)
     if bad := _FORBIDDEN.search(text):
         above = (text[: bad.start()] + "|").splitlines()
         message = f"the text holds a character that YAML does not allow (U+{ord(bad.group()):04X})"
-        mark = Mark(source, len(above), len(above[-1]) + (len(before) if len(above) == 1 else 0))
-        raise document.error("file-encoding", message, mark, "remove it; a spec is plain UTF-8 text")
+        hint = "remove it; a spec is plain UTF-8 text"
+        location = document.location(len(above), len(above[-1]))
+        raise SpecError.because("file-encoding", message, hint, location=location)
     try:
         document.check_size(text)
         node = yaml.compose(text, Loader=_Loader)
     except yaml.YAMLError as error:
-        raise syntax_error(error, file, lines, len(before)) from None
+        raise document.syntax_error(error) from None
     document.count = 0
     if node is not None:
         tree.data = document.value(node, at, None)
@@ -95,23 +96,22 @@ def read(text: str, file: str, *, source: int = 0, before: str = "", at: Path = 
 
 @dataclass
 class _Document:
-    """Turns the nodes of a text into plain data; marks and diagnostics go into the tree."""
+    """Turns the nodes of a text into plain data; locations and diagnostics go into the tree."""
 
     file: str
     lines: list[str]
     shift: int
-    source: int
     tree: Tree
     count: int = 0
 
-    def mark(self, node: Plain) -> Mark:
-        """Return the place where a node or event begins in the text as the user wrote it."""
-        line, column = node.start_mark.line + 1, node.start_mark.column + 1
-        return Mark(self.source, line, column + (self.shift if line == 1 else 0))
+    def location(self, line: int, column: int) -> Location:
+        """Return a place of the text as the user wrote it, counted from 1."""
+        text = self.lines[line - 1] if 0 < line <= len(self.lines) else ""
+        return Location(self.file, line, column + (self.shift if line == 1 else 0), text)
 
-    def error(self, code: str, message: str, mark: Mark, hint: str) -> SpecError:
-        """Return the error that stops the reading."""
-        return SpecError.because(code, message, hint, location=self._location(mark))
+    def begin(self, node: Plain) -> Location:
+        """Return the place where a node or event begins."""
+        return self.location(node.start_mark.line + 1, node.start_mark.column + 1)
 
     def check_size(self, text: str) -> None:
         """Refuse a large text by its events, before its nodes (`yaml-limit`, `several-documents`)."""
@@ -121,7 +121,7 @@ class _Document:
             if documents > 1:
                 hint = "a file holds one spec; put the other into a file of its own"
                 what = 'a second document begins here ("---")'
-                raise self.error("several-documents", what, self.mark(event), hint)
+                raise SpecError.because("several-documents", what, hint, location=self.begin(event))
             if isinstance(event, yaml.NodeEvent):
                 self._spend(event, depth)
             depth += isinstance(event, yaml.CollectionStartEvent)
@@ -137,21 +137,17 @@ class _Document:
         elif depth > MAX_DEPTH:
             message = f"lists and mappings are nested more than {MAX_DEPTH} deep"
         if message:
-            raise self.error("yaml-limit", message, self.mark(node), hint)
+            raise SpecError.because("yaml-limit", message, hint, location=self.begin(node))
 
-    def _location(self, mark: Mark) -> Location:
-        text = self.lines[mark.line - 1] if 0 < mark.line <= len(self.lines) else ""
-        return Location(self.file, mark.line, mark.column, text)
-
-    def value(self, node: Plain, path: Path, key: Mark | None) -> Plain:
-        """Return the plain data of a node; `key` marks the key in front, if there is one."""
+    def value(self, node: Plain, path: Path, key: Location | None) -> Plain:
+        """Return the plain data of a node; `key` is the place of the key in front, if there is one."""
         self._spend(node, len(path))
-        mark, mapping = self.mark(node), isinstance(node, yaml.MappingNode)
-        self.tree.places.values[path] = key if mapping and key else mark
+        place, mapping = self.begin(node), isinstance(node, yaml.MappingNode)
+        self.tree.places.values[path] = key if mapping and key else place
+        whole = format_key(path) or "the spec"
         if node.tag not in _TAGS.values():
-            message = f"{format_key(path) or 'the spec'} carries the tag {clip(node.tag)}"
             hint = "remove the tag: a spec holds plain numbers, texts, lists and mappings"
-            self._complain("yaml-tag", message, hint, path, mark)
+            self._complain("yaml-tag", f"{whole} carries the tag {clip(node.tag)}", hint, path, place)
         if mapping:
             return self._mapping(node, path)
         if isinstance(node, yaml.SequenceNode):
@@ -159,9 +155,8 @@ class _Document:
         if node.style in (None, ""):
             return resolve(node.value)
         if bad := FORBIDDEN_IN_TEXT.search(node.value):
-            what = f"the unprintable character U+{ord(bad.group()):04X}"
-            message = f"{format_key(path) or 'the spec'} holds {what}"
-            self._complain("bad-text", message, "remove the escape that makes it", path, mark, lost=path)
+            message = f"{whole} holds the unprintable character U+{ord(bad.group()):04X}"
+            self._complain("bad-text", message, "remove the escape that makes it", path, place, lost=path)
             return ""
         return node.value
 
@@ -169,60 +164,53 @@ class _Document:
         data: dict[str, Plain] = {}
         keys = self.tree.places.keys
         for name_node, value in node.value:
-            mark, name = self.mark(name_node), name_node.value
+            place, name, here = self.begin(name_node), name_node.value, (*path, name_node.value)
             if not isinstance(name_node, yaml.ScalarNode) or FORBIDDEN_IN_TEXT.search(name):
                 message = f"a key of {format_key(path) or 'the spec'} is not a word"
                 hint = 'keys are plain words; a list or mapping goes behind a colon ("key: value")'
-                self._complain("bad-key", message, hint, path, mark, lost=path)
-                continue
-            here = (*path, name)
-            if name == "<<" and name_node.style in (None, ""):
+                self._complain("bad-key", message, hint, path, place, lost=path)
+            elif name == "<<" and name_node.style in (None, ""):
                 message = 'the merge key "<<" is not supported'
                 hint = "write the keys out; an anchor (&name) and alias (*name) may stand for a whole value"
-                self._complain("yaml-merge-key", message, hint, here, mark, lost=path)
+                self._complain("yaml-merge-key", message, hint, here, place, lost=path)
             elif name in data:
-                where = " and on line ".join(str(line) for line in sorted({keys[here].line, mark.line}))
+                where = " and on line ".join(str(line) for line in sorted({keys[here].line, place.line}))
                 message = f"{format_key(here)} is given twice, on line {where}"
-                self._complain("duplicate-key", message, "keep one of the two", here, mark)
+                self._complain("duplicate-key", message, "keep one of the two", here, place)
             else:
-                keys[here] = mark
-                data[name] = self.value(value, here, mark)
+                keys[here] = place
+                data[name] = self.value(value, here, place)
         return data
 
     def _complain(
-        self, code: str, message: str, hint: str, path: Path, mark: Mark, lost: Path | None = None
+        self, code: str, message: str, hint: str, path: Path, place: Location, lost: Path | None = None
     ) -> None:
         # The value is read all the same: what else is wrong with it is worth saying.
-        self.tree.diagnostics.append(Diagnostic(code, message, hint, format_key(path), self._location(mark)))
+        self.tree.diagnostics.append(Diagnostic(code, message, hint, format_key(path), place))
         if lost is not None:
             self.tree.broken.add(lost)
 
-
-def syntax_error(error: yaml.YAMLError, file: str, lines: list[str], shift: int = 0) -> SpecError:
-    """Return the parser's error with its place; `shift` columns are added on the first line."""
-    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-    line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
-    column += shift if line == 1 else 0
-    if line > len(lines):
-        # The end of the file: point behind the last character that was written.
-        line = max(len(lines), 1)
-        while line > 1 and not lines[line - 1].strip():
-            line -= 1
-        column = len(lines[line - 1].rstrip()) + 1 if lines else 1
-    text = lines[line - 1] if lines else ""
-    message, hint = _meaning(error, text[column - 1 : column])
-    opened = getattr(error, "context_mark", None)
-    if opened is not None and opened.line + 1 != line and "closed" in message:
-        message += f" (it begins on line {opened.line + 1})"
-    location = Location(file, line, column, text)
-    return SpecError.because("yaml-syntax", message, hint, location=location)
+    def syntax_error(self, error: yaml.YAMLError) -> SpecError:
+        """Return the parser's error with its place, in plain words."""
+        opened = getattr(error, "context_mark", None)
+        mark = getattr(error, "problem_mark", None) or opened
+        place = self.location(mark.line + 1, mark.column + 1) if mark is not None else self.location(1, 1)
+        if place.line > len(self.lines):
+            # The end of the file: point behind the last character that was written.
+            line = max((i for i, one in enumerate(self.lines, 1) if one.strip()), default=1)
+            text = self.lines[line - 1] if self.lines else ""
+            place = Location(self.file, line, len(text.rstrip()) + 1, text)
+        message, hint = _meaning(error, place.text[place.column - 1 : place.column])
+        if opened is not None and opened.line + 1 != place.line and "closed" in message:
+            message += f" (it begins on line {opened.line + 1})"
+        return SpecError.because("yaml-syntax", message, hint, location=place)
 
 
 def _meaning(error: yaml.YAMLError, character: str) -> tuple[str, str]:
-    problem = " ".join(str(part) for part in (getattr(error, "problem", ""), getattr(error, "context", "")))
-    if "cannot start any token" in problem or character == "\t":
-        if character == "\t":
-            return "a tab is used where YAML wants spaces", "indent with spaces"
+    problem = " ".join(str(getattr(error, part, "")) for part in ("problem", "context"))
+    if character == "\t":
+        return "a tab is used where YAML wants spaces", "indent with spaces"
+    if "cannot start any token" in problem:
         return f'a value cannot begin with "{character}"', "put the text in quotes"
     for pattern, message, hint in _MEANINGS:
         if re.search(pattern, problem):

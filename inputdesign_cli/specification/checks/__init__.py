@@ -1,1 +1,0 @@
-"""What must hold across the sections of a spec."""
