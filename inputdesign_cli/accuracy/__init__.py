@@ -28,11 +28,11 @@ from inputdesign_cli.accuracy.model_error import (
     OnModelError as OnModelError,
     model_errors as model_errors,
 )
-from inputdesign_cli.accuracy.over_frequency import active_entries as active_entries
 from inputdesign_cli.accuracy.requirement import (
     Entry as Entry,
     Requirement as Requirement,
     Violation as Violation,
+    active_entries as active_entries,
     inverse_factor as inverse_factor,
     worst as worst,
 )

@@ -82,6 +82,7 @@ class Problem:
     finer: Problem | None = field(default=None, repr=False)
     seen: Demands | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
+    _elsewhere: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
     def demands(self) -> Demands:
@@ -112,7 +113,11 @@ class Problem:
 
     def on(self, basis: Basis) -> Problem:
         """Return the problem on another basis, for example one that has grown out of this one."""
-        return self if basis is self.basis else replace(self, basis=basis, finer=None)
+        if basis is self.basis:
+            return self
+        if not self._elsewhere or self._elsewhere[0].basis is not basis:
+            self._elsewhere[:] = [replace(self, basis=basis, finer=None)]
+        return self._elsewhere[0]
 
     def grown(self, basis: Basis) -> Problem:
         """Return the problem on a basis that begins with this one, and keep the integrals computed so far."""
@@ -236,7 +241,7 @@ class Problem:
 
     def cost_at(self, x: Array) -> float:
         """Return the cost of a spectrum (goal "cost")."""
-        return max(cost.at(x) for cost in self.costs)
+        return max([cost.at(x) for cost in self.costs])
 
     def _cost_of(self, scenarios: range) -> Functional:
         """Return the mean of the costs at these plants."""

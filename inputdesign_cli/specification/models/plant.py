@@ -176,7 +176,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         rows = transfer.as_matrix(named.expressed(self.written.get("B", self.B)))
         return tuple(tuple(named.leading(entry) for entry in row) for row in rows)
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Return the numbers of outputs and inputs."""
         return transfer.size_of(self.B)
