@@ -16,9 +16,8 @@ from inputdesign_cli.cli.designs import analyse, simulate, solve, validate
 from inputdesign_cli.cli.options import declared
 from inputdesign_cli.cli.reference import examples, explain, init, schema
 from inputdesign_cli.cli.signal import signal
-from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
-from inputdesign_cli.cli.terminal import guarded
+from inputdesign_cli.cli.terminal import guarded, prepare_signals, prepare_streams
 from inputdesign_cli.cli.watch import report, watch
 from inputdesign_cli.cli.wizard import wizard
 from inputdesign_cli.compute.executor import use_one_thread

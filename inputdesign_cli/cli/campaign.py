@@ -69,7 +69,7 @@ def proceed(
         raise typer.BadParameter("withdraw first, then say it without a record", param_hint="--regardless")
     with computing(directory, quiet=quiet):
         from inputdesign_cli import questions
-        from inputdesign_cli.outcome.record import SPEC
+        from inputdesign_cli.outcome.run_files import SPEC
         from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
         from inputdesign_cli.specification import parse_spec
@@ -104,8 +104,8 @@ def status(directory: Path, *, json_output: bool = False) -> None:
         typer.echo(json_text(memory.campaign), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
-    from inputdesign_cli.outcome.record import RESULT, readable
     from inputdesign_cli.outcome.run_directory import read_outcome
+    from inputdesign_cli.outcome.run_files import RESULT, readable
 
     with readable(directory / RESULT):
         text = summary(read_outcome(directory), memory.campaign.time_unit, [])

@@ -16,8 +16,8 @@ from inputdesign_cli.errors import STANDARD_STREAM, OutputError, bad_spec
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.outcome.origin import Origin
     from inputdesign_cli.outcome.results import Results
+    from inputdesign_cli.outcome.run_directory import Origin
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.specification.models.realisation import Figures
 
@@ -83,7 +83,7 @@ class Place:
     @property
     def origin(self) -> Origin:
         """Return the origin of the run: its files and the text of its spec."""
-        from inputdesign_cli.outcome.origin import Origin
+        from inputdesign_cli.outcome.run_directory import Origin
 
         return Origin(self.sources, self.asked, self.into.overwrite, self.judges)
 
@@ -95,7 +95,7 @@ class Place:
         """
         place = self if spec is None else replace(self, asked=spec.to_yaml(), figures=spec.figures)
         if not place.into.no_output:
-            from inputdesign_cli.outcome.origin import check_place
+            from inputdesign_cli.outcome.run_directory import check_place
 
             check_place(place.directory, place.origin, place.spared(place.asked))
         return place
@@ -109,7 +109,7 @@ class Place:
         Raises:
             OutputError: `output-is-the-spec`, it would say something else.
         """
-        from inputdesign_cli.outcome.record import SPEC
+        from inputdesign_cli.outcome.run_files import SPEC
         from inputdesign_cli.specification import same_content
         from inputdesign_cli.specification.yaml.files import read_text
 
@@ -163,8 +163,7 @@ def renew(
         OutputError: as `write_run`.
     """
     with status(f"{directory}: writing ...", quiet=shown.quiet):
-        from inputdesign_cli.outcome.origin import has_other_values
-        from inputdesign_cli.outcome.run_directory import replace_text, write_run
+        from inputdesign_cli.outcome.run_directory import has_other_values, replace_text, write_run
 
         drawings = {}
         if shown.figures:
@@ -176,7 +175,7 @@ def renew(
         replaced = has_other_values(directory, results.resolved_spec)
         files = write_run(results, directory, drawings, origin=origin)
         if page:
-            from inputdesign_cli.outcome.record import PAGE
+            from inputdesign_cli.outcome.run_files import PAGE
             from inputdesign_cli.report.render import report_text
 
             replace_text(directory / PAGE, report_text(directory))

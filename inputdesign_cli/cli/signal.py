@@ -152,8 +152,7 @@ def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, floa
 def _write(file: Path, results: Results) -> None:
     """Write one file of the kind that its ending names."""
     from inputdesign_cli.outcome.run_directory import write_bytes
-    from inputdesign_cli.outcome.signal_files import WRITERS
-    from inputdesign_cli.outcome.text_formats import csv_text
+    from inputdesign_cli.outcome.text_formats import WRITERS, csv_text
 
     table, ending = results.tables["signal"], file.suffix.removeprefix(".").lower()
     if ending == "png":

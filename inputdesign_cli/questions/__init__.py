@@ -1,6 +1,6 @@
 """The verbs take a spec and return results. A spec becomes a task once; the task does not know the spec.
 
-A verb imports its question when it is called, so that a command waits for no other.
+A question is imported when it is asked, so that a command waits for no other.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import yaml
 
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
 from inputdesign_cli.outcome.results import Result, Results
@@ -23,7 +24,6 @@ from inputdesign_cli.specification import Spec, load_spec, parse_spec
 if TYPE_CHECKING:
     import control
 
-    from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.explore import Family
     from inputdesign_cli.outcome.golden import Golden, GoldenRun
     from inputdesign_cli.questions.assessment.assess import Assessment
@@ -44,22 +44,17 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
-    from inputdesign_cli.questions.task import build_task
-
     return _in_time(spec, lambda: build_task(spec).solve())
 
 
 def analyse(spec: Spec) -> Results:
     """Return the accuracy that a given excitation gives, without any design. It raises as `solve` does."""
-    from inputdesign_cli.questions.task import build_analysis
-
     return _in_time(spec, lambda: build_analysis(spec).solve())
 
 
 def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing: the design, or the estimation where none is asked for."""
     from inputdesign_cli.questions.assessment.build import build_identification
-    from inputdesign_cli.questions.task import build_task
 
     with _placed(spec):
         build_task(spec) if spec.asks_for_design else build_identification(spec)
@@ -72,8 +67,6 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
         executor: where batches of runs are computed (default: in this process); the result does not depend
             on it.
     """
-    from inputdesign_cli.questions.task import build_task
-
     return _in_time(spec, lambda: build_task(spec).simulate(executor))
 
 
@@ -278,3 +271,67 @@ def _placed(spec: Spec) -> Iterator[None]:
             yield
     except IdesignError as error:
         raise spec.place(error) from error
+
+
+class Task(Protocol):
+    """Holds a question that was built and checked.
+
+    Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`). The verbs
+    add its place in a file (`Spec.place`).
+    """
+
+    def solve(self) -> Results:
+        """Return a design with its proof, or the accuracy that a given excitation gives."""
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """Return the answer of `solve`, with the experiment tried many times on the true system.
+
+        Args:
+            executor: where batches of runs are computed (default: in this process).
+        """
+
+
+def build_analysis(spec: Spec) -> Task:
+    """Return the task of a given excitation, whatever is asked of it.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    if spec.accuracy.frequency_response is not None and not spec.designs:
+        return _response(spec)
+    from inputdesign_cli.questions.given.build import build_given
+
+    return build_given(spec)
+
+
+def build_task(spec: Spec) -> Task:
+    """Return the task of a spec; everything that can be wrong with the spec is reported here.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    if spec.campaign is not None:
+        from inputdesign_cli.questions.campaign.build import build_campaign
+
+        return build_campaign(spec)
+    if not spec.designs:
+        return build_analysis(spec)
+    if spec.accuracy.frequency_response is not None:
+        return _response(spec)
+    if spec.plant.kind == "regression":
+        from inputdesign_cli.questions.regression.build import build_regression_task
+
+        return build_regression_task(spec)
+    if spec.accuracy.closed_loop_error is not None:
+        from inputdesign_cli.questions.loop_error.build import build_loop_error_task
+
+        return build_loop_error_task(spec)
+    from inputdesign_cli.questions.least_cost.build import build_convex
+
+    return build_convex(spec)
+
+
+def _response(spec: Spec) -> Task:
+    from inputdesign_cli.questions.frequency_response.build import build_response_task
+
+    return build_response_task(spec)

@@ -14,8 +14,8 @@ from typing import get_args
 
 from inputdesign_cli.errors import STANDARD_STREAM, Location, OutputError, SpecError, bad_spec
 from inputdesign_cli.figures.sweep_table import SweepAxis, SweepContent, read_content
-from inputdesign_cli.outcome.origin import digest
-from inputdesign_cli.outcome.record import environment
+from inputdesign_cli.outcome.run_directory import digest
+from inputdesign_cli.outcome.run_files import environment
 from inputdesign_cli.questions import Verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, Sweep, read_template

@@ -4,7 +4,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, simulate
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.report.evidence import simulation_table
+from inputdesign_cli.report.facts import simulation_table
 from tests.support.outcomes import typed
 
 SPEC = """
