@@ -10,7 +10,7 @@ import typer
 
 from inputdesign_cli.cli.options import Changes, Into, Shown
 from inputdesign_cli.cli.rows import Written, levels
-from inputdesign_cli.cli.run import Place, keep, name_of, read_spec, renew
+from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 
@@ -87,8 +87,8 @@ def proceed(
                 taken = replace(written.preparation(), operating_point=levels(operating_point))
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
-        shown = Shown(figures, json_output=json_output, quiet=quiet)
-        renew(results, directory, shown, stated.figures)
+        place = Place(Into(directory), figures=stated.figures)
+        keep(results, place, Shown(figures, json_output=json_output, quiet=quiet))
     code = _EXIT[results.result["status"]]
     if code:
         raise typer.Exit(code)
