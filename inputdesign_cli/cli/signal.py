@@ -26,7 +26,7 @@ _SMALLEST, _LARGEST = 1e-15, 1e15
 
 @dataclass(frozen=True)
 class Form:
-    """Holds the kinds of signals, of which one is made, with its length, its range, and more of some kinds."""
+    """Holds the kinds of signals, of which one is made, its length and range, and options of some kinds."""
 
     prbs: int | None = None
     multisine: int | None = None
