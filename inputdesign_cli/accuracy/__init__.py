@@ -14,14 +14,14 @@ from inputdesign_cli.accuracy.criteria import (
     InformationTarget as InformationTarget,
     criterion_of as criterion_of,
 )
-from inputdesign_cli.accuracy.cut import (
+from inputdesign_cli.accuracy.cuts import (
     ConcaveFunction as ConcaveFunction,
     Cut as Cut,
     CutBlock as CutBlock,
     Inequality as Inequality,
+    MatrixCut as MatrixCut,
     positive_part as positive_part,
 )
-from inputdesign_cli.accuracy.cuts import MatrixCut as MatrixCut
 from inputdesign_cli.accuracy.ellipsoid import EllipsoidError as EllipsoidError
 from inputdesign_cli.accuracy.model_error import (
     ModelError as ModelError,

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.cut import Cut
+from inputdesign_cli.accuracy.cuts import Cut
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment

@@ -31,7 +31,7 @@ def read_spec(file: Path, changes: Changes, *, design: bool | None = True) -> Sp
     Raises:
         SpecError: as `load_spec`.
     """
-    from inputdesign_cli import specification
+    import inputdesign_cli.specification as specification
 
     overrides, confine = changes.overrides or (), changes.confine
     if str(file) != STANDARD_STREAM:

@@ -35,6 +35,7 @@ from inputdesign_cli.outcome.run_files import (
     SPEC,
     environment,
     heal,
+    known_result,
     load_result,
     owned_files,
     put_in_place,
@@ -124,10 +125,7 @@ def check_place(directory: Path, origin: Origin, spec: str) -> None:
 
 def has_other_values(directory: Path, spec: str) -> bool:
     """Return whether the directory holds a run whose `spec.yaml` differs from this one."""
-    try:
-        return load_result(directory).get("spec_sha256") not in (None, digest(spec))
-    except DataError:
-        return False
+    return known_result(directory).get("spec_sha256") not in (None, digest(spec))
 
 
 def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
@@ -136,10 +134,7 @@ def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
     Raises:
         DataError: `data-repeated`.
     """
-    try:
-        result = load_result(spec.parent) if spec.name == SPEC else {}
-    except DataError:
-        return
+    result = known_result(spec.parent) if spec.name == SPEC else {}
     assessment, counted = result.get("assessment"), result.get("made_from")
     if not (isinstance(assessment, dict) and "top_up_status" in assessment and isinstance(counted, list)):
         return
@@ -189,12 +184,8 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
         OutputError: `output-other-run`; `output-spec-changed` and `output-signal-changed`, the user has
             worked on `spec.yaml` or `signal.csv` there; `campaign-exists`, its records would be lost.
     """
-    written, signal = _content(target / SPEC), _content(target / SIGNAL)
-    try:
-        result = load_result(target)
-    except DataError:
-        return
-    if written is None:
+    result, written, signal = known_result(target), _content(target / SPEC), _content(target / SIGNAL)
+    if not result or written is None:
         return
     campaign = result.get("campaign")
     records = campaign.get("records") if isinstance(campaign, dict) else None

@@ -63,12 +63,18 @@ def load_result(directory: Path) -> dict[str, Any]:
     return result
 
 
+def known_result(directory: Path) -> dict[str, Any]:
+    """Return the content of `result.json`; empty where there is none that can be read."""
+    try:
+        return load_result(directory) if os.path.lexists(directory / RESULT) else {}
+    except DataError:
+        return {}
+
+
 def listed_files(directory: Path) -> list[str]:
     """Return the names of the files of the run in `directory`, `result.json` first; none without a run."""
-    try:
-        return list(dict.fromkeys([RESULT, *load_result(directory).get("files", ())]))
-    except DataError:
-        return []
+    result = known_result(directory)
+    return list(dict.fromkeys([RESULT, *result.get("files", ())])) if result else []
 
 
 def owned_files(directory: Path) -> list[str]:
