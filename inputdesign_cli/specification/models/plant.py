@@ -75,12 +75,12 @@ class NamedPlant(Section):
         """Return the numbers of outputs and inputs."""
         raise NotImplementedError
 
-    @property
+    @cached_property
     def outputs(self) -> int:
         """Return the number of outputs."""
         return self.shape[0]
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Return the number of inputs."""
         return self.shape[1]
