@@ -41,7 +41,7 @@ from inputdesign_cli import load_spec
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.spectrum import LinesBasis
 
 T = TypeVar("T")

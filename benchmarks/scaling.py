@@ -40,7 +40,7 @@ import numpy as np
 from rivals.naive_exchange import GRID, naive
 
 from inputdesign_cli.design.convex.designs import Design, solve_design
-from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.specification import parse_spec
 
 ROOT = Path(__file__).parent.parent

@@ -35,7 +35,7 @@ from inputdesign_cli import load_spec
 from inputdesign_cli.compute.executor import InProcess
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.figures.sweep_table import read_sweep
-from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.sweeps.notebook import sweep
 
 ROOT = Path(__file__).parent.parent

@@ -17,8 +17,8 @@ import numpy as np
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.outcome.record import load_result
 from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.run_files import load_result
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.build import build_campaign
 from inputdesign_cli.questions.campaign.trials import energy_of

@@ -14,25 +14,25 @@ from inputdesign_cli.accuracy.criteria import (
     InformationTarget as InformationTarget,
     criterion_of as criterion_of,
 )
-from inputdesign_cli.accuracy.cut import (
+from inputdesign_cli.accuracy.cuts import (
     ConcaveFunction as ConcaveFunction,
     Cut as Cut,
     CutBlock as CutBlock,
     Inequality as Inequality,
+    MatrixCut as MatrixCut,
     positive_part as positive_part,
 )
-from inputdesign_cli.accuracy.cuts import MatrixCut as MatrixCut
 from inputdesign_cli.accuracy.ellipsoid import EllipsoidError as EllipsoidError
 from inputdesign_cli.accuracy.model_error import (
     ModelError as ModelError,
     OnModelError as OnModelError,
     model_errors as model_errors,
 )
-from inputdesign_cli.accuracy.over_frequency import active_entries as active_entries
 from inputdesign_cli.accuracy.requirement import (
     Entry as Entry,
     Requirement as Requirement,
     Violation as Violation,
+    active_entries as active_entries,
     inverse_factor as inverse_factor,
     worst as worst,
 )

@@ -17,8 +17,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from inputdesign_cli.accuracy.cut import Cut
-from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut
+from inputdesign_cli.accuracy.cuts import Cut, DeterminantCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.accuracy.requirement import OneCondition, Requirement, inverse_factor
 from inputdesign_cli.arrays import Array
 

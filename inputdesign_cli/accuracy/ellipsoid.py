@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.cuts import EllipsoidCut
 from inputdesign_cli.accuracy.model_error import OnModelError
-from inputdesign_cli.accuracy.over_frequency import real_rows
 from inputdesign_cli.arrays import Array, ComplexArray
 
 _BISECTIONS = 80
@@ -50,7 +49,8 @@ class EllipsoidError(OnModelError):
         """Return real and imaginary parts of z, then of c, over |c_0|, (n, 4, k)."""
         z, c, start = self._forms(w)
         turned = np.conj(start) / np.abs(start) ** 2  # c_0 becomes 1
-        return np.concatenate([real_rows(z * turned[:, None]), real_rows(c * turned[:, None])], axis=1)
+        z, c = z * turned[:, None], c * turned[:, None]
+        return np.stack([z.real, z.imag, c.real, c.imag], axis=1)
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """Return alpha over the radius at which the ellipsoid first touches |z^T d| = |1 + c^T d|.

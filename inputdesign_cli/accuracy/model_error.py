@@ -19,8 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.admissible import AdmissibleError
 from inputdesign_cli.accuracy.cuts import MatrixCut
-from inputdesign_cli.accuracy.over_frequency import OverFrequency, largest_singular, turned
-from inputdesign_cli.accuracy.requirement import Requirement, inverse_factor
+from inputdesign_cli.accuracy.requirement import (
+    OverFrequency,
+    Requirement,
+    inverse_factor,
+    largest_singular,
+    turned,
+)
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import local_maxima

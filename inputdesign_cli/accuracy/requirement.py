@@ -1,17 +1,35 @@
-"""What the design asks of a requirement: is it met, where not, and which cones would mend it."""
+"""What the design asks of a requirement: is it met, where not, and which cones would mend it.
+
+A requirement is one condition, or one at every frequency of a band. A grid sees everything there, and peaks
+are polished between its points.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.cut import Cut
-from inputdesign_cli.arrays import Array
+from inputdesign_cli.accuracy.cuts import Cut
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model, graded_grid, local_maxima
+from inputdesign_cli.plant.frequencies import SLACK
 
 Entry = tuple[int, int]
+
+# The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
+_BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
+# Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
+_ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
+_GROWS = 5.0
+_KEPT = 8  # sets of frequencies whose rows are remembered at a time
 
 
 @dataclass(frozen=True)
@@ -92,6 +110,186 @@ class OneCondition(Requirement):
         return np.full(np.shape(frequencies), self.ratio(information))
 
 
+class _LastLook:
+    """Holds the last results of a requirement, since later calls often need them again."""
+
+    def __init__(self) -> None:
+        self.looked: tuple[Array, Array, Array] | None = None  # an information matrix, and what it gives
+        self._rows: dict[bytes, NDArray[np.float64]] = {}
+
+    def rows_at(self, w: Array, rows: Callable[[Array], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return `rows` (w), kept since a search for a peak often begins at the same points."""
+        key = w.tobytes()
+        if key not in self._rows:
+            if len(self._rows) >= _KEPT:
+                self._rows.clear()
+            self._rows[key] = rows(w)
+        return self._rows[key]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverFrequency(Requirement):
+    """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
+
+    It concerns one `entry` of G, or all of them together; `band` is in the unit of the experiment. Subclasses
+    give `rows`, often `measure`, and the points of the frequency plane near which they change fast
+    (`own_singularities`) or have a kink (`knots`).
+    """
+
+    experiment: Experiment
+    band: tuple[float, float]
+    entry: Entry | None = None
+
+    @property
+    def of_the_norm(self) -> bool:
+        """Return whether no entry is named, of several."""
+        return self.entry is None and self.experiment.model.outputs * self.experiment.model.inputs > 1
+
+    @property
+    @abstractmethod
+    def own_singularities(self) -> ComplexArray:
+        """Return the singularities other than from the plant and its loop."""
+
+    @property
+    def knots(self) -> Array:
+        """Return frequencies at which the ratio may have a kink."""
+        return np.zeros(0)
+
+    @abstractmethod
+    def rows(self, w: ArrayLike) -> NDArray[np.float64]:
+        """Return T(w), (n, q, k)."""
+
+    def measure(self, half: NDArray[np.float64], w: Array) -> Array:
+        """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
+        return largest_singular(half)
+
+    def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
+        """Return real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k).
+
+        In memory they stand as `turned` has them.
+        """
+        if self.entry is None:
+            gradient = self.experiment.plant_gradient(w)
+        else:
+            gradient = self.experiment.entry_gradient(w, *self.entry)
+        n, k = gradient.shape[:2]
+        flat = gradient.reshape(n, k, -1).transpose(1, 2, 0)
+        return np.concatenate([flat.real, flat.imag], axis=1).T
+
+    def concerned(self, G: ComplexArray) -> ComplexArray:
+        """Return the entry (n, 1) of G (n, p, r), or all of them (n, p r)."""
+        if self.entry is None:
+            return G.reshape(len(G), G.shape[1] * G.shape[2])
+        return G[:, self.entry[0], self.entry[1], None]
+
+    def nominal_size(self, w: ArrayLike) -> Array:
+        """Return |G| (n,) of the entry, or the Frobenius norm."""
+        return np.linalg.norm(self.concerned(self.experiment.model.plant_at(w)), axis=1)
+
+    @cached_property
+    def grid_singularities(self) -> ComplexArray:
+        """Return points of the frequency plane near which G, the requirement or the loop change fast."""
+        model = self.experiment.model
+        plant = model.singularities if self.entry is None else model.entry_singularities(*self.entry)
+        return np.concatenate([plant, self.experiment.singularities, self.own_singularities])
+
+    @cached_property
+    def grid(self) -> Array:
+        """Return frequencies of the band that see every resonance of G, the requirement and the loop."""
+        grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
+        # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
+        if self.poles_on_the_circle.size == 0:
+            return grid
+        clear = np.all(np.abs(grid[:, None] - self.poles_on_the_circle) > _HIDDEN * self.band[1], axis=1)
+        return grid[clear]
+
+    @cached_property
+    def poles_on_the_circle(self) -> Array:
+        """Return the frequencies of the band where G has a pole numerically on the unit circle."""
+        lo, hi = self.band
+        near = self.grid_singularities
+        places = np.unique(near.real[near.imag <= _ON_THE_CIRCLE])
+        inside = places[(places >= lo - _EDGE * hi) & (places <= hi * (1.0 + _EDGE))]
+        if inside.size == 0:
+            return inside
+        side = np.where(inside + 1e-5 * hi <= hi, 1e-6 * hi, -1e-6 * hi)
+        far, close = (self.nominal_size(inside + step * side) for step in (10.0, 1.0))
+        return inside[~np.isfinite(close) | (close > _GROWS * far)]
+
+    @cached_property
+    def _grid_rows(self) -> NDArray[np.float64]:
+        return self.rows(self.grid)
+
+    @cached_property
+    def _last(self) -> _LastLook:
+        return _LastLook()
+
+    def ratios(self, information: Array, frequencies: Array) -> Array:
+        """Return the ratio (n,) at given frequencies."""
+        rows = self._last.rows_at(frequencies, self.rows)
+        return self.measure(turned(rows, inverse_factor(information).T), frequencies)
+
+    def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
+        """Return local maxima of the ratio over the band, polished between the grid points."""
+        turn, on_grid = self._on_grid(information)
+        return self._polished(turn, on_grid, above)
+
+    def _on_grid(self, information: Array) -> tuple[Array, Array]:
+        """Return K^T with K^T K = M^-1, and the ratio on the grid.
+
+        Raises:
+            InaccurateError: `ratio-not-finite`.
+        """
+        turn, on_grid = self._looked(information)
+        if not np.all(np.isfinite(on_grid)):
+            raise InaccurateError.because(
+                "ratio-not-finite",
+                f"{self.name} has no finite value at {self.grid[~np.isfinite(on_grid)][0]:.6g} (in the "
+                "unit of the experiment)",
+                hint="restrict the band of the requirement, and rescale signals of extreme units",
+                key="accuracy",
+            )
+        return turn, on_grid
+
+    def _polished(self, turn: Array, on_grid: Array, above: float) -> list[Violation]:
+        w, ratio = local_maxima(
+            lambda w: self.measure(turned(self._last.rows_at(w, self.rows), turn), w),
+            self.grid,
+            on_grid,
+            above=above,
+        )
+        return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
+
+    def most(self, information: Array) -> float:
+        """Bound the ratio by the grid: a peak between them stands no higher than `local_maxima` admits."""
+        top = self.least(information)
+        return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
+
+    def least(self, information: Array) -> float:
+        """Return the largest ratio at the points of the grid; NaN where one is not finite."""
+        return float(self._looked(information)[1].max())
+
+    def _looked(self, information: Array) -> tuple[Array, Array]:
+        """Return K^T with K^T K = M^-1, and the ratio on the grid, finite or not."""
+        seen = self._last.looked
+        if seen is None or not np.array_equal(seen[0], information):
+            turn = inverse_factor(information).T
+            seen = information.copy(), turn, self.measure(turned(self._grid_rows, turn), self.grid)
+            self._last.looked = seen
+        return seen[1:]
+
+    def worst(self, information: Array) -> Violation:
+        """Return the largest violation. A peak next to frequency zero counts as at zero."""
+        turn, on_grid = self._on_grid(information)
+        # A peak that ends below the highest point of the grid is not the largest.
+        found = worst(self._polished(turn, on_grid, float(on_grid.max()) * (1.0 - _ROUNDING)))
+        lo, hi = self.band
+        if found.frequency is None or lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
+            return found
+        at_zero = float(self.ratios(information, np.zeros(1))[0])
+        return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _ROUNDING) else found
+
+
 def inverse_factor(information: Array) -> Array:
     """Return K (.., k, k) with K^T K = M^-1.
 
@@ -110,3 +308,29 @@ def inverse_factor(information: Array) -> Array:
 def worst(violations: list[Violation]) -> Violation:
     """Return the largest violation; ratio 0 when there are none."""
     return max(violations, key=lambda v: v.ratio, default=Violation(0.0))
+
+
+def turned(rows: NDArray[np.float64], turn: Array) -> NDArray[np.float64]:
+    """Return rows @ turn (n, q, k) as one product, since stacks of small matrices are multiplied one by one.
+
+    In memory the frequencies stand side by side: few sums over many of them are then sums of long vectors.
+    """
+    n, q, k = rows.shape
+    return np.asarray((turn.T @ rows.T.reshape(k, q * n)).reshape(-1, q, n).T)
+
+
+def largest_singular(half: NDArray[np.float64]) -> Array:
+    """Return the largest singular values (n,) of (n, q, k): closed form for two rows, else Gram matrix."""
+    if half.shape[1] != 2:
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(half @ half.swapaxes(1, 2))[:, -1], 0.0))
+    real, imaginary = half[:, 0], half[:, 1]
+    a, d = np.einsum("ni,ni->n", real, real), np.einsum("ni,ni->n", imaginary, imaginary)
+    b = np.einsum("ni,ni->n", real, imaginary)
+    return np.sqrt(0.5 * (a + d) + np.hypot(0.5 * (a - d), b))
+
+
+def active_entries(model: Model, highest: float) -> list[Entry]:
+    """Return the entries of G that are not zero, or change with a parameter, probed below `highest`."""
+    w = np.array([0.12, 0.39]) * highest
+    there = np.any(model.plant_at(w), axis=0) | np.any(model.plant_gradient(w), axis=(0, 1))
+    return [(i, j) for i in range(model.outputs) for j in range(model.inputs) if there[i, j]]

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.cut import Cut
-from inputdesign_cli.accuracy.cuts import MatrixCut, VarianceCut
-from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.accuracy.cuts import Cut, MatrixCut, VarianceCut
+from inputdesign_cli.accuracy.requirement import OverFrequency
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant import ScalarTransfer
 

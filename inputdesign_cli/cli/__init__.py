@@ -5,6 +5,7 @@ Nothing heavy is imported here or at the top of a command's file: `idesign --hel
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 import typer
@@ -16,12 +17,11 @@ from inputdesign_cli.cli.designs import analyse, simulate, solve, validate
 from inputdesign_cli.cli.options import declared
 from inputdesign_cli.cli.reference import examples, explain, init, schema
 from inputdesign_cli.cli.signal import signal
-from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
-from inputdesign_cli.cli.terminal import guarded
+from inputdesign_cli.cli.terminal import guarded, prepare_signals, prepare_streams
 from inputdesign_cli.cli.watch import report, watch
 from inputdesign_cli.cli.wizard import wizard
-from inputdesign_cli.compute.executor import use_one_thread
+from inputdesign_cli.compute.executor import ONE_THREAD
 from inputdesign_cli.version import __version__
 
 app = typer.Typer(
@@ -87,5 +87,6 @@ def main() -> None:
     """Run the `idesign` command."""
     prepare_streams()
     prepare_signals()
-    use_one_thread()  # numpy, which reads it, has not been imported yet
+    for name, value in ONE_THREAD.items():  # numpy, which reads them, has not been imported yet
+        os.environ.setdefault(name, value)
     app(prog_name="idesign")

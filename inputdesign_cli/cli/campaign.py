@@ -10,7 +10,7 @@ import typer
 
 from inputdesign_cli.cli.options import Changes, Into, Shown
 from inputdesign_cli.cli.rows import Written, levels
-from inputdesign_cli.cli.run import Place, keep, name_of, read_spec, renew
+from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 
@@ -69,7 +69,7 @@ def proceed(
         raise typer.BadParameter("withdraw first, then say it without a record", param_hint="--regardless")
     with computing(directory, quiet=quiet):
         from inputdesign_cli import questions
-        from inputdesign_cli.outcome.record import SPEC
+        from inputdesign_cli.outcome.run_files import SPEC
         from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
         from inputdesign_cli.specification import parse_spec
@@ -87,8 +87,8 @@ def proceed(
                 taken = replace(written.preparation(), operating_point=levels(operating_point))
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
-        shown = Shown(figures, json_output=json_output, quiet=quiet)
-        renew(results, directory, shown, stated.figures)
+        place = Place(Into(directory), figures=stated.figures)
+        keep(results, place, Shown(figures, json_output=json_output, quiet=quiet))
     code = _EXIT[results.result["status"]]
     if code:
         raise typer.Exit(code)
@@ -104,8 +104,8 @@ def status(directory: Path, *, json_output: bool = False) -> None:
         typer.echo(json_text(memory.campaign), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
-    from inputdesign_cli.outcome.record import RESULT, readable
     from inputdesign_cli.outcome.run_directory import read_outcome
+    from inputdesign_cli.outcome.run_files import RESULT, readable
 
     with readable(directory / RESULT):
         text = summary(read_outcome(directory), memory.campaign.time_unit, [])

@@ -72,7 +72,7 @@ def identify(
     place = Place(into, f"{data[0].stem}_identified", [spec, *data])
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
-        from inputdesign_cli.outcome.origin import check_counted_once
+        from inputdesign_cli.outcome.run_directory import check_counted_once
 
         stated = read_spec(spec, changes, design=False)
         place = place.checked(stated)
@@ -101,7 +101,7 @@ def assess(
     place = Place(into, f"{data[0].stem}_assessed", [spec, *data], judges=True)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
-        from inputdesign_cli.outcome.origin import check_counted_once
+        from inputdesign_cli.outcome.run_directory import check_counted_once
 
         stated = read_spec(spec, changes)
         place = place.checked(stated)

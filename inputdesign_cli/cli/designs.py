@@ -11,9 +11,8 @@ import typer
 
 from inputdesign_cli.cli.options import Changes, Into, Shown, Workers
 from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
-from inputdesign_cli.cli.streams import ending_early
 from inputdesign_cli.cli.sweep import show_trade
-from inputdesign_cli.cli.terminal import computing
+from inputdesign_cli.cli.terminal import computing, ending_early
 from inputdesign_cli.compute.time_limit import stoppable
 from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
 

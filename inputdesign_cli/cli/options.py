@@ -119,35 +119,27 @@ def spec_keys(incomplete: str) -> list[str]:
     from inputdesign_cli.specification import json_schema
 
     schema = json_schema()
-    found = list(_entries(schema, schema, ""))
-    key, equals, _ = incomplete.partition("=")
-    if not equals:
-        return [f"{name}=" for name in dict.fromkeys(name for name, _ in found) if name.startswith(key)]
-    words = dict.fromkeys(f"{key}={word}" for name, node in found if name == key for word in _words(node))
-    return [word for word in words if word.startswith(incomplete)]
+    found = dict.fromkeys(_completions(schema, schema, ""))
+    return [
+        text
+        for text in found
+        if text.startswith(incomplete) and text.endswith("=") == ("=" not in incomplete)
+    ]
 
 
-def _entries(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the paths of all keys that hold values: through references and alternatives, not into lists."""
+def _completions(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[str]:
+    """Yield `KEY=` for all keys that hold values, not into lists, and `KEY=WORD` for each text they take."""
     if "$ref" in node:
-        yield from _entries(root["$defs"][node["$ref"].rpartition("/")[2]], root, path)
+        yield from _completions(root["$defs"][node["$ref"].rpartition("/")[2]], root, path)
     for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
-        yield from _entries(alternative, root, path)
+        yield from _completions(alternative, root, path)
+    words = ["true", "false"] if node.get("type") == "boolean" else [*node.get("enum", ()), node.get("const")]
+    yield from (f"{path}={word}" for word in words if isinstance(word, str))
     for key, below in node.get("properties", {}).items():
         name = f"{path}.{key}" if path else key
         if name != "sweep":
-            yield name, below
-            yield from _entries(below, root, name)
-
-
-def _words(node: dict[str, Any]) -> Iterator[str]:
-    """Yield the texts that a value may be, where it is one of a few."""
-    listed = [*node.get("enum", ()), *([node["const"]] if "const" in node else ())]
-    yield from (word for word in listed if isinstance(word, str))
-    if node.get("type") == "boolean":
-        yield from ("true", "false")
-    for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
-        yield from _words(alternative)
+            yield f"{name}="
+            yield from _completions(below, root, name)
 
 
 _CALLS: dict[str, Callable[..., object]] = {

@@ -16,8 +16,8 @@ from inputdesign_cli.errors import STANDARD_STREAM, OutputError, bad_spec
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.outcome.origin import Origin
     from inputdesign_cli.outcome.results import Results
+    from inputdesign_cli.outcome.run_directory import Origin
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.specification.models.realisation import Figures
 
@@ -31,7 +31,7 @@ def read_spec(file: Path, changes: Changes, *, design: bool | None = True) -> Sp
     Raises:
         SpecError: as `load_spec`.
     """
-    from inputdesign_cli import specification
+    import inputdesign_cli.specification as specification
 
     overrides, confine = changes.overrides or (), changes.confine
     if str(file) != STANDARD_STREAM:
@@ -62,11 +62,14 @@ def name_of(file: Path) -> str:
 
 @dataclass(frozen=True)
 class Place:
-    """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first."""
+    """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first.
+
+    A run without files goes on with what is in the directory.
+    """
 
     into: Into
-    name: str
-    sources: Sequence[Path]
+    name: str = ""
+    sources: Sequence[Path] = ()
     judges: bool = False  # the run has a verdict
     asked: str = ""  # the spec as it was read
     figures: Figures | None = None  # their form, if the spec has one
@@ -81,11 +84,12 @@ class Place:
         return self.into.output or Path("runs") / self.name
 
     @property
-    def origin(self) -> Origin:
+    def origin(self) -> Origin | None:
         """Return the origin of the run: its files and the text of its spec."""
-        from inputdesign_cli.outcome.origin import Origin
+        from inputdesign_cli.outcome.run_directory import Origin
 
-        return Origin(self.sources, self.asked, self.into.overwrite, self.judges)
+        judged = self.judges
+        return Origin(self.sources, self.asked, self.into.overwrite, judged) if self.sources else None
 
     def checked(self, spec: Spec | None) -> Place:
         """Return the place for the run of a spec that was read, before anything is computed.
@@ -94,8 +98,8 @@ class Place:
             OutputError: the directory cannot take the run, see `check_place`, and `output-is-the-spec`.
         """
         place = self if spec is None else replace(self, asked=spec.to_yaml(), figures=spec.figures)
-        if not place.into.no_output:
-            from inputdesign_cli.outcome.origin import check_place
+        if place.origin is not None and not place.into.no_output:
+            from inputdesign_cli.outcome.run_directory import check_place
 
             check_place(place.directory, place.origin, place.spared(place.asked))
         return place
@@ -109,13 +113,12 @@ class Place:
         Raises:
             OutputError: `output-is-the-spec`, it would say something else.
         """
-        from inputdesign_cli.outcome.record import SPEC
+        from inputdesign_cli.outcome.run_files import SPEC
         from inputdesign_cli.specification import same_content
         from inputdesign_cli.specification.yaml.files import read_text
 
         target = self.directory / SPEC
-        named = self.sources[0]
-        if not (target.exists() and named.exists() and target.samefile(named)):
+        if not any(target.exists() and one.exists() and target.samefile(one) for one in self.sources[:1]):
             return spec
         text = read_text(target)
         if not same_content(text, spec):
@@ -139,44 +142,21 @@ def keep(results: Results, place: Place, shown: Shown, *, page: bool = False) ->
     if place.into.no_output:
         _show(results, [], shown)
         return
-    results = replace(results, resolved_spec=place.spared(results.resolved_spec))
-    renew(results, place.directory, shown, place.figures, place.origin, page=page)
-
-
-def renew(
-    results: Results,
-    directory: Path,
-    shown: Shown,
-    figures: Figures | None,
-    origin: Origin | None = None,
-    *,
-    page: bool = False,
-) -> None:
-    """Write a run directory, and print its result or its summary.
-
-    Args:
-        figures: their form, if the spec has one.
-        origin: what the run is made from; None for a run that goes on with what is in the directory.
-        page: whether the page about it is written as well.
-
-    Raises:
-        OutputError: as `write_run`.
-    """
+    results, directory = replace(results, resolved_spec=place.spared(results.resolved_spec)), place.directory
     with status(f"{directory}: writing ...", quiet=shown.quiet):
-        from inputdesign_cli.outcome.origin import has_other_values
-        from inputdesign_cli.outcome.run_directory import replace_text, write_run
+        from inputdesign_cli.outcome.run_directory import has_other_values, replace_text, write_run
 
         drawings = {}
         if shown.figures:
             from inputdesign_cli.figures.plots import draw_all
             from inputdesign_cli.specification.models.realisation import Figures
 
-            form = figures or Figures()
+            form = place.figures or Figures()
             drawings = draw_all(results, shown.figure_format or form.format, form.width)
         replaced = has_other_values(directory, results.resolved_spec)
-        files = write_run(results, directory, drawings, origin=origin)
+        files = write_run(results, directory, drawings, origin=place.origin)
         if page:
-            from inputdesign_cli.outcome.record import PAGE
+            from inputdesign_cli.outcome.run_files import PAGE
             from inputdesign_cli.report.render import report_text
 
             replace_text(directory / PAGE, report_text(directory))

@@ -25,35 +25,14 @@ _SMALLEST, _LARGEST = 1e-15, 1e15
 
 
 @dataclass(frozen=True)
-class Kinds:
-    """Holds the kinds of signals, of which one is made."""
+class Form:
+    """Holds the kinds of signals, of which one is made, its length and range, and options of some kinds."""
 
     prbs: int | None = None
     multisine: int | None = None
     chirp: str = ""
     steps: int | None = None
-
     kind: str = ""
-
-    def chosen(self) -> str:
-        """Return the kind that is asked for.
-
-        Raises:
-            typer.BadParameter: There is none, or more than one.
-        """
-        stated = {name: value for name, value in vars(self).items() if value not in (None, "")}
-        if len(stated) != 1:
-            said = " and ".join(f"--{name}" for name in stated) or "none of them"
-            raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
-        if self.kind and self.kind not in names("idesign.signals"):
-            refuse(f"no package adds a kind {self.kind!r}", "--kind")
-        return self.kind or next(iter(stated))
-
-
-@dataclass(frozen=True)
-class Form:
-    """Holds the length and the range of a signal, and what holds for some kinds only."""
-
     samples: int | None = None
     span: str = "-1:1"
     inputs: int = 1
@@ -65,7 +44,7 @@ class Form:
     sample_time: float = 1.0
     time_unit: TimeUnit = "s"
 
-    def asked(self, kinds: Kinds) -> ReadyMade:
+    def asked(self) -> ReadyMade:
         """Return the signal of the kind that is asked for.
 
         Raises:
@@ -73,22 +52,29 @@ class Form:
         """
         from inputdesign_cli.questions.ready_made import ReadyMade
 
-        kind = kinds.chosen()
+        kinds = {name: vars(self)[name] for name in ("prbs", "multisine", "chirp", "steps", "kind")}
+        stated = [name for name, value in kinds.items() if value not in (None, "")]
+        if len(stated) != 1:
+            said = " and ".join(f"--{name}" for name in stated) or "none of them"
+            raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
+        if self.kind and self.kind not in names("idesign.signals"):
+            refuse(f"no package adds a kind {self.kind!r}", "--kind")
+        kind = self.kind or stated[0]
         owners = {"--band": (self.band, "multisine"), "--odd": (self.odd, "multisine")}
         owners |= {"--periods": (self.periods > 1, "multisine"), "--hold": (self.hold > 1, "prbs")}
         for option, (is_stated, owner) in owners.items():
-            if is_stated and kind not in (owner, kinds.kind):
+            if is_stated and kind not in (owner, self.kind):
                 refuse(f"it is of --{owner}, and does nothing to --{kind}: leave it out", option)
         if not _SMALLEST <= self.sample_time <= _LARGEST:
             refuse(f"it is a positive number, from {_SMALLEST:g} to {_LARGEST:g}", "--sample-time")
-        band, option = (kinds.chirp, "--chirp") if kinds.chirp else (self.band, "--band")
+        band, option = (self.chirp, "--chirp") if self.chirp else (self.band, "--band")
         ranges = tuple(_pair(part, "--range") for part in self.span.split(","))
         if len(ranges) not in (1, self.inputs):
             refuse(f"it has {len(ranges)} ranges, and there are {self.inputs} inputs", "--range")
         return ReadyMade(
             kind,
-            bits=kinds.prbs,
-            number=kinds.multisine or kinds.steps,
+            bits=self.prbs,
+            number=self.multisine or self.steps,
             band=_pair(band, option, least=0.0) if band else None,
             samples=self.samples,
             levels=ranges * (self.inputs // len(ranges)),
@@ -103,7 +89,6 @@ class Form:
 
 def signal(
     *,
-    kinds: Kinds,
     form: Form,
     output: list[str] | None = None,
     overwrite: bool = False,
@@ -122,7 +107,7 @@ def signal(
             listed = ", ".join(f".{ending}" for ending in _ENDINGS)
             refuse(f"{file.name} ends with none of {listed}", "--output")
         refuse_existing(file, overwrite)
-    asked = form.asked(kinds)
+    asked = form.asked()
     from inputdesign_cli.questions.ready_made import make_signal
 
     results = make_signal(asked)
@@ -152,8 +137,7 @@ def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, floa
 def _write(file: Path, results: Results) -> None:
     """Write one file of the kind that its ending names."""
     from inputdesign_cli.outcome.run_directory import write_bytes
-    from inputdesign_cli.outcome.signal_files import WRITERS
-    from inputdesign_cli.outcome.text_formats import csv_text
+    from inputdesign_cli.outcome.text_formats import WRITERS, csv_text
 
     table, ending = results.tables["signal"], file.suffix.removeprefix(".").lower()
     if ending == "png":

@@ -7,8 +7,16 @@ from pathlib import Path
 
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.report.evidence import BREAK, Rows, estimate_table, requirement_table, simulation_table
-from inputdesign_cli.report.facts import Fact, facts, said
+from inputdesign_cli.report.facts import (
+    BREAK,
+    Fact,
+    Rows,
+    estimate_table,
+    facts,
+    requirement_table,
+    said,
+    simulation_table,
+)
 
 _NONE = Rows((), ())
 Line = tuple[str, str]

@@ -32,8 +32,8 @@ def report(directory: Path, *, output: Path | None = None, bibtex: bool = False,
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.outcome.record import PAGE, is_page
         from inputdesign_cli.outcome.run_directory import replace_text
+        from inputdesign_cli.outcome.run_files import PAGE, is_page
         from inputdesign_cli.report.render import bibtex_text, report_text
 
         if bibtex:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
@@ -16,12 +15,6 @@ Answer = TypeVar("Answer")
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
-
-
-def use_one_thread() -> None:
-    """Ask for one thread, unless the environment asks for another number."""
-    for name, value in ONE_THREAD.items():
-        os.environ.setdefault(name, value)
 
 
 @dataclass(frozen=True)

@@ -36,9 +36,14 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     if _HAS_ALARM:
         signal.signal(signal.SIGALRM, later)
         signal.setitimer(signal.ITIMER_REAL, _MOMENT)
-    if not (_HAS_ALARM and _lets_imports_end(frame)):
-        _came.append(number)
-        raise _end(number)
+        while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
+            frame = frame.f_back
+        if frame is not None:
+            _waiting_since.append(time.monotonic())
+            if _waiting_since[-1] - _waiting_since[0] < _PATIENCE:
+                return
+    _came.append(number)
+    raise _end(number)
 
 
 def _is_under_way(handled: BaseException | None) -> bool:
@@ -48,15 +53,6 @@ def _is_under_way(handled: BaseException | None) -> bool:
             return True
         handled = handled.__context__
     return False
-
-
-def _lets_imports_end(frame: FrameType | None) -> bool:
-    """Return whether modules are being imported, and not for too long since the interruption."""
-    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
-        frame = frame.f_back
-    if frame is not None and not _waiting_since:
-        _waiting_since.append(time.monotonic())
-    return frame is not None and time.monotonic() - _waiting_since[0] < _PATIENCE
 
 
 @contextmanager

@@ -45,8 +45,8 @@ class Processes:
                     more = bool(pending)
                     wait(pending, return_when=FIRST_COMPLETED)
                 wait(pending)  # the others have ended as well
-            for future in list(pending):
-                job = pending.pop(future)
+            for future, job in list(pending.items()):
+                del pending[future]
                 yield _alone(function, job) if _was_killed(future) else _finished(job, future)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures import estimates, frequency, records, spectrum, studies
-from inputdesign_cli.figures.nyquist import draw_nyquist
+from inputdesign_cli.figures.frequency import draw_nyquist
 from inputdesign_cli.figures.style import FILE_TYPES, FileType, Width, painted, rendered
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import Curves

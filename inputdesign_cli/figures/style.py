@@ -62,8 +62,9 @@ OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # for curves n
 _LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
-# A logarithmic axis whose end is below this multiple of its beginning has even steps.
-_EVEN, _STEPS = 8.0, 6
+# A logarithmic axis whose end is below the first multiple of its beginning has even steps; beyond the second
+# only powers of ten have a number.
+_EVEN, _STEPS, _WIDE = 8.0, 6, 1e4
 
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
@@ -233,8 +234,10 @@ def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
     axis = axes.xaxis if which == "x" else axes.yaxis
     low, high = axis.get_view_interval()
     even = high < _EVEN * low
-    axis.set_major_locator(MaxNLocator(_STEPS, steps=[1, 2, 5]) if even else LogLocator(subs=(1.0, 2.0, 5.0)))
-    if even:
+    wide = high > _WIDE * low
+    subs = (1.0,) if wide else (1.0, 2.0, 5.0)
+    axis.set_major_locator(MaxNLocator(_STEPS, steps=[1, 2, 5]) if even else LogLocator(subs=subs))
+    if even or wide:
         axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())

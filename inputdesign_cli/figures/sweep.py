@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from inputdesign_cli.figures import style
@@ -35,7 +34,6 @@ _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
 # Values over a wider ratio are drawn on a logarithmic scale; keys from the second ratio on.
 LOG_FROM = 10.0
 _LOG_KEYS_FROM = 100.0
-_DECADES_IN_FULL = 3.0
 # Ticks at points: their largest number, and their least distance as a share of the axis.
 _MOST_TICKS, _ROOM = 12, 0.055
 _NAMES = {
@@ -147,37 +145,41 @@ def _draw_curves(
 
     Only points (n,) that are `shown` are drawn; the scales depend on all.
     """
-    x, y = table.numbers(along), table.numbers(quantity)
-    assert x is not None
-    assert y is not None
+    x, y = _known(table, along), _known(table, quantity)
+    of_value = quantity == "objective.value"
     groups = list(dict.fromkeys(table.columns[across])) if across else [""]
-    bound, whatever = bound_of(table) if quantity == "objective.value" else (None, "")
+    bound, whatever = bound_of(table) if of_value else (None, "")
+    white = (
+        table.numbers(f"baseline.white.{objective(table.kind).white}") if of_value and not across else None
+    )
     side = f"{'ceiling' if table.maximised else 'floor'}: {whatever}"
-    everything = [y] if bound is None else [y, bound]
     for group, colour in zip(groups, PALETTE, strict=False):
-        own = np.array([not across or text == group for text in table.columns[across or along]])
-        member = own & shown
+        member = shown & [not across or text == group for text in table.columns[across or along]]
         name = f"{_short(across)} = {group}" if across else "design"
         curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
         if bound is not None:
             shade = colour if across else BLACK
             curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1, label=side)
-    white = table.numbers(f"baseline.white.{objective(table.kind).white}")
-    if quantity == "objective.value" and not across and white is not None:
+    if white is not None:
         curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
-        everything.append(white)
     mark_failures(axes, x[~np.isfinite(y) & shown])
-    _scale_values(axes, table, np.concatenate([part[np.isfinite(part)] for part in everything]))
+    _scale_values(axes, table, [one for one in (y, bound, white) if one is not None])
     scale_key(axes, along, x)
     axes.set_ylabel(_label(table, quantity))
 
 
-def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
+def _known(table: SweepTable, name: str) -> Array:
+    """Return a column that is known to have numbers, (n,)."""
+    values = table.numbers(name)
+    assert values is not None
+    return values
+
+
+def _scale_values(axes: Axes, table: SweepTable, drawn: Sequence[Array]) -> None:
     """Scale the vertical axis: logarithmic over decades, from zero where that is near."""
-    low, high = float(values.min()), float(values.max())
+    low, high = (float(end(np.concatenate(drawn))) for end in (np.nanmin, np.nanmax))
     if low > 0 and high > LOG_FROM * low and table.kind != "D":
-        log_axes(axes, "y")
-        plain_numbers(axes.yaxis, high / low)
+        style.plain_decades(axes, "y")
     elif table.maximised:
         # Differences count, except differences of rounding.
         half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
@@ -197,11 +199,9 @@ def bound_of(table: SweepTable) -> tuple[Array | None, str]:
 
 def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Figure) -> None:
     """Draw the quantity in colour over two keys; points without a result stay hatched."""
-    values = table.numbers(quantity)
-    assert values is not None
-    rows, columns = _ordered(table.columns[down]), _ordered(table.columns[along])
+    rows, columns = (sorted(set(table.columns[key]), key=float) for key in (down, along))
     cells = np.full((len(rows), len(columns)), np.nan)
-    for r, c, value in zip(table.columns[down], table.columns[along], values, strict=True):
+    for r, c, value in zip(table.columns[down], table.columns[along], _known(table, quantity), strict=True):
         cells[rows.index(r), columns.index(c)] = value
     low, high = float(np.nanmin(cells)), float(np.nanmax(cells))
     wide = low > 0 and high > LOG_FROM * low
@@ -212,25 +212,16 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     image = axes.pcolormesh(np.ma.masked_invalid(cells), norm=norm, cmap="cividis", rasterized=True)
     bar = page.colorbar(image, label=_label(table, quantity))
     if wide:
-        plain_numbers(bar.ax.yaxis, high / low)
-    _ticks(axes.xaxis, columns)
-    _ticks(axes.yaxis, rows)
-    axes.set_xlabel(key_label(along))
-    axes.set_ylabel(key_label(down))
+        style.plain_decades(bar.ax, "y")
+    for axis, texts, key in ((axes.xaxis, columns, along), (axes.yaxis, rows, down)):
+        step = -(-len(texts) // 20)
+        axis.set_ticks((np.arange(len(texts))[::step] + 0.5).tolist(), texts[::step])
+        axis.set_label_text(key_label(key))
     if cells.size <= MOST_LABELLED and page.get_figwidth() >= _CELL * len(columns):
         for (i, j), value in np.ndenumerate(cells):
             known = bool(np.isfinite(value))
             text, colour = (f"{value:.3g}", style.ink_on(image, value)) if known else ("none", BLACK)
             axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour)
-
-
-def _ordered(texts: list[str]) -> list[str]:
-    return sorted(set(texts), key=float)
-
-
-def _ticks(axis: Axis, texts: list[str]) -> None:
-    step = -(-len(texts) // 20)
-    axis.set_ticks((np.arange(len(texts))[::step] + 0.5).tolist(), texts[::step])
 
 
 def _short(key: str | None) -> str:
@@ -248,29 +239,17 @@ def _moment_entries(table: SweepTable) -> list[str]:
 
 
 def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
-    """Draw R11, R12, .. and the trace over a key ([eckhard-mse], Figures 1, 2); crosses without a result.
-
-    The axis is logarithmic if the trace spans more than a decade and no entry is zero or negative.
-    """
-    x, trace = table.numbers(along), table.numbers(_TRACE)
-    assert x is not None
-    assert trace is not None
-    entries = _moment_entries(table)
+    """Draw R11, R12, .. and the trace over a key ([eckhard-mse], Figures 1, 2); crosses without a result."""
+    x, trace, entries = _known(table, along), _known(table, _TRACE), _moment_entries(table)
+    drawn = [_known(table, name) for name in entries]
     # Entries may coincide (R11 = R22 if the regressors are delayed copies): the later, the thinner.
     widths = np.linspace(5.0, 1.2, len(entries))
     axes = page.add_subplot()
-    values = [trace]
-    for name, colour, width in zip(entries, PALETTE, widths, strict=False):
-        y = table.numbers(name)
-        assert y is not None
+    for name, y, colour, width in zip(entries, drawn, PALETTE, widths, strict=False):
         curve(axes, x, y, color=colour, linewidth=width, label=f"R{style.lowered(*_place(name))}")
-        values.append(y)
     curve(axes, x, trace, color=BLACK, linestyle=DASHED, label="trace R")
     mark_failures(axes, x[~np.isfinite(trace)])
-    span = float(np.nanmax(trace) / np.nanmin(trace))
-    if span > LOG_FROM and min(float(np.nanmin(part)) for part in values) > 0:
-        log_axes(axes, "y")
-        plain_numbers(axes.yaxis, span)
+    _scale_values(axes, table, [trace, *drawn])
     scale_key(axes, along, x)
     axes.set_ylabel("moments, summed over the samples")
     style.legend_above(axes)
@@ -306,34 +285,17 @@ def scale_key(axes: Axes, key: str, x: Array) -> None:
 
     Up to a dozen points that stand apart have their ticks, and no others.
     """
-    low, high = float(np.nanmin(x)), float(np.nanmax(x))
-    if low > 0 and (key == "experiment.samples" or high > _LOG_KEYS_FROM * low):
-        log_axes(axes, "x")
-        plain_numbers(axes.xaxis, high / low)
+    points = np.unique(x[np.isfinite(x)])
+    wide = points[0] > 0 and (key == "experiment.samples" or points[-1] > _LOG_KEYS_FROM * points[0])
+    if wide:
+        style.plain_decades(axes, "x")
     elif np.all(x == np.round(x)):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    points = np.unique(x[np.isfinite(x)])
-    if _apart(points, logarithmic=axes.get_xscale() == "log"):
-        axes.xaxis.set_major_locator(FixedLocator(points.tolist()))
+    place = np.log(points) if wide else points
+    if 1 < points.size <= _MOST_TICKS and np.diff(place).min() > _ROOM * np.ptp(place):
+        axes.set_xticks(points, [f"{point:g}" for point in points])
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel(key_label(key))
-
-
-def _apart(points: Array, *, logarithmic: bool) -> bool:
-    """Return whether there is room for a number at each of the points."""
-    if not 1 < points.size <= _MOST_TICKS:
-        return False
-    place = np.log(points) if logarithmic else points
-    return bool(np.diff(place).min() > _ROOM * np.ptp(place))
-
-
-def plain_numbers(axis: Axis, ratio: float) -> None:
-    """Set ticks of a logarithmic axis, written out: powers of ten, over few decades 2 and 5 times them."""
-    subs = (1.0, 2.0, 5.0) if ratio < 10.0**_DECADES_IN_FULL else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def draw_trade(trade: Trade, page: Figure) -> None:
@@ -353,8 +315,6 @@ def draw_trade(trade: Trade, page: Figure) -> None:
         axes.set_ylabel("criterion")
     else:
         axes.axhline(1.0, color=BLACK, linestyle=DASHED, linewidth=1.1, label="what is asked")
-        known = np.append(trade.values[np.isfinite(trade.values)], 1.0)
-        log_axes(axes, "y")
-        plain_numbers(axes.yaxis, float(known.max() / known.min()))
+        style.plain_decades(axes, "y")
         axes.set_ylabel("error of the record / what is asked")
     style.legend_above(axes)

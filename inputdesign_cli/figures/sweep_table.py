@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -23,21 +23,33 @@ QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """Holds a key that is varied, with its values as texts."""
+    """Holds a key that is varied, with its values as texts, each as `--set KEY=TEXT` takes it."""
 
     key: str
     values: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SweepContent:
-    """Holds the content of `sweep.json`."""
+    """Holds the content of `sweep.json`.
 
+    Attributes:
+        made_from: the spec file as it is seen from the directory.
+        asked_sha256: the digest of the spec without its parts about a sweep.
+        statuses: the number of points of each status.
+    """
+
+    format: int = 1
+    kind: str = "sweep"
+    title: str = ""
     verb: Literal["solve", "analyse", "simulate"]
+    made_from: tuple[str, ...] = ()
+    asked_sha256: str = ""
     axes: tuple[SweepAxis, ...]
-    title: str | None = None
     zip: bool = False
-    environment: Mapping[str, object] | None = None
+    points: int = 0
+    statuses: Mapping[str, int] = field(default_factory=dict)
+    environment: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -116,6 +128,15 @@ class Trade:
     criterion: bool
 
 
+def read_content(root: Path) -> SweepContent:
+    """Return the content of `sweep.json`.
+
+    Raises:
+        OSError, ValueError, RecursionError: it cannot be read.
+    """
+    return read_plain(SweepContent, json.loads(read_regular(root / "sweep.json")), "sweep.json")
+
+
 def read_sweep(root: Path) -> SweepTable:
     """Read the table of a sweep.
 
@@ -123,7 +144,7 @@ def read_sweep(root: Path) -> SweepTable:
         DataError: `run-missing` or `run-unreadable`.
     """
     try:
-        summary = read_plain(SweepContent, json.loads(read_regular(root / "sweep.json")), "sweep.json")
+        summary = read_content(root)
         header, *rows = csv_rows(read_regular(root / "sweep.csv"))
         columns = {name: [row[i] for row in rows] for i, name in enumerate(header)}
         table = SweepTable(summary, columns)

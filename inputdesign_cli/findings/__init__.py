@@ -6,8 +6,7 @@ A file says when its finding holds and what its sentence is. It is found by its 
 from importlib import import_module
 from pkgutil import iter_modules
 
-from inputdesign_cli import error_codes
-from inputdesign_cli.error_codes import Explanation
+from inputdesign_cli.error_codes import Explanation, explanations as of_errors
 from inputdesign_cli.finding import KINDS, FindingKind
 from inputdesign_cli.specification import plugins
 
@@ -23,4 +22,4 @@ def explanations() -> dict[str, Explanation]:
     """Return the explanation of every code: errors first, then findings."""
     found = {code: Explanation(kind.title, kind.text, kind.remedy) for code, kind in kinds().items()}
     added = {code: Explanation(**entry) for code, entry in plugins.codes().items()}
-    return {**error_codes.explanations(), **found, **added}
+    return {**of_errors(), **found, **added}

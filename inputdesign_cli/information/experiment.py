@@ -145,8 +145,8 @@ class Experiment(Coordinates):
 
     def entry_gradient(self, w: ArrayLike, output: int, input: int) -> ComplexArray:
         """Return the whitened gradient (n, k) of one entry of G."""
-        entry = self.model.plant_gradient(w)[:, :, output : output + 1, input : input + 1]
-        return self._whiten(entry)[:, :, 0, 0]
+        entry = self.model.plant_gradient(w)[:, :, output, input]
+        return entry if self.factor is None else (self._inverse_factor @ entry.T).T
 
     def _whiten(self, gradient: ComplexArray) -> ComplexArray:
         if self.factor is None:

@@ -39,10 +39,6 @@ class Quadrature:
     nodes: Array
     weights: Array
 
-    def part(self, which: slice) -> Quadrature:
-        """Return some of the nodes with their weights."""
-        return Quadrature(self.nodes[which], self.weights[which])
-
 
 Sums = Callable[[Quadrature, NDArray], NDArray[np.float64]]
 """Sums over nodes of weighted values (n, ...) there; those over two sets of nodes add up."""
@@ -122,6 +118,7 @@ def integrate(
     highest_lag: int = 0,
     knots: Array = _NONE,
     several: bool = False,
+    unit: float = 1.0,
 ) -> NDArray[np.float64]:
     """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
@@ -131,6 +128,7 @@ def integrate(
 
     Args:
         several: values are large, as for several channels: they are computed at few nodes at a time.
+        unit: of the frequencies of `values` and `sums`; all other frequencies are divided by it.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:
@@ -144,11 +142,11 @@ def integrate(
 
     at_once = _AT_ONCE_OF_SEVERAL if several else _AT_ONCE
     # The first rule never stands alone: one call computes its values and the next rule's.
-    coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once)
+    coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once, unit)
     earlier = np.inf
     for refine in range(1, _MAX_REFINEMENTS + 1):
         if refine > 1:
-            (fine,) = _summed(values, sums, [rule_of(refine)], at_once)
+            (fine,) = _summed(values, sums, [rule_of(refine)], at_once, unit)
         scale = np.abs(fine).max(initial=0.0)
         change = np.abs(fine - coarse).max(initial=0.0)
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
@@ -173,19 +171,21 @@ def integrate(
 
 
 def _summed(
-    values: Values, sums: Sums, rules: Sequence[Quadrature], at_once: int
+    values: Values, sums: Sums, rules: Sequence[Quadrature], at_once: int, unit: float
 ) -> list[NDArray[np.float64]]:
     """Return the sums on each of the rules."""
     nodes = np.concatenate([rule.nodes for rule in rules])
     ends = np.cumsum([rule.nodes.size for rule in rules]).tolist()
     found: list[list[NDArray[np.float64]]] = [[] for _ in rules]
     for start in range(0, nodes.size, at_once):
-        here = values(nodes[start : start + at_once])
+        here = values(nodes[start : start + at_once] * unit)
         for rule, end, parts in zip(rules, ends, found, strict=True):
             first = end - rule.nodes.size
             lo, hi = max(start, first), min(start + len(here), end)
             if lo < hi:
-                parts.append(sums(rule.part(slice(lo - first, hi - first)), here[lo - start : hi - start]))
+                own = slice(lo - first, hi - first)
+                there = Quadrature(rule.nodes[own] * unit, rule.weights[own] * unit)
+                parts.append(sums(there, here[lo - start : hi - start]))
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in found]
 
 
@@ -204,16 +204,16 @@ def integrate_band(
     """
     unit = (band[1] - band[0]) / np.pi
     near: ComplexArray = np.asarray(singularities, dtype=complex) * (1.0 / unit + 0j)
-    lo, hi = band[0] / unit, band[1] / unit
     return integrate(
-        lambda w: values(w * unit),
-        lambda rule, here: sums(Quadrature(rule.nodes * unit, rule.weights * unit), here),
+        values,
+        sums,
         near,
-        lo=lo,
-        hi=hi,
+        lo=band[0] / unit,
+        hi=band[1] / unit,
         highest_lag=highest_lag,
         knots=knots / unit,
         several=True,
+        unit=unit,
     )
 
 

@@ -7,8 +7,8 @@ order of computation. One process, several and a cluster give the same numbers.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,16 +18,6 @@ from inputdesign_cli.errors import IdesignError
 
 Answer = TypeVar("Answer")
 Seed = int | np.random.SeedSequence
-
-
-@dataclass(frozen=True)
-class _Batch(Generic[Answer]):
-    """Holds all that a worker needs for a batch: the same function for all, a stream of its own."""
-
-    index: int
-    function: Callable[[int, np.random.Generator], Answer]
-    runs: int
-    seed: np.random.SeedSequence
 
 
 def run_batches(
@@ -50,29 +40,28 @@ def run_batches(
     """
     root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
     batches = (
-        _Batch(
-            index,
-            function,
-            min(size, runs - start),
-            np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index)),
-        )
+        (min(size, runs - start), np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index)))
         for index, start in enumerate(range(0, runs, size))
     )
     answers: dict[int, Answer] = {}
     told = 0
-    for done in (executor or InProcess()).run(_compute, batches):
+    for done in (executor or InProcess()).run(partial(_compute, function), batches):
+        count, stream = done.job
         if isinstance(done.error, WorkerLostError):
-            message = f"a batch of {done.job.runs} simulated runs has no result: {done.error}"
+            message = f"a batch of {count} simulated runs has no result: {done.error}"
             hint = "the system may have run out of memory; try fewer processes"
             raise IdesignError.because("worker-lost", message, hint) from done.error
         if done.error is not None:
             raise done.error
         assert done.answer is not None  # there is an answer or an error
-        answers[done.job.index] = done.answer
-        told += done.job.runs
+        answers[stream.spawn_key[-1]] = done.answer
+        told += count
         tell(Counted("simulated runs", told, runs))
     return [answers[index] for index in range(len(answers))]
 
 
-def _compute(batch: _Batch[Answer]) -> Answer:
-    return batch.function(batch.runs, np.random.default_rng(batch.seed))
+def _compute(
+    function: Callable[[int, np.random.Generator], Answer], batch: tuple[int, np.random.SeedSequence]
+) -> Answer:
+    count, stream = batch
+    return function(count, np.random.default_rng(stream))

@@ -33,6 +33,6 @@ from inputdesign_cli.outcome.estimate import (
     Nominal as Nominal,
     Validation as Validation,
 )
-from inputdesign_cli.outcome.outcome import Outcome as Outcome
+from inputdesign_cli.outcome.results import Outcome as Outcome
 from inputdesign_cli.outcome.robust import Robust as Robust
 from inputdesign_cli.outcome.simulation import Simulation as Simulation

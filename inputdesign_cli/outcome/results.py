@@ -1,23 +1,79 @@
 """Results of a design, an analysis or a study for the record and the report: plain data, nothing to compute.
 
-`result` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
+`Outcome` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
 are in rad per time unit, spectra in the convention of the contract (power = integral over the normalised
 circle / 2 pi).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.outcome import Information, ModelError, Objective, Outcome, plain
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.outcome import design, estimate
+from inputdesign_cli.outcome.campaign import Campaign
+from inputdesign_cli.outcome.codec import others, plain
 from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
+from inputdesign_cli.outcome.robust import Robust
+from inputdesign_cli.outcome.simulation import Simulation
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """Holds the question and the answer, section by section; a section is None if the question lacks it.
+
+    `notes` are the messages of the `findings`. `provenance` has what the writer of a run adds: environment,
+    digests, and the names of its files.
+    """
+
+    format: int = 1
+    title: str | None = None
+    status: str | None = None
+    objective: design.Objective | None = None
+    cost: float | None = None
+    samples: int | None = None
+    power: design.Powers | None = None
+    model_error: design.ModelError | None = None
+    requirements: tuple[design.RequirementMet, ...] | None = None
+    limits: tuple[design.LimitUse, ...] | None = None
+    information: design.Information | None = None
+    spectrum: design.Spectrum | None = None
+    baseline: design.Baseline | None = None
+    robust: Robust | None = None
+    foreseen: design.Foreseen | None = None
+    signal: design.Signal | None = None
+    frequency_response: estimate.MeasuredLines | None = None
+    closed_loop_error: design.ClosedLoopError | None = None
+    mean_squared_error: design.MeanSquaredError | None = None
+    moments: design.Moments | None = None
+    sensitivity: design.Sensitivity | None = None
+    identification: estimate.Identification | None = None
+    assessment: estimate.Assessment | None = None
+    exploration: estimate.Exploration | None = None
+    validation: estimate.Validation | None = None
+    simulation: Simulation | None = None
+    campaign: Campaign | None = None
+    solver: design.Solver | None = None
+    findings: tuple[Finding, ...] | None = None
+    notes: tuple[str, ...] | None = None
+    timing_s: Mapping[str, float] | None = None
+    provenance: Mapping[str, object] = others()
+
+    def saying(self, findings: Iterable[Finding]) -> Self:
+        """Return the outcome with further findings and their notes."""
+        more = tuple(findings)
+        if not more:
+            return self
+        messages = tuple(one.message for one in more)
+        return replace(self, findings=(*(self.findings or ()), *more), notes=(*(self.notes or ()), *messages))
+
 
 Array = NDArray[np.float64]
 # Data as JSON has it. What is in a result is known by its path, not by its type.
@@ -55,12 +111,12 @@ class Results:
         return self.outcome.cost
 
     @property
-    def objective(self) -> Objective | None:
+    def objective(self) -> design.Objective | None:
         """Return the value of the design with its proved bounds, or None if nothing was designed."""
         return self.outcome.objective
 
     @property
-    def model_error(self) -> ModelError | None:
+    def model_error(self) -> design.ModelError | None:
         """Return the largest r_u/r_adm and its frequency, or None if no model error is looked at."""
         return self.outcome.model_error
 
@@ -83,7 +139,7 @@ class Results:
         return found
 
     @property
-    def _informed(self) -> Information:
+    def _informed(self) -> design.Information:
         if self.outcome.information is None:
             raise AttributeError("this run has no information matrix")
         return self.outcome.information

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,12 @@ class Units:
     channels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     by_duration: bool = False
 
-    @property
+    @cached_property
     def frequency(self) -> float:
         """Return the divisor that turns an experiment's frequency into rad per time unit."""
         return self.sample_time if self.sampled else 1.0
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Return the time between samples in the unit of the experiment's frequency: 1, or `sample_time`."""
         return 1.0 if self.sampled else self.sample_time
@@ -60,12 +61,12 @@ class Units:
         """Return the header of a column of times: time_s."""
         return f"time_{self.time_unit}"
 
-    @property
+    @cached_property
     def excitation(self) -> str:
         """Return the signal that is designed: r in closed loop, u in open loop."""
         return "r" if self.closed_loop else "u"
 
-    @property
+    @cached_property
     def excitations(self) -> tuple[str, ...]:
         """Return the names of the columns of the record: u1, u2, .., in closed loop r1, r2, .."""
         return tuple(f"{self.excitation}{a + 1}" for a in range(self.inputs))
@@ -92,7 +93,7 @@ class Units:
         ends = [self.channels.get(f"{x}{i + 1}", ("", ""))[0] for x, i in (("u", input), ("y", output))]
         return " → ".join(ends) if all(ends) else ""
 
-    @property
+    @cached_property
     def single(self) -> bool:
         """Return whether there is one input and one output."""
         return self.inputs == self.outputs == 1

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 
+Key = TypeVar("Key")
 _latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
 _WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared
 _MODERATE = 1e100  # quotients up to this are no overflow
@@ -62,6 +64,27 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
         value *= q
         value += coefficient
     return value
+
+
+def evaluate_all(polynomials: Mapping[Key, Sequence[Array]], q: ComplexArray) -> dict[Key, ComplexArray]:
+    """Return values (S, 1, n) at `q` of polynomials of S models each; of constants (S, 1, 1)."""
+    tables = {key: np.array(one) for key, one in polynomials.items()}
+    found = {key: one[:, None].astype(complex) for key, one in tables.items() if one.shape[1] == 1}
+    varying = [key for key, one in tables.items() if one.shape[1] > 1]
+    if varying:
+        longest = max(tables[key].shape[1] for key in varying)
+        rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
+        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), len(rows[0]), 1, q.size)
+        found |= dict(zip(varying, at_q, strict=True))
+    return found
+
+
+def powers(q: ComplexArray, highest: int) -> list[ComplexArray]:
+    """Return the powers of q up to the `highest`, from q^0 on; at least up to the first."""
+    found = [np.ones_like(q), q]
+    for _ in range(highest - 1):
+        found.append(found[-1] * q)
+    return found
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:

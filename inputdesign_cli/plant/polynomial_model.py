@@ -33,7 +33,9 @@ from inputdesign_cli.plant.polynomial import (
     all_roots,
     at,
     evaluate,
+    evaluate_all,
     frequencies_last,
+    powers,
     roots_in_z,
     stack,
     unit_circle,
@@ -243,24 +245,25 @@ class PolynomialModel(Parametrised):
         rows = zip(self.per_output(self.A), self.B, self.F, strict=True)
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
-    def _shifts(self, q: ComplexArray) -> list[ComplexArray]:
-        """Return the powers of q up to the highest of a parameter."""
-        found = [np.ones_like(q), q]
-        for _ in range(max((parameter.power for parameter in self.parameters), default=0) - 1):
-            found.append(found[-1] * q)
-        return found
+    @cached_property
+    def _highest(self) -> int:
+        """Return the highest power of q^-1 that a parameter stands before."""
+        return max((parameter.power for parameter in self.parameters), default=0)
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
+        highest, entries = self._highest, self._entries
         q = unit_circle(w)
         gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
-        shifts = self._shifts(q)
+        shifts = powers(q, highest)
         for i, j in self.active:
-            A, B, F = evaluate(self._entries[i][j], q)
+            A, B, F = evaluate(entries[i][j], q)
             AF = A * F
             factors["b", i, j] = 1.0 / AF
-            factors |= {(x, i, j): -B / (own * AF) for x, own in (("a", A), ("f", F)) if x in self.letters}
+            for letter, own in (("a", A), ("f", F)):
+                if letter in self.letters:
+                    factors[letter, i, j] = -B / (own * AF)
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf":
                 shift = shifts[parameter.power]
@@ -388,57 +391,43 @@ def _gradients(
     Args:
         y, u, e: (S, n, p or r, m); None is a zero signal; axes of length one are broadcast.
     """
-    first, q = models[0], unit_circle(w)
-    gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)
-
+    first = models[0]
+    highest, letters = first._highest, first.letters
     active = first.active if u is not None else ()
     wanted = {("c", i, 0): [m.row(m.C, i) for m in models] for i in range(first.outputs)}
     wanted |= {("d", i, 0): [m.row(m.D, i) for m in models] for i in range(first.outputs)}
     wanted |= {("f", i, j): [m.F[i][j] for m in models] for i, j in active}
-    if "f" in first.letters:
+    if "f" in letters:
         wanted |= {("b", i, j): [m.B[i][j] for m in models] for i, j in active}
-    at_q = _values(wanted, q)
-    C, D = ([at_q[letter, i, 0] for i in range(first.outputs)] for letter in "cd")
     y, u, e = (x if x is None else x.transpose(0, 2, 3, 1) for x in (y, u, e))
+    q = unit_circle(w)
+    at_q, shifts = evaluate_all(wanted, q), powers(q, highest)
+    gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)
     noise: dict[tuple[str, int], ComplexArray] = {}
     for i in range(first.outputs):
-        if y is not None and "a" in first.letters:
-            noise["a", i] = (-D[i] / C[i]) * y[:, i]
-        if e is not None and "c" in first.letters:
-            noise["c", i] = e[:, i] / C[i]
-        if e is not None and "d" in first.letters:
-            noise["d", i] = -e[:, i] / D[i]
+        C, D = at_q["c", i, 0], at_q["d", i, 0]
+        if y is not None and "a" in letters:
+            noise["a", i] = (-D / C) * y[:, i]
+        if e is not None and "c" in letters:
+            noise["c", i] = e[:, i] / C
+        if e is not None and "d" in letters:
+            noise["d", i] = -e[:, i] / D
     plant: dict[tuple[str, int, int], ComplexArray] = {}
     for i, j in active:
         assert u is not None
         F = at_q["f", i, j]
-        filtered = D[i] / (C[i] * F)
+        filtered = at_q["d", i, 0] / (at_q["c", i, 0] * F)
         plant["b", i, j] = filtered * u[:, j]
-        if "f" in first.letters:
+        if "f" in letters:
             plant["f", i, j] = (-filtered * at_q["b", i, j] / F) * u[:, j]
-    shifts = first._shifts(q)
     for index, parameter in enumerate(first.parameters):
         if parameter.letter in "bf":
             i, j = parameter.places[0]
             if (parameter.letter, i, j) in plant:
                 gradient[:, index, i] = shifts[parameter.power] * plant[parameter.letter, i, j]
             continue
-        for i in {place[0] for place in parameter.places}:
+        outputs, _ = zip(*parameter.places, strict=True)
+        for i in set(outputs):
             if (parameter.letter, i) in noise:
                 gradient[:, index, i] = shifts[parameter.power] * noise[parameter.letter, i]
     return gradient.transpose(0, 4, 1, 2, 3)
-
-
-def _values(
-    polynomials: dict[tuple[str, int, int], list[Array]], q: ComplexArray
-) -> dict[tuple[str, int, int], ComplexArray]:
-    """Return values (S, 1, n) at `q` of polynomials of S models each; of constants (S, 1, 1)."""
-    tables = {key: np.array(one) for key, one in polynomials.items()}
-    found = {key: one[:, None].astype(complex) for key, one in tables.items() if one.shape[1] == 1}
-    varying = [key for key, one in tables.items() if one.shape[1] > 1]
-    if varying:
-        longest = max(tables[key].shape[1] for key in varying)
-        rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
-        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), len(rows[0]), 1, q.size)
-        found |= dict(zip(varying, at_q, strict=True))
-    return found

@@ -1,29 +1,32 @@
 """The verbs take a spec and return results. A spec becomes a task once; the task does not know the spec.
 
-A verb imports its question when it is called, so that a command waits for no other.
+A question is imported when it is asked, so that a command waits for no other. Numbers beyond double
+precision become errors here, at the border of every task.
 """
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
+import numpy as np
 import yaml
 
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
 from inputdesign_cli.outcome.results import Result, Results
-from inputdesign_cli.questions.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.specification import Spec, load_spec, parse_spec
 
 if TYPE_CHECKING:
     import control
 
-    from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.explore import Family
     from inputdesign_cli.outcome.golden import Golden, GoldenRun
     from inputdesign_cli.questions.assessment.assess import Assessment
@@ -44,22 +47,17 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
-    from inputdesign_cli.questions.task import build_task
-
     return _in_time(spec, lambda: build_task(spec).solve())
 
 
 def analyse(spec: Spec) -> Results:
     """Return the accuracy that a given excitation gives, without any design. It raises as `solve` does."""
-    from inputdesign_cli.questions.task import build_analysis
-
     return _in_time(spec, lambda: build_analysis(spec).solve())
 
 
 def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing: the design, or the estimation where none is asked for."""
     from inputdesign_cli.questions.assessment.build import build_identification
-    from inputdesign_cli.questions.task import build_task
 
     with _placed(spec):
         build_task(spec) if spec.asks_for_design else build_identification(spec)
@@ -72,8 +70,6 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
         executor: where batches of runs are computed (default: in this process); the result does not depend
             on it.
     """
-    from inputdesign_cli.questions.task import build_task
-
     return _in_time(spec, lambda: build_task(spec).simulate(executor))
 
 
@@ -278,3 +274,138 @@ def _placed(spec: Spec) -> Iterator[None]:
             yield
     except IdesignError as error:
         raise spec.place(error) from error
+
+
+class Task(Protocol):
+    """Holds a question that was built and checked.
+
+    Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`). The verbs
+    add its place in a file (`Spec.place`).
+    """
+
+    def solve(self) -> Results:
+        """Return a design with its proof, or the accuracy that a given excitation gives."""
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """Return the answer of `solve`, with the experiment tried many times on the true system.
+
+        Args:
+            executor: where batches of runs are computed (default: in this process).
+        """
+
+
+def build_analysis(spec: Spec) -> Task:
+    """Return the task of a given excitation, whatever is asked of it.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    if spec.accuracy.frequency_response is not None and not spec.designs:
+        return _response(spec)
+    from inputdesign_cli.questions.given.build import build_given
+
+    return build_given(spec)
+
+
+def build_task(spec: Spec) -> Task:
+    """Return the task of a spec; everything that can be wrong with the spec is reported here.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    if spec.campaign is not None:
+        from inputdesign_cli.questions.campaign.build import build_campaign
+
+        return build_campaign(spec)
+    if not spec.designs:
+        return build_analysis(spec)
+    if spec.accuracy.frequency_response is not None:
+        return _response(spec)
+    if spec.plant.kind == "regression":
+        from inputdesign_cli.questions.regression.build import build_regression_task
+
+        return build_regression_task(spec)
+    if spec.accuracy.closed_loop_error is not None:
+        from inputdesign_cli.questions.loop_error.build import build_loop_error_task
+
+        return build_loop_error_task(spec)
+    from inputdesign_cli.questions.least_cost.build import build_convex
+
+    return build_convex(spec)
+
+
+def _response(spec: Spec) -> Task:
+    from inputdesign_cli.questions.frequency_response.build import build_response_task
+
+    return build_response_task(spec)
+
+
+# Numbers of a spec within this many powers of ten of one are not to blame.
+_USUAL = 6.0
+
+
+@contextmanager
+def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
+    """Raise overflow, division by zero and singular matrices inside as errors of the spec.
+
+    Args:
+        extreme: the key of the spec whose number is farthest from one, and how many powers of ten that is.
+
+    Raises:
+        InaccurateError: `beyond-precision`, `numerically-singular`.
+    """
+    with np.errstate(over="raise", divide="raise", invalid="raise"), warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        try:
+            yield
+        except np.linalg.LinAlgError as error:
+            raise InaccurateError.because(
+                "numerically-singular",
+                "the information matrix is singular to working precision: parameters are nearly alike",
+                "lower the orders, or look for poles and zeros that nearly cancel",
+                "plant",
+            ) from error
+        except (ArithmeticError, RuntimeWarning) as error:
+            raise _beyond(extreme, str(error)) from error
+
+
+def finite(results: Results, extreme: tuple[str, float]) -> Results:
+    """Return the results if every number of them is finite.
+
+    Raises:
+        InaccurateError: `beyond-precision`.
+    """
+    try:
+        _ = results.result
+    except ValueError as error:
+        raise _beyond(extreme, str(error)) from error
+    for name, table in results.tables.items():
+        for column, values in table.columns.items():
+            if not np.all(np.isfinite(values)):
+                raise _beyond(extreme, f"{column} of {name}.csv has values that are not finite")
+    return results
+
+
+def most_extreme(data: object) -> tuple[str, float]:
+    """Return the key of the number in plain data that is farthest from one, and its powers of ten."""
+
+    def walk(node: object, key: str) -> Iterator[tuple[str, float]]:
+        if isinstance(node, dict):
+            for name, value in node.items():
+                yield from walk(value, f"{key}.{name}" if key else str(name))
+        elif isinstance(node, list | tuple):
+            for index, value in enumerate(node):
+                yield from walk(value, f"{key}[{index}]")
+        elif isinstance(node, int | float) and not isinstance(node, bool) and node:
+            yield key, abs(math.log10(abs(node)))
+
+    return max(walk(data, ""), key=lambda found: found[1], default=("", 0.0))
+
+
+def _beyond(extreme: tuple[str, float], why: str) -> InaccurateError:
+    key, far = extreme
+    hint = "choose units in which the signals and the parameters are of the order of one"
+    if far > _USUAL:
+        hint = f"{key} is the most extreme number of the spec: {hint}"
+    message = f"the numbers of this question leave the range of double precision: {why}"
+    return InaccurateError.because("beyond-precision", message, hint, key if far > _USUAL else "")

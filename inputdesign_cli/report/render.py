@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.record import RESULT, readable
+from inputdesign_cli.outcome.run_files import RESULT, readable
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.run_page import run_page, run_sources
 from inputdesign_cli.report.sweep_page import sweep_page, sweep_sources

@@ -12,8 +12,16 @@ from inputdesign_cli.outcome.run_directory import read_outcome, read_run
 from inputdesign_cli.outcome.sentences import shown
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, run_charts
-from inputdesign_cli.report.evidence import estimate_table, requirement_table, simulation_table
-from inputdesign_cli.report.facts import Fact, answer, facts, provenance, said
+from inputdesign_cli.report.facts import (
+    Fact,
+    answer,
+    estimate_table,
+    facts,
+    provenance,
+    requirement_table,
+    said,
+    simulation_table,
+)
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
 

@@ -71,7 +71,7 @@ def sweep_page(root: Path) -> dict[str, object]:
         ],
         "verb": summary.verb,
         "spec": read_regular(root / "sweep.yaml").decode(),
-        "provenance": provenance(summary.environment or {}),
+        "provenance": provenance(summary.environment),
         "citations": cited,
     }
 

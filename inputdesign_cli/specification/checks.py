@@ -451,6 +451,7 @@ def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagn
     return [
         found
         for check, reads in CHECKS
-        if (design or check not in OF_DESIGNS) and not any(related(parse_key(key), broken) for key in reads)
+        if (design or check not in OF_DESIGNS)
+        and not (broken and any(related(parse_key(key), broken) for key in reads))
         for found in check(spec)
     ]

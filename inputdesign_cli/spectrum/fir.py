@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +31,7 @@ class FirBasis(GramBasis):
     e^{-jwm} I]; c_t is the sum of the blocks (s + t, s) of Q.
     """
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Return the number of unknowns."""
         return svec_length(self.inputs) + self.order * self.inputs**2

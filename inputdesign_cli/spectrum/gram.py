@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -44,7 +45,7 @@ class GramBasis(DensityFamily, ABC):
 
     hermitian = False
 
-    @property
+    @cached_property
     def gram_order(self) -> int:
         """Return the order n = r (m + 1) of the Gram matrix."""
         return self.inputs * (self.order + 1)
@@ -54,7 +55,7 @@ class GramBasis(DensityFamily, ABC):
         """Return the degree of the polynomial."""
         return self.order
 
-    @property
+    @cached_property
     def _copies(self) -> int:
         """Return the number of generators of the whole cone, in multiples of n."""
         return 2 if self.hermitian else 1

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,12 +81,12 @@ class LinesBasis:
             self, frequencies=np.repeat(w, len(start)), directions=np.tile(start, (w.size, 1)), units=units
         )
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Return the number of unknowns."""
         return self.frequencies.size
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Return the number of inputs r."""
         return self.directions.shape[1]

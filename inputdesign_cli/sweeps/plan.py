@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import get_args
 
 from inputdesign_cli.errors import STANDARD_STREAM, Location, OutputError, SpecError, bad_spec
-from inputdesign_cli.outcome.origin import digest
-from inputdesign_cli.outcome.record import environment
+from inputdesign_cli.figures.sweep_table import SweepAxis, SweepContent, read_content
+from inputdesign_cli.outcome.run_directory import digest
+from inputdesign_cli.outcome.run_files import environment
 from inputdesign_cli.questions import Verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, Sweep, read_template
@@ -22,7 +23,7 @@ from inputdesign_cli.specification.models.sweep import range_values
 from inputdesign_cli.specification.yaml.plain import plain, to_yaml
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.specification.yaml.scalars import resolve
-from inputdesign_cli.sweeps.points import SUMMARY, PointJob
+from inputdesign_cli.sweeps.points import PointJob
 from inputdesign_cli.version import __version__
 
 Settings = Sequence[str] | Mapping[str, object]
@@ -34,33 +35,23 @@ _WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
 
 @dataclass(frozen=True)
-class Axis:
-    """Holds a key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
-
-    key: str
-    texts: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Grid:
     """Generates the points as tuples of texts, one per axis, when asked for. The last axis runs fastest."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
     zipped: bool = False
 
     def __len__(self) -> int:
-        lengths = [len(axis.texts) for axis in self.axes]
+        lengths = [len(axis.values) for axis in self.axes]
         return (min(lengths) if self.zipped else math.prod(lengths)) if lengths else 0
 
     def __getitem__(self, index: int) -> tuple[str, ...]:
         if not 0 <= index < len(self):
             raise IndexError(index)
-        if self.zipped:
-            return tuple(axis.texts[index] for axis in self.axes)
         texts = []
         for axis in reversed(self.axes):
-            index, place = divmod(index, len(axis.texts))
-            texts.append(axis.texts[place])
+            index, place = (index, index) if self.zipped else divmod(index, len(axis.values))
+            texts.append(axis.values[place])
         return tuple(reversed(texts))
 
     def __iter__(self) -> Iterator[tuple[str, ...]]:
@@ -72,11 +63,11 @@ class Grid:
 
     def block(self) -> dict[str, object]:
         """Return the grid as the `sweep` block of a spec."""
-        values = {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
+        values = {axis.key: [_data(text) for text in axis.values] for axis in self.axes}
         return {"set": values, "zip": True} if self.zipped else {"set": values}
 
 
-def parse_settings(settings: Settings) -> tuple[list[str], list[Axis]]:
+def parse_settings(settings: Settings) -> tuple[list[str], list[SweepAxis]]:
     """Read `KEY=V1,V2,..` and `KEY=LOW:HIGH:STEP` as axes; `KEY=VALUE` stays an override of every point.
 
     Commas inside brackets, braces and quotes belong to a value. A mapping of keys to values takes the place
@@ -88,7 +79,7 @@ def parse_settings(settings: Settings) -> tuple[list[str], list[Axis]]:
     if isinstance(settings, Mapping):
         return [f"sweep={json.dumps({'set': plain(settings)})}"], []
     fixed: list[str] = []
-    axes: dict[str, Axis] = {}
+    axes: dict[str, SweepAxis] = {}
     for setting in settings:
         key, equals, text = setting.partition("=")
         parts = _split(text)
@@ -108,28 +99,25 @@ def parse_settings(settings: Settings) -> tuple[list[str], list[Axis]]:
             hint = "give all its values at once: key=v1,v2,v3"
             raise bad_spec("sweep-twice", f"{key} is swept by two settings", hint=hint, key=key)
         else:
-            axes[key] = Axis(key, tuple(texts))
+            axes[key] = SweepAxis(key, tuple(texts))
     return fixed, list(axes.values())
 
 
-def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Grid:
+def build_grid(block: Sweep | None, axes: Sequence[SweepAxis], *, zipped: bool) -> Grid:
     """Return the grid of the spec's `sweep` block; axes of the command line replace or join them.
 
     Raises:
         SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`.
     """
-    merged: dict[str, Axis] = {}
-    if block is not None:
-        for key, values in block.set.items():
-            merged[key] = Axis(key, tuple(_text(value) for value in values))
-    for axis in axes:
-        merged[axis.key] = axis
+    stated = {} if block is None else block.set
+    merged = {key: SweepAxis(key, tuple(map(_text, values))) for key, values in stated.items()}
+    merged |= {axis.key: axis for axis in axes}
     grid = Grid(tuple(merged.values()), zipped or (block is not None and block.zip))
     if not merged:
         message = "nothing is varied: no key has several values"
         hint = "write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5"
         raise bad_spec("sweep-empty", message, hint=hint)
-    lengths = {axis.key: len(axis.texts) for axis in grid.axes}
+    lengths = {axis.key: len(axis.values) for axis in grid.axes}
     if grid.zipped and len(set(lengths.values())) > 1:
         listed = ", ".join(f"{key} has {n}" for key, n in lengths.items())
         message = f"values that are taken side by side must be equally many ({listed})"
@@ -221,26 +209,24 @@ class Plan:
         """Return the content of the spec without its parts about a sweep."""
         return {key: value for key, value in self.draft.data.items() if key != "sweep"}
 
-    def summary(self, made_from: Sequence[str], statuses: Mapping[str, int]) -> dict[str, object]:
+    def summary(self, made_from: Sequence[str], statuses: Mapping[str, int]) -> SweepContent:
         """Return the content of sweep.json.
 
         Args:
             made_from: the spec file as it is seen from the directory.
             statuses: the number of points of each status.
         """
-        return {
-            "format": 1,
-            "kind": "sweep",
-            "title": str(self.draft.data.get("title", "")),
-            "verb": self.verb,
-            "made_from": list(made_from),
-            "asked_sha256": digest(to_yaml(self.base)),
-            "axes": [{"key": axis.key, "values": list(axis.texts)} for axis in self.grid.axes],
-            "zip": self.grid.zipped,
-            "points": len(self.grid),
-            "statuses": statuses,
-            "environment": environment(),
-        }
+        return SweepContent(
+            title=str(self.draft.data.get("title", "")),
+            verb=self.verb,
+            made_from=tuple(made_from),
+            asked_sha256=digest(to_yaml(self.base)),
+            axes=self.grid.axes,
+            zip=self.grid.zipped,
+            points=len(self.grid),
+            statuses=statuses,
+            environment=environment(),
+        )
 
     def check_place(self, made_from: Sequence[str], root: Path) -> None:
         """Refuse a directory with the sweep of another spec, of other keys, or of another command.
@@ -251,19 +237,17 @@ class Plan:
             OutputError: `output-other-run`.
         """
         try:
-            there = json.loads(read_regular(root / SUMMARY))
-            keys = [axis["key"] for axis in there["axes"]]
-            verb, theirs, asked = there["verb"], there.get("made_from"), there.get("asked_sha256")
-        except (OSError, ValueError, RecursionError, KeyError, TypeError):
+            there = read_content(root)
+        except (OSError, ValueError, RecursionError):
             return  # a sweep that was killed at its very start left nothing to compare
-        ours = [axis.key for axis in self.grid.axes]
-        same_file = theirs == list(made_from) != [STANDARD_STREAM]
-        if verb != self.verb:
-            what = f"the command {verb}, not {self.verb}"
+        ours, keys = ([axis.key for axis in axes] for axes in (self.grid.axes, there.axes))
+        same_file = there.made_from == tuple(made_from) != (STANDARD_STREAM,)
+        if there.verb != self.verb:
+            what = f"the command {there.verb}, not {self.verb}"
         elif set(keys) != set(ours):
-            what = f"{', '.join(map(str, keys))}, not {', '.join(ours)}"
-        elif not same_file and asked != digest(to_yaml(self.base)):
-            what = "another spec" + (f" ({theirs[0]} as seen from there)" if theirs else "")
+            what = f"{', '.join(keys)}, not {', '.join(ours)}"
+        elif not same_file and there.asked_sha256 != digest(to_yaml(self.base)):
+            what = "another spec" + (f" ({there.made_from[0]} as seen from there)" if there.made_from else "")
         else:
             return
         raise OutputError.because(

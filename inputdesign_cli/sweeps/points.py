@@ -37,10 +37,15 @@ from inputdesign_cli.errors import (
     SpecError,
 )
 from inputdesign_cli.outcome.codec import json_text
-from inputdesign_cli.outcome.origin import digest
-from inputdesign_cli.outcome.record import RESULT, SPEC as RUN_SPEC, environment, is_plain, unreadable
-from inputdesign_cli.outcome.replacing import locked
-from inputdesign_cli.outcome.run_directory import output_errors, read_run, replace_text
+from inputdesign_cli.outcome.run_directory import digest, output_errors, read_run, replace_text
+from inputdesign_cli.outcome.run_files import (
+    RESULT,
+    SPEC as RUN_SPEC,
+    environment,
+    is_plain,
+    locked,
+    unreadable,
+)
 from inputdesign_cli.questions import Verb, run_verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple, Self
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, OutputError
 from inputdesign_cli.outcome.codec import json_text
-from inputdesign_cli.outcome.origin import Origin
-from inputdesign_cli.outcome.record import PAGE, is_page
-from inputdesign_cli.outcome.run_directory import output_errors, replace_text
+from inputdesign_cli.outcome.run_directory import Origin, output_errors, replace_text
+from inputdesign_cli.outcome.run_files import PAGE, is_page
 from inputdesign_cli.outcome.text_formats import csv_line, shortest
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps import points

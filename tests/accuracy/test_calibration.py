@@ -11,8 +11,8 @@ import scipy.stats
 from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.errors import InaccurateError, InfeasibleError
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.common.confidence import settled_alpha
-from inputdesign_cli.questions.task import build_task
 
 SPECS = Path(__file__).parents[2] / "specs"
 BASE = """

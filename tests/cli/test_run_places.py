@@ -13,9 +13,8 @@ import pytest
 from inputdesign_cli import questions
 from inputdesign_cli.cli import main
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.outcome.origin import Origin, check_place
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.run_directory import write_run
+from inputdesign_cli.outcome.run_directory import Origin, check_place, write_run
 from tests.support.outcomes import typed
 
 SPEC = """\

@@ -131,7 +131,7 @@ def work():
         print("tidied up")
 
 def run():
-    cli.streams.prepare_signals()
+    cli.terminal.prepare_signals()
     cli.typer.run(guarded(work)) if where == "guarded" else work()
 
 cli.main = run

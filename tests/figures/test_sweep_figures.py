@@ -16,7 +16,7 @@ def table(axes, values, *, zipped=False, floor=None, kind="least_cost"):
     if floor is not None:
         columns["objective.any_spectrum_bound"] = [str(f) for f in floor]
     listed = tuple(SweepAxis(key, tuple(axes[key])) for key in keys)
-    return SweepTable(SweepContent("solve", listed, zip=zipped), columns)
+    return SweepTable(SweepContent(verb="solve", axes=listed, zip=zipped), columns)
 
 
 N = "experiment.samples"

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome import replacing
+from inputdesign_cli.outcome import run_files
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from tests.support.outcomes import typed
@@ -250,8 +250,8 @@ def test_links_in_a_run_directory_lead_nowhere(tmp_path):
 
 
 def test_two_writers_take_turns(tmp_path, monkeypatch):
-    monkeypatch.setattr(replacing, "_PATIENCE", 0.05)
-    with replacing.workplace(tmp_path / "a"), pytest.raises(OutputError) as caught:
+    monkeypatch.setattr(run_files, "_PATIENCE", 0.05)
+    with run_files.workplace(tmp_path / "a"), pytest.raises(OutputError) as caught:
         write_run(a_run("first"), tmp_path / "a")
     assert caught.value.diagnostics[0].code == "output-busy"
     write_run(a_run("first"), tmp_path / "a")
@@ -297,10 +297,10 @@ DESIGN = BARE + "sys.argv[0] = 'idesign'\nmain()\n"
 WRITE = f"""{BARE}
 from pathlib import Path
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.outcome import replacing
-replacing._PATIENCE = 0.2
+from inputdesign_cli.outcome import run_files
+run_files._PATIENCE = 0.2
 try:
-    with replacing.workplace(Path(sys.argv[1])):
+    with run_files.workplace(Path(sys.argv[1])):
         print("free", flush=True)
         sys.stdin.read()
 except OutputError as error:

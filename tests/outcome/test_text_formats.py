@@ -20,9 +20,9 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome import Outcome, OutcomeError, plain, read_plain
 from inputdesign_cli.outcome.codec import NULL, json_text, others
-from inputdesign_cli.outcome.record import FIGURES
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.run_directory import curves_json, read_curves
+from inputdesign_cli.outcome.run_files import FIGURES
 from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_line, csv_rows, csv_text
 from tests.support.commands import caller

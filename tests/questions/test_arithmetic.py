@@ -11,7 +11,7 @@ import pytest
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.questions.arithmetic import finite, most_extreme, sound_arithmetic
+from inputdesign_cli.questions import finite, most_extreme, sound_arithmetic
 from tests.support.outcomes import typed
 
 BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}"

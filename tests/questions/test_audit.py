@@ -8,9 +8,9 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.outcome import Outcome, plain, read_plain
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import design_outcome
-from inputdesign_cli.questions.task import build_task
 
 PLANT = """
 plant: {B: [0, 3.6], F: [1, -0.7]}

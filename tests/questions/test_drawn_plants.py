@@ -5,8 +5,8 @@ import pytest
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.least_cost.build import build_convex
-from inputdesign_cli.questions.task import build_task
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS
 
 

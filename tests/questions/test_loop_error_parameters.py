@@ -5,7 +5,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, simulate, solve, validate
 from inputdesign_cli.errors import Diagnostic, SpecError
-from inputdesign_cli.report.evidence import simulation_table
+from inputdesign_cli.report.facts import simulation_table
 from tests.support.outcomes import typed
 
 REST = """

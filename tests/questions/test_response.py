@@ -10,8 +10,8 @@ from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.outcome import Outcome, read_plain
 from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.frequency_response.outcome import audit_response
-from inputdesign_cli.questions.task import build_task
 
 SPECS = Path(__file__).parents[2] / "specs"
 SINGLE = """

@@ -12,9 +12,9 @@ from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.common.record import Made, make_record
 from inputdesign_cli.questions.least_cost.record_search import ShortestRecord, Way
-from inputdesign_cli.questions.task import build_task
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.selection import Record
 

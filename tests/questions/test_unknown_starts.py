@@ -12,7 +12,7 @@ from inputdesign_cli.identification import information_begun_anywhere
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.outcome.design import RequirementMet, Signal
 from inputdesign_cli.outcome.estimate import Assessment
-from inputdesign_cli.outcome.outcome import Outcome
+from inputdesign_cli.outcome.results import Outcome
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.common.task import growth_by_start
 from inputdesign_cli.questions.least_cost.build import build_convex

@@ -19,8 +19,8 @@ from inputdesign_cli.outcome.curves import (
     SignalCurves,
     SpectrumCurves,
 )
-from inputdesign_cli.outcome.record import FIGURES
 from inputdesign_cli.outcome.run_directory import curves_json
+from inputdesign_cli.outcome.run_files import FIGURES
 from inputdesign_cli.report.charts import captioned, run_charts
 from inputdesign_cli.report.facts import facts, said
 from tests.support.curves import CURVES

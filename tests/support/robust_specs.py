@@ -4,7 +4,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.questions import build_task
 
 FIRST = """
 plant: {B: [0, 3.6], F: [1, -0.7]}

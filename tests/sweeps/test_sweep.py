@@ -16,9 +16,9 @@ import inputdesign_cli
 from inputdesign_cli import load_spec, parse_spec, questions, sweep
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError, SpecError
-from inputdesign_cli.figures.sweep_table import read_sweep
+from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
-from inputdesign_cli.sweeps.plan import Axis, Grid, build_grid, build_plan, parse_settings
+from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings
 from inputdesign_cli.sweeps.points import Layout
 from inputdesign_cli.sweeps.running import Row, list_points, scalars, table_lines
 from tests.support.processes import running
@@ -330,7 +330,7 @@ def test_nothing_to_vary_is_an_error(spec, stub):
 
 def texts(*settings):
     fixed, axes = parse_settings(settings)
-    return fixed, {axis.key: axis.texts for axis in axes}
+    return fixed, {axis.key: axis.values for axis in axes}
 
 
 @pytest.mark.parametrize(
@@ -372,12 +372,12 @@ def test_bad_settings(setting, code):
 
 @pytest.mark.parametrize("lengths", [(1,), (3, 1), (2, 4, 3), (1, 2, 1, 2)])
 def test_a_grid_is_the_product_of_its_axes(lengths):
-    axes = [Axis(f"k{i}", tuple(map(str, range(n)))) for i, n in enumerate(lengths)]
-    assert list(Grid(tuple(axes))) == list(itertools.product(*(axis.texts for axis in axes)))
+    axes = [SweepAxis(f"k{i}", tuple(map(str, range(n)))) for i, n in enumerate(lengths)]
+    assert list(Grid(tuple(axes))) == list(itertools.product(*(axis.values for axis in axes)))
 
 
 def test_a_zipped_grid_goes_side_by_side():
-    grid = build_grid(None, [Axis("a", ("1", "2")), Axis("b", ("3", "4"))], zipped=True)
+    grid = build_grid(None, [SweepAxis("a", ("1", "2")), SweepAxis("b", ("3", "4"))], zipped=True)
     assert list(grid) == [("1", "3"), ("2", "4")]
     assert grid.overrides(grid[1]) == ["a=2", "b=4"]
 
@@ -386,8 +386,8 @@ def test_a_zipped_grid_goes_side_by_side():
     ("axes", "zipped", "code"),
     [
         ([], False, "sweep-empty"),
-        ([Axis("a", ("1", "2")), Axis("b", ("3",) * 3)], True, "sweep-lengths"),
-        ([Axis("a", ("1",) * 1001), Axis("b", ("1",) * 1000)], False, "sweep-too-large"),
+        ([SweepAxis("a", ("1", "2")), SweepAxis("b", ("3",) * 3)], True, "sweep-lengths"),
+        ([SweepAxis("a", ("1",) * 1001), SweepAxis("b", ("1",) * 1000)], False, "sweep-too-large"),
     ],
 )
 def test_grids_that_are_refused(axes, zipped, code):
@@ -402,9 +402,9 @@ BLOCK = {"set": {"a": [1, "white", {"type": "fir"}], "b": "0:0.2:0.1"}}
 def test_the_block_of_a_spec_and_the_command_line():
     block = Sweep.model_validate(BLOCK)
     grid = build_grid(block, [], zipped=False)
-    assert [axis.texts for axis in grid.axes] == [("1", "white", '{"type": "fir"}'), ("0", "0.1", "0.2")]
-    replaced = build_grid(block, [Axis("a", ("7", "8")), Axis("c", ("x", "y"))], zipped=False)
-    assert {axis.key: axis.texts for axis in replaced.axes} == {
+    assert [axis.values for axis in grid.axes] == [("1", "white", '{"type": "fir"}'), ("0", "0.1", "0.2")]
+    replaced = build_grid(block, [SweepAxis("a", ("7", "8")), SweepAxis("c", ("x", "y"))], zipped=False)
+    assert {axis.key: axis.values for axis in replaced.axes} == {
         "a": ("7", "8"), "b": ("0", "0.1", "0.2"), "c": ("x", "y")
     }  # fmt: skip
     assert build_grid(Sweep.model_validate(grid.block()), [], zipped=False) == grid

@@ -116,7 +116,7 @@ class Demands:
         """Return the criterion of the nominal plant that is to be maximised, if that is the goal."""
         return criterion_of(self.scenarios[0].requirements)
 
-    @property
+    @cached_property
     def definite(self) -> bool:
         """Return whether the requirements exclude a singular information matrix."""
         return any(asked.requirement.definite for asked in self.asked)

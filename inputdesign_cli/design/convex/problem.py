@@ -82,6 +82,7 @@ class Problem:
     finer: Problem | None = field(default=None, repr=False)
     seen: Demands | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
+    _elsewhere: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
     def demands(self) -> Demands:
@@ -93,7 +94,7 @@ class Problem:
             return self.seen
         return Demands((asked, *self.others))
 
-    @property
+    @cached_property
     def scenarios(self) -> tuple[Scenario, ...]:
         """Return all S plants, the nominal one first."""
         return self.demands.scenarios
@@ -112,7 +113,11 @@ class Problem:
 
     def on(self, basis: Basis) -> Problem:
         """Return the problem on another basis, for example one that has grown out of this one."""
-        return self if basis is self.basis else replace(self, basis=basis, finer=None)
+        if basis is self.basis:
+            return self
+        if not self._elsewhere or self._elsewhere[0].basis is not basis:
+            self._elsewhere[:] = [replace(self, basis=basis, finer=None)]
+        return self._elsewhere[0]
 
     def grown(self, basis: Basis) -> Problem:
         """Return the problem on a basis that begins with this one, and keep the integrals computed so far."""
@@ -135,12 +140,12 @@ class Problem:
             return np.concatenate([before, integrals(self.basis.beyond(len(before)))])
         return integrals(self.basis)
 
-    @property
+    @cached_property
     def scaled(self) -> bool:
         """Return whether an unknown s multiplies limits and known information (goals other than cost)."""
         return self.goal != "cost"
 
-    @property
+    @cached_property
     def has_floors(self) -> bool:
         """Return whether some limit is a lower one."""
         powers = any(not limit.upper for limit in self.limits)
@@ -155,7 +160,7 @@ class Problem:
             lambda basis: joint_information(experiments, basis.integrals),
         )
 
-    @property
+    @cached_property
     def information_map(self) -> NDArray[np.float64]:
         """Return the information maps (size, k, k) of the nominal plant."""
         return self.information_maps[:, 0]
@@ -169,7 +174,7 @@ class Problem:
     def _priors(self) -> NDArray[np.float64]:
         return np.array([scenario.experiment.prior_information for scenario in self.scenarios])
 
-    @property
+    @cached_property
     def baseline_information(self) -> Array:
         """Return M0 of the nominal plant (k, k)."""
         return self.baselines[0]
@@ -236,7 +241,7 @@ class Problem:
 
     def cost_at(self, x: Array) -> float:
         """Return the cost of a spectrum (goal "cost")."""
-        return max(cost.at(x) for cost in self.costs)
+        return max([float(cost.vector @ x) for cost in self.costs])
 
     def _cost_of(self, scenarios: range) -> Functional:
         """Return the mean of the costs at these plants."""
@@ -260,11 +265,13 @@ class Problem:
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
         """Return the power of input, output or excitation (of one channel) as a functional."""
+        # Without this problem inside, which would keep the arrays of each that has grown beyond it.
+        experiment = self.scenarios[scenario].experiment
+        if kind == "input" and experiment.loop is None:
+            kind = "excitation"  # the same signal
         known = self._powers.get((kind, channel, scenario))
         if known is not None:
             return known
-        # Without this problem inside, which would keep the arrays of each that has grown beyond it.
-        experiment = self.scenarios[scenario].experiment
 
         def density(w: Array) -> Array:
             return experiment.power_density(kind, w, channel)

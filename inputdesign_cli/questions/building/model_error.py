@@ -11,7 +11,7 @@ import scipy
 from inputdesign_cli import accuracy
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
-from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.accuracy.requirement import OverFrequency
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.shares import rounded_down, rounded_up

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.accuracy import Criterion, InformationTarget, WeightedVariance, active_entries
-from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.accuracy.requirement import OverFrequency
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model

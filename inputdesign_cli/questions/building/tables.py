@@ -10,10 +10,9 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.records import read_sheet
-from inputdesign_cli.records.columns import columns_of
-from inputdesign_cli.records.signals import check_range
 from inputdesign_cli.specification import Spec
+
+# A spec without data files does not wait for what reads them.
 
 _LARGEST = 1e40  # as of other numbers in a spec
 
@@ -23,6 +22,9 @@ def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 
     Raises `DataError`: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
     """
+    from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.columns import columns_of
+
     sheet = read_sheet(path, key=key)
     found = columns_of(sheet, wanted)
     for role, numbers in found.items():
@@ -39,6 +41,9 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 
     Raises `DataError`: see `read_columns`; `beyond-precision`.
     """
+    from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.signals import check_range
+
     sheet = read_sheet(path, key=key)
     for line in sheet.passed:
         message = f"line {line} of {path.name} is blank or commented out: is a sample missing there?"
@@ -52,6 +57,8 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 
 def has_column(path: Path, start: str, *, key: str) -> bool:
     """Return whether some header of a data file begins like this; `DataError` (`data-unreadable`)."""
+    from inputdesign_cli.records import read_sheet
+
     return any(name.startswith(start) for name in read_sheet(path, key=key).header)
 
 

@@ -25,9 +25,8 @@ from pathlib import Path
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import OutcomeError, plain, read_plain
 from inputdesign_cli.outcome.campaign import Campaign
-from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC, load_result, unreadable
-from inputdesign_cli.outcome.replacing import locked
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
+from inputdesign_cli.outcome.run_files import RESULT, SIGNAL, SPEC, load_result, locked, unreadable
 from inputdesign_cli.regular_file import read_regular
 
 VERSION = 1

@@ -261,7 +261,7 @@ def _target(
     bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in scenarios]
 
     def largest(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
-        return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+        return max([of[n](M) for n, M in zip(numbers, informations, strict=True)])
 
     least = partial(largest, bounding) if meets else None
     cost = design_cost(design, request.cost)
@@ -382,7 +382,7 @@ def _largest(
         eigenvalues = np.linalg.eigvalsh(information)
         if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
             raise np.linalg.LinAlgError
-        return max((of(requirement, information) for requirement in requirements), default=0.0)
+        return max([of(requirement, information) for requirement in requirements], default=0.0)
 
     return ratio
 

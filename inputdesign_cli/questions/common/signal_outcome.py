@@ -16,7 +16,7 @@ from inputdesign_cli.outcome import Signal
 from inputdesign_cli.outcome.curves import PredictedPanel, SignalCurves
 from inputdesign_cli.outcome.design import Moves
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.signal_files import WRITERS
+from inputdesign_cli.outcome.text_formats import WRITERS
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest

@@ -23,8 +23,14 @@ from inputdesign_cli.findings import simulated_runs
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
-from inputdesign_cli.monte_carlo.study import Study, Tried, tried_on_model, tried_on_truth
-from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
+from inputdesign_cli.monte_carlo.study import (
+    PredictedError,
+    Study,
+    Trials,
+    Tried,
+    tried_on_model,
+    tried_on_truth,
+)
 from inputdesign_cli.outcome import Powers, Simulation as Studied, curves as plots
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations

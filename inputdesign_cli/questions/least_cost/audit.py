@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev, legendre, polynomial
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
-from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.accuracy.requirement import OverFrequency
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario

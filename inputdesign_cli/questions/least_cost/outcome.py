@@ -55,7 +55,7 @@ class Designed:
     kept: Sequence[int] = ()
     plants: Plants | None = None
 
-    @property
+    @cached_property
     def design(self) -> Design:
         """Return the design of the answer."""
         return self.answer.design

@@ -79,12 +79,12 @@ class NamedPlant(Section):
         """Return a parameter of the model as an expression in the named parameters."""
         raise NotImplementedError
 
-    @property
+    @cached_property
     def outputs(self) -> int:
         """Return the number of outputs."""
         return self.shape[0]
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Return the number of inputs."""
         return self.shape[1]
@@ -180,7 +180,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         rows = transfer.as_matrix(named.expressed(self.written.get("B", self.B)))
         return tuple(tuple(named.leading(entry) for entry in row) for row in rows)
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Return the numbers of outputs and inputs."""
         return transfer.size_of(self.B)

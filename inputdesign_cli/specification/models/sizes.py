@@ -6,45 +6,10 @@ Beyond them memory or time runs out, or rounding dominates; `docs/sizes.md` show
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from pydantic import AfterValidator
 
-from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import core_schema
-
-from inputdesign_cli.specification.models.section import fail
+from inputdesign_cli.specification.models.section import Size, fail
 from inputdesign_cli.specification.models.wording import show
-from inputdesign_cli.specification.yaml.plain import Plain
-
-
-@dataclass(frozen=True)
-class Size:
-    """The largest number, or the longest list, that a key takes; stands in the `Annotated[..]` of a type."""
-
-    most: int
-    why: str
-
-    def check(self, value: Plain) -> Plain:
-        """Return the value itself, or raise `PydanticCustomError` (`too-large`)."""
-        listed = isinstance(value, list | tuple | dict)
-        size = len(value) if listed else value
-        if isinstance(size, int | float) and not isinstance(size, bool) and self.most < size < 2**1024:
-            held = f"has {size} entries" if listed else f"is {show(size)}"
-            hint = f"write at most {self.most}" + (" entries" if listed else "")
-            raise fail("too-large", f"{{key}} {held}, and at most {self.most} are taken: {self.why}", hint)
-        return value
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(self.check, handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Plain]:
-        inner = handler(schema)
-        limits = {"array": "maxItems", "integer": "maximum", "object": "maxProperties"}
-        limit = limits.get(str(inner.get("type")))
-        return {**inner, limit: self.most} if limit else inner
 
 
 def magnitude(least: float, most: float) -> AfterValidator:

@@ -16,7 +16,7 @@ from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel
-from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.spectrum import FirBasis, PolynomialBasis
 from tests.support.on_grid import OnGrid
 from tests.support.plants import arrays, two_by_two
