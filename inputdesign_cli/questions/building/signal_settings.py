@@ -50,7 +50,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         stated_method=signal.type is not None,
         others=()
         if limits.moves is not None
-        else tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
+        else tuple(build_signal_settings(spec, method) for method in _methods(spec)[1:]),
         limit_keys=tuple(key for key in stated if spec.at(*key.split(".")) is not None),
         delivery=Delivery(
             operating_points=None if signal.offset is None else operating_points(spec),
@@ -64,7 +64,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
 def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettings:
     """Return the settings of the signal of a type; what is not stated follows from other keys."""
     signal, inputs = spec.signal, spec.plant.inputs
-    method = method or _method(spec)
+    method = method or _methods(spec)[0]
     limited = spec.limits.amplitude is not None or spec.limits.rate is not None
     uniform: Phases = "orthogonal" if inputs > 1 else "random"
     phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else uniform)
@@ -163,33 +163,30 @@ def sampling_rate(spec: Spec) -> float:
     return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
 
 
-def _method(spec: Spec) -> str:
-    """Return the type of signal: as stated, or as other keys imply."""
-    signal = spec.signal
-    implied = "multisine" if signal.stated("phases", "lines") else "prbs" if signal.bits is not None else ""
-    return signal.type or implied or _usual_method(spec)
+def _methods(spec: Spec) -> tuple[str, ...]:
+    """Return the type of signal, as stated or as other keys imply, and then others that may serve too.
 
-
-def _usual_method(spec: Spec) -> str:
-    """Return the type if none is stated: filtered noise for one input and output in q^-1, or multisine."""
-    plant, spectrum = spec.plant, spec.spectrum
+    The usual type is filtered noise for one input and output in q^-1, or else multisine. There are no others
+    if the spec states how the signal is made.
+    """
+    signal, plant, spectrum = spec.signal, spec.plant, spec.spectrum
     single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
     banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
     noise = single and not banded and spec.accuracy.frequency_response is None
-    return "filtered_noise" if noise else "multisine"
-
-
-def _other_methods(spec: Spec) -> tuple[str, ...]:
-    """Return other types that may serve too; empty if the spec states how the signal is made."""
-    if spec.signal.stated("phases", "lines", "bits"):
-        return ()
-    others = [_usual_method(spec), "multisine"]
-    if spec.plant.sampled and not spec.signal.ramp:
+    usual = "filtered_noise" if noise else "multisine"
+    implied = "prbs" if signal.bits is not None else usual
+    if made := signal.stated("phases", "lines"):
+        implied = "multisine"
+    method = signal.type or implied
+    if made or signal.bits is not None:
+        return (method,)
+    others = [usual, "multisine"]
+    if plant.sampled and not signal.ramp:
         moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
         # Limits on moves may prevent an input from switching between its levels at once.
         slow = moves is not None and peak is not None and bool(np.isfinite(moves).any())
         others.append("slewed" if slow and not spec.closed_loop else "binary")
-    return tuple(method for method in dict.fromkeys(others) if method != _method(spec))
+    return tuple(dict.fromkeys([method, *others]))
 
 
 def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array | None:
@@ -212,23 +209,21 @@ def check_signal(spec: Spec) -> None:
         _check_length(spec, settings)
     _check_kind(spec, settings)
     _check_moves(spec, settings)
-    for channel in range(spec.plant.inputs):
-        _check_level(spec, channel)
+    _check_levels(spec)
 
 
 def _check_length(spec: Spec, settings: SignalSettings) -> None:
     """Refuse samples, periods, holds, ramps and harmonics that do not fit each other."""
     samples, block, ramp = spec.signal_samples, settings.block, settings.ramp
-    key = "signal.periods" if settings.periods > 1 else "signal.hold"
     least, period = least_period(spec.plant.inputs), samples // block
-    if samples % block:
-        nearest = " or ".join(str(n) for n in (samples - samples % block, block * (period + 1)) if n)
-        hint = f"write signal.samples: {nearest}, or another number of periods"
-        message = f"{samples} samples are no multiple of {block}: periods times samples of a hold"
-        raise spec.complain("conflicting-keys", message, hint=hint, key=key)
-    if block > 1 and period < least:
-        hint = "ask for more samples, fewer periods or a shorter hold"
+    if samples % block or (block > 1 and period < least):
         message = f"the values of a period are {period}, and must be {least} or more"
+        hint = "ask for more samples, fewer periods or a shorter hold"
+        if samples % block:
+            nearest = " or ".join(str(n) for n in (samples - samples % block, block * (period + 1)) if n)
+            message = f"{samples} samples are no multiple of {block}: periods times samples of a hold"
+            hint = f"write signal.samples: {nearest}, or another number of periods"
+        key = "signal.periods" if settings.periods > 1 else "signal.hold"
         raise spec.complain("conflicting-keys", message, hint=hint, key=key)
     if 2 * ramp > samples:
         message = f"ramp is {ramp}, but the signal has {samples} samples to fade in and out"
@@ -285,27 +280,26 @@ def _check_moves(spec: Spec, settings: SignalSettings) -> None:
         raise spec.complain("not-supported", message, hint=hint, key="limits.moves")
 
 
-def _check_level(spec: Spec, channel: int) -> None:
+def _check_levels(spec: Spec) -> None:
     """Refuse a level, limits and a converter that do not fit; in a loop, limits are not of the signal."""
     bounds, inputs = build_bounds(spec), spec.plant.inputs
-    limits = {
-        key: float(bound[channel])
-        for key, bound in (("limits.amplitude", bounds.amplitude), ("limits.rate", bounds.rate))
-        if bound is not None and not spec.closed_loop
-    }
-    most, levels = limits.get("limits.amplitude", np.inf), per_channel(spec.signal.amplitudes, inputs)
-    if levels is not None and levels[channel] > most:
-        of = f" of input {channel + 1}" if inputs > 1 else ""
-        hint = "lower it, or remove it: the tool finds the level that the accuracy needs"
-        message = f"amplitudes is {levels[channel]:g}, above limits.amplitude {most:g}{of}"
-        raise spec.complain("conflicting-keys", message, hint=hint, key="signal.amplitudes")
-    for quantiser in bounds.quantisers[channel : channel + 1]:
+    unlimited = np.full(inputs, np.inf)
+    most, rate = (
+        unlimited if bound is None or spec.closed_loop else bound for bound in (bounds.amplitude, bounds.rate)
+    )
+    for channel, level in enumerate(np.broadcast_to(spec.signal.amplitudes or 0.0, inputs)):
+        if level > most[channel]:
+            of = f" of input {channel + 1}" if inputs > 1 else ""
+            hint = "lower it, or remove it: the tool finds the level that the accuracy needs"
+            message = f"amplitudes is {level:g}, above limits.amplitude {most[channel]:g}{of}"
+            raise spec.complain("conflicting-keys", message, hint=hint, key="signal.amplitudes")
+    for channel, quantiser in enumerate(bounds.quantisers):
         step, span = quantiser.step, quantiser.span
         if quantiser.reach() < step:
             message = f"the offset {quantiser.offset:g} leaves no room in [{-span:g}, {span - step:g}]"
             hint = "move the offset, or widen quantisation.range"
             raise spec.complain("coarse-converter", message, hint=hint, key="signal.offset")
-        for key, bound in limits.items():
+        for key, bound in (("limits.amplitude", most[channel]), ("limits.rate", rate[channel])):
             if bound * (1 + _STEPS_ROUNDING) < step:
                 message = f"{key} is {bound:g}, less than one step {step:g} of the converter"
                 hint = "take a converter of more bits or of a smaller range, or raise the limit"

@@ -231,31 +231,25 @@ def response_results(
     signal = replace(signal, worst_ratio=plan.record.worst_ratio, start_shift=plan.shift)
     matrices = _matrices(plan.powers)
     spectrum = {units.frequency_header: terms.frequency, **hermitian_columns(matrices, "power")}
-    columns, deviations = deviation_curves(units, terms.frequency, terms.lines, _deviations(terms, plan))
+    columns, drawn = deviations(terms, plan)
     for i in range(units.outputs):
         columns[f"noise_spectrum{'' if units.outputs == 1 else f'_{i + 1}'}"] = terms.lines.noise[:, i]
     tables = {"deviations": Table(columns), "spectrum": Table(spectrum)}
     lines = SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True)
-    curves: dict[str, Curves] = {"deviations": deviations, "spectrum": lines}
+    curves: dict[str, Curves] = {"deviations": drawn, "spectrum": lines}
     results = results_of(terms.header, response_outcome(terms, plan, timing), tables, curves)
     return with_record(results, request, units, experiment, plan.record, signal)
 
 
-def _deviations(terms: ResponseTerms, plan: Planned) -> dict[str, NDArray[np.float64]]:
-    """Return the deviations (L, p, r) of the designed lines and of the record."""
-    designed = terms.lines.deviations(plan.powers, plan.counted)
-    return {"deviation": designed, "deviation_record": plan.deviations}
-
-
-def studied_deviations(
-    terms: ResponseTerms, plan: Planned, results: Results, study: ResponseStudy
-) -> tuple[Table, DeviationCurves]:
-    """Return deviations.csv and its figure with the simulated deviations."""
-    name = "deviation_simulated"
-    listed = {**_deviations(terms, plan), name: study.deviation}
-    shown = (name, f"{study.runs} simulated experiments")
-    columns, curves = deviation_curves(terms.header.units, terms.frequency, terms.lines, listed, shown)
-    return Table({**results.tables["deviations"].columns, **columns}), curves
+def deviations(
+    terms: ResponseTerms, plan: Planned, study: ResponseStudy | None = None
+) -> tuple[dict[str, Array], DeviationCurves]:
+    """Return deviations.csv and its figure, of the designed lines and of the record; with simulated ones."""
+    designed, name, shown = terms.lines.deviations(plan.powers, plan.counted), "deviation_simulated", None
+    listed = {"deviation": designed, "deviation_record": plan.deviations}
+    if study is not None:
+        listed[name], shown = study.deviation, (name, f"{study.runs} simulated experiments")
+    return deviation_curves(terms.header.units, terms.frequency, terms.lines, listed, shown)
 
 
 def tried_lines(

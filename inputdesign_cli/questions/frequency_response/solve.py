@@ -21,7 +21,7 @@ from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
-from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.delivery import timing, with_study
@@ -67,23 +67,20 @@ class ResponseTask:
             raise bad_spec("out-of-range", message, hint=hint, key="simulation.runs")
         plan, results = self._solved()
         begun = time.perf_counter()
-        records = {"design": (plan.applied, plan.record.samples)}
-        if study.compare:
-            records["white"] = (plan.flat, self._best(plan.flat, plan.length))
         nominal, power = terms.experiment, results.outcome.power
         if study.truth is not None and power is not None:
             nominal = study.truth.experiment(nominal, power.output or ())
         tried = partial(study_response, runs=study.runs, seed=study.seed, executor=executor)
-        studies = {
-            name: tried(nominal.model, u, terms.periods, terms.grid.excited)
-            for name, (_, u) in records.items()
-        }
-        inputs = {
-            name: outcome.tried_lines(terms, plan, records[name][0], found) for name, found in studies.items()
-        }
-        table, curves = outcome.studied_deviations(terms, plan, results, studies["design"])
+        at = terms.periods, terms.grid.excited
+        designed = tried(nominal.model, plan.record.samples, *at)
+        inputs = {"design": outcome.tried_lines(terms, plan, plan.applied, designed)}
+        if study.compare:
+            white = tried(nominal.model, self._best(plan.flat, plan.length), *at)
+            inputs["white"] = outcome.tried_lines(terms, plan, plan.flat, white)
+        columns, curves = outcome.deviations(terms, plan, designed)
+        tables = {"deviations": Table({**results.tables["deviations"].columns, **columns})}
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
-        return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
+        return with_study(results, entry, begun, tables=tables, curves={"deviations": curves})
 
     def _designed(self) -> tuple[ResponseDesign, int]:
         """Return the powers and the samples that count."""

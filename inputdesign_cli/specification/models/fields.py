@@ -63,18 +63,12 @@ def _listed(coefficients: Sequence[float]) -> str:
 
 def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
     """Check that all roots in z lie strictly inside the unit circle, for ascending powers of q^-1."""
+    return _check_roots(polynomial, in_s=False)
 
-    def refuse(worst: complex) -> PathDiagnostic | None:
-        if abs(worst) < 1.0 - _ROUNDING:
-            return None
-        place = f"radius {abs(worst):.6g} at {abs(float(np.angle(worst))):.4g} rad/sample"
-        message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
-        hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
-        if 0.0 in polynomial[1:-1] and all(float(c).is_integer() for c in polynomial):
-            hint += "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
-        return PathDiagnostic("unstable-polynomial", message, hint)
 
-    return _check_roots(polynomial, np.abs, refuse)
+def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
+    """Check that all roots lie in the open left half plane, for descending powers of s."""
+    return _check_roots(polynomial, in_s=True)
 
 
 def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:
@@ -91,27 +85,8 @@ def check_no_growth_in_s(polynomial: Polynomial) -> PathDiagnostic | None:
     return check_left_half_plane(polynomial[: last + 1])
 
 
-def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
-    """Check that all roots lie in the open left half plane, for descending powers of s."""
-
-    def refuse(worst: complex) -> PathDiagnostic | None:
-        if worst.real < 0:
-            return None
-        pair = f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else ""
-        place = f"s = {worst.real + 0.0:.4g}{pair}"
-        message = f"{{key}} has a root at {place}; all poles must lie in the left half plane"
-        hint = "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3"
-        return PathDiagnostic("unstable-polynomial", message, hint)
-
-    return _check_roots(polynomial, np.real, refuse)
-
-
-def _check_roots(
-    polynomial: Polynomial,
-    badness: Callable[[np.ndarray], np.ndarray],
-    refuse: Callable[[complex], PathDiagnostic | None],
-) -> PathDiagnostic | None:
-    """Return the diagnostic of the worst root, if it is refused or cannot be computed."""
+def _check_roots(polynomial: Polynomial, *, in_s: bool) -> PathDiagnostic | None:
+    """Return the diagnostic of the worst root, if it is unstable or cannot be computed."""
     try:
         with np.errstate(all="ignore"):
             roots = np.roots(np.asarray(polynomial, dtype=float))
@@ -120,7 +95,21 @@ def _check_roots(
     if not np.all(np.isfinite(roots)):
         message = "the roots of {key} cannot be computed: its coefficients are of too different magnitude"
         return PathDiagnostic("bad-polynomial", message, "rescale it, or choose another time unit")
-    return refuse(complex(roots[np.argmax(badness(roots))])) if roots.size else None
+    size = roots.real if in_s else np.abs(roots) - 1.0 + _ROUNDING
+    if not np.any(size >= 0.0):
+        return None
+    worst = complex(roots[np.argmax(size)])
+    if in_s:
+        pair = f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else ""
+        root = f"at s = {worst.real + 0.0:.4g}{pair}; all poles must lie in the left half plane"
+        hint = "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3"
+    else:
+        place = f"radius {abs(worst):.6g} at {abs(float(np.angle(worst))):.4g} rad/sample"
+        root = f"of {place}; all roots (in z) must lie inside the unit circle"
+        hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
+        if 0.0 in polynomial[1:-1] and all(float(c).is_integer() for c in polynomial):
+            hint += "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
+    return PathDiagnostic("unstable-polynomial", f"{{key}} has a root {root}", hint)
 
 
 PolynomialList = tuple[Polynomial, ...]

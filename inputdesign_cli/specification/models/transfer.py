@@ -137,7 +137,7 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 class TransferMatrix(Section):
     """numerator / denominator entry by entry, in s or in q^-1."""
 
-    numerator: fields.RowsMatrix = Field(description="Rows (outputs) of columns (inputs) of coefficients.")
+    numerator: fields.GainMatrix = Field(description="Coefficients; rows (outputs) of columns (inputs).")
     denominator: fields.ContinuousDenominator = Field(
         default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
     )
@@ -161,7 +161,13 @@ class TransferMatrix(Section):
         return tuple(tuple(common for _ in row) for row in self.numerator_matrix)
 
 
-class DiscreteMatrix(TransferMatrix, family="transfer", phrase="a transfer matrix in q^-1"):
+class TransferRows(TransferMatrix):
+    """A transfer matrix that is written as rows of columns, never as one polynomial."""
+
+    numerator: fields.RowsMatrix = Field(description="Rows (outputs) of columns (inputs) of coefficients.")
+
+
+class DiscreteMatrix(TransferRows, family="transfer", phrase="a transfer matrix in q^-1"):
     """A transfer matrix in the delay operator: coefficients in ascending powers of q^-1."""
 
     kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
@@ -172,7 +178,7 @@ class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-
 
     kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
 
-    continuous: TransferMatrix = Field(description="numerator and denominator in descending powers of s.")
+    continuous: TransferRows = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = optional("How it is sampled: zoh.")
 
     def check(self) -> Iterator[PathDiagnostic]:
