@@ -41,7 +41,7 @@ from inputdesign_cli.identification.search import Rival, Search, from_rest_or_fr
 from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.transfer_matrix import TransferKind
-from inputdesign_cli.information.coordinates import taking_part, triangular_factor
+from inputdesign_cli.information.experiment import taking_part, triangular_factor
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,

@@ -1,6 +1,5 @@
 """The information matrix as an affine function of the input spectrum."""
 
-from inputdesign_cli.information.coordinates import Coordinates as Coordinates
 from inputdesign_cli.information.experiment import (
     POWER_KINDS as POWER_KINDS,
     Experiment as Experiment,

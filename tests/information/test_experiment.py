@@ -13,8 +13,7 @@ from inputdesign_cli.information import (
     jointly_whitened,
     mean_cost,
 )
-from inputdesign_cli.information.coordinates import factor_of, taking_part
-from inputdesign_cli.information.experiment import WeightedProducts
+from inputdesign_cli.information.experiment import WeightedProducts, factor_of, taking_part
 from inputdesign_cli.plant import (
     ContinuousModel,
     PolynomialModel,

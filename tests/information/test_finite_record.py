@@ -9,7 +9,7 @@ import scipy.signal
 
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment, FiniteRecord, integrate
-from inputdesign_cli.information.record_transforms import RecordTransforms
+from inputdesign_cli.information.finite_record import RecordTransforms
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix, logarithmic_distance
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.multisine import multisine_record

@@ -27,9 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.gradients import weighty_ones
 from inputdesign_cli.design.convex.master import Proof, Row
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Problem, weighty_ones
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum import Functional, weighted_mean
 

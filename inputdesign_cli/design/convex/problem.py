@@ -9,7 +9,7 @@ other; what is said of information below is then said of one matrix.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -23,7 +23,6 @@ from inputdesign_cli.design.amplitude.polytope import Facet, LagPolytope
 from inputdesign_cli.design.amplitude.windows import weighted
 from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
-from inputdesign_cli.design.convex.gradients import Gradients, weighty_ones
 from inputdesign_cli.design.convex.limits import (
     DensityBreach,
     DensityLimit,
@@ -32,9 +31,72 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import Experiment, PowerKind, joint_information, mean_cost
-from inputdesign_cli.plant import local_maxima
+from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts, joint_information, mean_cost
+from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
 from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
+
+
+def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
+    """Return the scenarios whose weight Y_s of `weights` (S, k, k) is not zero."""
+    return np.flatnonzero(np.any(weights, axis=(1, 2))).tolist()
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """Holds the gradients of all plants, the nominal one first, for the last grid requested."""
+
+    experiments: tuple[Experiment, ...]
+    _grids: dict[frozenset[int], Array] = field(default_factory=dict, init=False, repr=False)
+    _products: dict[int, tuple[Array, WeightedProducts]] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def grid(self) -> Array:
+        """Return frequencies that see every resonance of the nominal plant's densities, over the band."""
+        nominal = self.experiments[0]
+        return graded_grid(nominal.singularities, *nominal.band)
+
+    def grid_of(self, scenarios: Sequence[int]) -> Array:
+        """Return the common frequency grid for the densities of these scenarios together."""
+        others = frozenset(scenarios) - {0}
+        if not others:
+            return self.grid
+        if others not in self._grids:
+            plants = [self.experiments[number].singularities for number in (0, *sorted(others))]
+            self._grids[others] = common_grid(plants, *self.experiments[0].band)
+        return self._grids[others]
+
+    def value_density(self, weights: NDArray[np.float64]) -> Callable[[Array], NDArray]:
+        """Return the density of sum_s tr(Y_s M_s) over frequency, for fixed Y = `weights` (S, k, k)."""
+        weighty = weighty_ones(weights)
+        grid = self.grid_of(weighty)
+        known: list[NDArray] = []
+
+        def density(w: Array) -> NDArray:
+            if w is grid and known:  # asked for again with every share that limits keep of a price
+                return known[0]
+            parts = (self._worth(number, weights[number], w, on_grid=w is grid) for number in weighty)
+            total = sum(parts, self.worthless(w))
+            if w is grid:
+                known.append(total)
+            return total
+
+        return density
+
+    def worthless(self, w: Array) -> NDArray:
+        """Return zero at every frequency of `w` (n,): (n,), or (n, r, r) for several inputs."""
+        r = self.experiments[0].inputs
+        return np.zeros((np.size(w), *(() if r == 1 else (r, r))))
+
+    def _worth(self, scenario: int, weight: Array, w: Array, *, on_grid: bool) -> NDArray:
+        """Return the density of tr(Y M_s) at frequencies `w`; the gradients on a grid are kept."""
+        experiment = self.experiments[scenario]
+        if not on_grid:
+            return experiment.value_density(weight, w)
+        known = self._products.get(scenario)
+        if known is None or known[0] is not w:
+            known = self._products[scenario] = (w, experiment.products(w))
+        return experiment.valued(known[1], weight)
+
 
 _RIPPLE = 16  # points of the grid a lag
 Goal = Literal["cost", "factor", "samples"]
