@@ -244,6 +244,8 @@ def told(error: IdesignError) -> str:
 def findings_of(task: Identification, found: Identified) -> list[Finding]:
     """Return all findings for or against the data and the estimate."""
     units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
+    # Where an expression ends G may vanish, whatever the inputs do.
+    at_ends = stopped_at_ends(model, estimate)
     rivals = (
         other_minima(units, model, estimate, question.asked, question.entries, question.information)
         if question is not None
@@ -254,8 +256,18 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         *larger_noise(model, found.noise_refuted),
         *started(estimate),
         *on_the_circle(model, estimate),
-        *speaking_against(task, found),
-        *([] if stopped_at_ends(model, estimate) else hardly_explained(units, model, estimate)),
+        # Faults of measurement stand alone, as they upset other tests.
+        *(
+            mismeasured(task, found)
+            or [
+                *([] if at_ends else idle(units, task.nominal, model, estimate)),
+                *shifted_levels(estimate, found.data, units.time_unit),
+                *refutations(model, estimate),
+                *([] if found.loop_told else answering(units, estimate)),
+                *found.data.repeated,
+            ]
+        ),
+        *([] if at_ends else hardly_explained(units, model, estimate)),
         *near_zero(model, estimate),
         *band_limited(model, estimate),
         *differences(estimate, [name for name, _ in found.data.files]),
@@ -263,19 +275,6 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         *ruled_out(estimate, found.ruled_out),
         *unasked(found.unasked),
         *rivals,
-    ]
-
-
-def speaking_against(task: Identification, found: Identified) -> list[Finding]:
-    """Return findings against the model; faults of measurement alone, as they upset other tests."""
-    data, estimate, units = found.data, found.estimate, task.header.units
-    return mismeasured(task, found) or [
-        # Where an expression ends G may vanish, whatever the inputs do.
-        *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
-        *shifted_levels(estimate, data, units.time_unit),
-        *refutations(found.model, estimate),
-        *([] if found.loop_told else answering(units, estimate)),
-        *data.repeated,
     ]
 
 

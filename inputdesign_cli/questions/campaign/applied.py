@@ -61,9 +61,20 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
         plan: (n, r); `applied`: (m, r), whose `rows` (m,) are counted from its first.
         strongest: the largest root mean square of all plans, beside which a plan may be at rest.
     """
-    begins = _begins(plan, applied, rows)
+
+    def alike(start: int) -> float:
+        return abs(likeness(plan[start + rows], applied))
+
+    best = max(range(len(plan) - int(rows[-1])), key=alike)
+    begins = best if alike(best) > max(LIKE, alike(0) + _BETTER) else 0
     due = plan[begins + rows]
-    shares = [_followed(due[:, j], applied[:, j], strongest) for j in range(plan.shape[1])]
+    # A channel that should be at rest follows or does not.
+    shares = [
+        float(np.std(own) <= _MOVED * strongest)
+        if np.sqrt(np.mean(wanted**2)) < _AT_REST * strongest
+        else likeness(wanted, own)
+        for wanted, own in zip(due.T, applied.T, strict=True)
+    ]
     least = int(np.argmin(shares))
     spliced, own = shares[least], applied[:, least]
     follows = _follows(spliced, due[:, least], own, _SURE_IN_PLACE)
@@ -113,23 +124,6 @@ def _varying(plan: Array, applied: Array) -> tuple[Array, Array]:
     if np.all(np.ptp(plan, axis=0) == 0.0):
         return plan, applied
     return plan - plan.mean(axis=0), applied - applied.mean(axis=0)
-
-
-def _followed(plan: Array, applied: Array, strongest: float) -> float:
-    """Return the correlation of one channel (m,); 1 or 0 for a channel that should be at rest."""
-    if np.sqrt(np.mean(plan**2)) < _AT_REST * strongest:
-        return float(np.std(applied) <= _MOVED * strongest)
-    return likeness(plan, applied)
-
-
-def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
-    """Return the sample of the plan (n, r) that a record (m, r) of these `rows` begins with."""
-
-    def at(start: int) -> float:
-        return abs(likeness(plan[start + rows], applied))
-
-    best = max(range(len(plan) - int(rows[-1])), key=at)
-    return best if at(best) > max(LIKE, at(0) + _BETTER) else 0
 
 
 def _in_step(plan: Array, applied: Array, places: NDArray[np.int64]) -> Array:

@@ -19,8 +19,7 @@ from inputdesign_cli.questions.building.uncertainty import farthest_radius
 from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.rounds import Rounds
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
-from inputdesign_cli.questions.campaign.study import CampaignTask
-from inputdesign_cli.questions.campaign.trials import CampaignStudy
+from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Campaign, Pilot
