@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,8 @@ def accepted(
         DataError: `record-copied`, `record-too-long`, `record-other-part`, `record-other-scale`,
             `record-unlike`.
     """
-    _check_answers(given.name, part)
+    columns = dict(list(part.table.columns.items())[1:])  # without times
+    _check_answers(given.name, part, columns)
     if part.samples > due.samples:
         raise DataError.because(
             "record-too-long",
@@ -46,17 +48,20 @@ def accepted(
     if part.excitation is None:
         ended = shorter(given.name, due.file, part.samples, due.samples)
         return entry, [*without_excitation(given.name, due.file), *ended]
+    plans = [plan for plan in memory.campaign.plans if plan.samples >= part.samples]
     strongest = max(each.power for each in memory.campaign.plans) ** 0.5
-    matches = {
-        plan.file: matched(_whole(memory, plan), part.excitation - plan.offset, part.rows, strongest)
-        for plan in memory.campaign.plans
-        if plan.samples >= part.samples
-    }
+    matches, wholes = dict[str, Match](), dict[str, Array]()
+    for plan in plans:
+        signals = list(csv_columns(memory.files[plan.file]).values())[1:]
+        wholes[plan.file] = np.asarray(np.stack(signals, axis=1) - plan.offset, dtype=float)
+        about = part.excitation - plan.offset
+        matches[plan.file] = matched(wholes[plan.file], about, part.rows, strongest)
     match, levelled = matches[due.file], part.excitation - due.offset
     likest = max(matches, key=lambda name: abs(matches[name].likeness))
     other = likest if abs(matches[likest].likeness) > max(LIKE, abs(match.likeness)) else None
     if not unlike:
-        _check_applied(given.name, due.file, part, match, other, _whole(memory, due)[part.rows], levelled)
+        found = standing_in(wholes[due.file][part.rows], levelled, columns)
+        _check_applied(given.name, due.file, part.kind, match, other, found)
     samples = match.begins + part.samples
     energy = float(np.sum(levelled**2)) * samples / len(part.rows)
     scale = match.scale if match.likeness > LIKE else None
@@ -74,12 +79,11 @@ def accepted(
     return entry, findings + shorter(given.name, due.file, samples, due.samples)
 
 
-def _check_answers(given: str, part: Part) -> None:
+def _check_answers(given: str, part: Part, columns: Mapping[str, Array]) -> None:
     """Raise `DataError` (`record-copied`) where an output is what was applied.
 
     In a loop that is the reference: without one, a controller without dynamics makes a copy of y of u.
     """
-    columns = _signals(part)
     outputs, inputs = ([name for name in columns if name.startswith(kind)] for kind in ("y", part.kind))
     for output, name in itertools.product(outputs, inputs):
         if len(part.rows) > _FEW and copied(columns[output], columns[name]):
@@ -99,23 +103,17 @@ def _renamed(applied: str, other: str) -> str:
     return f"say which column is which, --columns {applied}=NAME,{other}=NAME,.."
 
 
-def _signals(part: Part) -> dict[str, Array]:
-    """Return the columns (m,) of a record without its times."""
-    return dict(list(part.table.columns.items())[1:])
-
-
 def _check_applied(
-    given: str, due: str, part: Part, match: Match, other: str | None, plan: Array, applied: Array
+    given: str, due: str, kind: str, match: Match, other: str | None, found: tuple[int, str, float] | None
 ) -> None:
     """Raise `DataError` (`record-unlike`, `record-other-part`, `record-other-scale`) for what is no plan.
 
     Args:
-        plan, applied: (m, r) at the samples of the record.
+        found: a column that stands in for a channel, see `standing_in`.
     """
-    code, hint, loop = "record-unlike", f"give the record of {due}; {_FORCED}", part.kind == "r"
-    found = standing_in(plan, applied, _signals(part))
+    code, hint, loop = "record-unlike", f"give the record of {due}; {_FORCED}", kind == "r"
     if found is not None:
-        own = f"{part.kind}{found[0]}"
+        own = f"{kind}{found[0]}"
         wrong = f"the columns of {given} look swapped: {found[1]} follows {due} as {own} should "
         wrong += f"(correlation {found[2]:.2f}), and {own} does not"
         hint = f"{_renamed(own, found[1])}; {_FORCED}"
@@ -127,16 +125,10 @@ def _check_applied(
         hint = f"mend the column if it is in another unit; {_FORCED}"
     # A reference is computed: no actuator clips it. The input of the loop only follows it.
     elif not match.follows or (loop and match.spliced <= LIKE):
-        wrong = f"what was applied in {given} is not {due}: {part.kind}{match.channel} has a correlation of "
+        wrong = f"what was applied in {given} is not {due}: {kind}{match.channel} has a correlation of "
         wrong += f"{match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted)"
         hint = f"give the record of {due}; is it another experiment, or another column (--columns)? "
         hint += _FORCED.capitalize()
     else:
         return
     raise DataError.because(code, wrong, hint=hint)
-
-
-def _whole(memory: Memory, plan: PlannedPart) -> Array:
-    """Return the samples (n, r) of a plan about its levels."""
-    columns = list(csv_columns(memory.files[plan.file]).values())[1:]
-    return np.asarray(np.stack(columns, axis=1) - plan.offset, dtype=float)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -137,49 +136,38 @@ def _again(
         np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
         for record in campaign.records
     ]
-    with _on_disc(files, counting, given) as paths:
-        past = Past(
-            records=paths,
-            done=campaign.done,
-            applied=np.concatenate(applied) if applied else None,
-            last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
-            first_cost=campaign.first_cost,
-            number=len(campaign.rounds) + 1,
-            regardless=bool(campaign.regardless),
-        )
-        decision = decide(past)
+    past = Past(
+        done=campaign.done,
+        applied=np.concatenate(applied) if applied else None,
+        last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
+        first_cost=campaign.first_cost,
+        number=len(campaign.rounds) + 1,
+        regardless=bool(campaign.regardless),
+    )
+    # The new record is not in the directory yet; errors about it name the file that was given.
+    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
+        paths = [Path(folder) / name for name in counting]
+        for path in paths:
+            path.write_bytes(files[path.name])
+
+        def renamed(text: str) -> str:
+            own = text.removeprefix(f"{folder}{os.sep}")
+            return own if given is None else own.replace(counting[-1], given.name)
+
+        def named(one: Diagnostic) -> Diagnostic:
+            place = None if one.location is None else replace(one.location, file=renamed(one.location.file))
+            return replace(one, message=renamed(one.message), location=place)
+
+        try:
+            decision = decide(replace(past, records=paths))
+        except DataError as error:
+            raise DataError([named(one) for one in error.diagnostics]) from error
     if decision.refuted:
         every, end = len(counting) == len(campaign.records), decision.task.rules.end
         said = said.saying(campaign_refuted(memory.directory, campaign.done, end, counting, every=every))
     results = _decided(decision, campaign, files, said)
     provenance = {**results.outcome.provenance, "made_from": list(memory.made_from)}
     return replace(results, outcome=replace(results.outcome, provenance=provenance))
-
-
-@contextmanager
-def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | None) -> Iterator[list[Path]]:
-    """Write the records that count to files; the new one is not in the directory yet.
-
-    Errors about the new one name the file that was `given`.
-    """
-    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
-        paths = [Path(folder) / name for name in names]
-        for path in paths:
-            path.write_bytes(files[path.name])
-
-        def named(diagnostic: Diagnostic) -> Diagnostic:
-            text, place = [diagnostic.message], diagnostic.location
-            if place is not None:
-                text.append(place.file.removeprefix(f"{folder}{os.sep}"))
-            if given is not None:
-                text = [one.replace(names[-1], given.name) for one in text]
-            placed = None if place is None else replace(place, file=text[1])
-            return replace(diagnostic, message=text[0], location=placed)
-
-        try:
-            yield paths
-        except DataError as error:
-            raise DataError([named(one) for one in error.diagnostics]) from error
 
 
 def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], said: Outcome) -> Results:
