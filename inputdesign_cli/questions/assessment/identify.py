@@ -285,11 +285,7 @@ def mismeasured(task: Identification, found: Identified) -> list[Finding]:
 
 
 def identification_results(task: Identification, found: Identified, began: float) -> Results:
-    """Return the results that `idesign identify` writes.
-
-    Args:
-        began: `time.perf_counter()` when the work began.
-    """
+    """Return the results that `idesign identify` writes; the work `began` at this `time.perf_counter()`."""
     header, question, estimate = task.header, found.question, found.estimate
     tables, curves = data_curves(header.units, found.data, estimate)
     bound = None
@@ -317,11 +313,7 @@ def identification_results(task: Identification, found: Identified, began: float
 
 
 def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:
-    """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
-
-    Raises:
-        DataError: see `identified`.
-    """
+    """Estimate the model whose structure `plant` and `noise` give from records; see `identified`."""
     began = time.perf_counter()
     return identification_results(*identified(task, paths, preparation), began)
 

@@ -172,12 +172,7 @@ def data_curves(units: Units, data: Record, estimate: Estimate) -> tuple[dict[st
 def bound_of_data(
     units: Units, confidence: Confidence, errors: Sequence[OnModelError], *, asked: bool, information: Array
 ) -> tuple[Table, BoundCurves, Bound]:
-    """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
-
-    Args:
-        errors: the model errors of r_u; `asked` says whether requirements state r_adm.
-        information: (k, k) of the data.
-    """
+    """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if requirements state r_adm."""
     bound = Bound(confidence.alpha, confidence=confidence.reported)
     if asked:
         violation = worst([error.worst(information) for error in errors])

@@ -28,12 +28,7 @@ Decide = Callable[[Past], Decision]
 
 
 def begun(decide: Decide, folder: Path, directory: Path) -> Results:
-    """Return the results with the first plan.
-
-    Args:
-        folder: what names of files in the spec are relative to.
-        directory: where the campaign will be.
-    """
+    """Return the results with the first plan; names of files in the spec are relative to a `folder`."""
     decision = decide(Past())
     task = decision.task
     campaign = Campaign(
@@ -99,11 +94,7 @@ def advanced(
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
-    """Return the results of the decision without a record, whose file stays.
-
-    Raises:
-        DataError: `record-unknown`.
-    """
+    """Return the results of the decision without a record, whose file stays; raise `record-unknown`."""
     records = list(memory.campaign.records)
     if not 1 <= number <= len(records) or records[number - 1].withdrawn:
         left = [str(n) for n, record in enumerate(records, 1) if not record.withdrawn]
@@ -126,11 +117,7 @@ def _again(
     said: Outcome,
     given: Path | None = None,
 ) -> Results:
-    """Decide on the next part from all records that count.
-
-    Args:
-        said: notes and findings about a new record, which was `given`.
-    """
+    """Decide on the next part from all records that count; `said` is what there is to say of a new one."""
     counting = [record.file for record in campaign.records if not record.withdrawn]
     applied = [
         np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
@@ -171,11 +158,7 @@ def _again(
 
 
 def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], said: Outcome) -> Results:
-    """Return the results of a decision.
-
-    Args:
-        said: notes and findings that come first.
-    """
+    """Return the results of a decision; what was `said` before comes first."""
     number, header, rules = len(campaign.records), decision.task.identification.header, decision.task.rules
     tables: dict[str, Table] = {}
     curves: dict[str, Curves] = {}
@@ -264,11 +247,7 @@ def _entry(decision: Decision, campaign: Campaign, file: str) -> Round:
 
 
 def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]]:
-    """Return rounds.csv, a row for each round with an estimate, and its figures.
-
-    Args:
-        end: samples after which the campaign is over at the latest.
-    """
+    """Return rounds.csv, a row for each round with an estimate, and its figures; `end` is the last sample."""
     known = [one for one in rounds if one.estimate is not None]
 
     def column(values: Iterable[float | None]) -> Array:

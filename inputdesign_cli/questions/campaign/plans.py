@@ -97,22 +97,22 @@ class Planner:
         first: float | None,
         before: Array | None = None,
     ) -> Planned:
-        """Plan the experiment that follows a number of samples.
+        """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
         Args:
             known: None before any data.
-            done: samples that have been applied.
-            seed: of the record.
             first: cost of a sample of the first plan, which the cap is relative to.
             before: (n, r), applied so far about the operating point; None before any.
-
-        Raises:
-            IdesignError: there is no first plan.
         """
         take, rest = rules.schedule.take(done), rules.schedule.rest(done)
         earlier = np.zeros((0, self.nominal.inputs)) if before is None else before
         if known is None and done == 0 and rules.pilot_power is not None:
-            return self._kept(self._pilot(rules.pilot_power, take, seed), rules, np.inf, None, earlier)
+            # White noise of this power, even over the inputs.
+            powers = np.full(self.nominal.inputs, rules.pilot_power / self.nominal.inputs)
+            drawn = Redrawn.flat("pilot", "white", powers, self.nominal.band, take, self.step)
+            record = drawn.draw(1, take, np.random.default_rng(seed))[0]
+            pilot = Planned(record, take, power_of(record), 0.0, "pilot")
+            return self._kept(pilot, rules, np.inf, None, earlier)
         cap = rules.cap(first)
         if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
             cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
@@ -190,12 +190,9 @@ class Planner:
         return replace(plan, record=record, share=scale**2, part_cost=part_cost, beyond=beyond)
 
     def knowing(self, model: Model) -> tuple[float, Array | None]:
-        """Return the cost of the spectrum of the design for a known plant, and the record (samples, r) of it.
+        """Return the cost of the design for a known plant, over all samples, and its record (samples, r).
 
-        The cost is summed over the samples; the record is None if none fits.
-
-        Raises:
-            IdesignError: there is no design.
+        The record is None if none fits. Raise `IdesignError` if there is no design.
         """
         found, record = self._designed(model, Change(self.nominal.samples, self.seed)), None
         with suppress(IdesignError):
@@ -243,14 +240,6 @@ class Planner:
         task = replace(task, asked=replace(task.asked, windows=0))  # a part is not the whole record
         kind: PlanKind = "white" if change.white else "nominal" if task.asked.plants is None else "robust"
         return _Found(task, task.designed(), kind)
-
-    def _pilot(self, power: float, take: int, seed: int) -> Planned:
-        """Return white noise of this power, even over the inputs."""
-        nominal = self.nominal
-        powers = np.full(nominal.inputs, power / nominal.inputs)
-        drawn = Redrawn.flat("pilot", "white", powers, nominal.band, take, self.step)
-        record = drawn.draw(1, take, np.random.default_rng(seed))[0]
-        return Planned(record, take, power_of(record), 0.0, "pilot")
 
     def _stopgap(self, rules: Rules, cost: float, rest: int, seed: int, why: IdesignError) -> Planned:
         """Return white noise of this cost a sample; of the power of the pilot if nothing else was applied."""
@@ -306,10 +295,7 @@ def standing(
 ) -> Standing | None:
     """Return the estimate with its accuracy, or the nearest usable model on the way from the `last` one.
 
-    Return None if no model on the way can be used.
-
-    Args:
-        informed: information (k, k) of the data at a model.
+    `informed` returns the information (k, k) of the data at a model. None: no model can be used.
     """
     for share in _SHARES:
         model = estimate if share == 1.0 else estimate.at(last.theta + share * (estimate.theta - last.theta))

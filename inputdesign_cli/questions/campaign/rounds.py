@@ -117,12 +117,7 @@ class Part:
 
 
 def decide(task: Rounds, past: Past) -> Decision:
-    """Estimate all records jointly, judge, and plan the next part.
-
-    Raises:
-        DataError: a record cannot be used.
-        IdesignError: nothing can be planned.
-    """
+    """Estimate all records jointly, judge, and plan the next part; raise `IdesignError` if none can be."""
     rules = task.rules
     decision = Decision(task, rules.seed_of(past.number), "missed" if past.done >= rules.end else "running")
     if past.records:
@@ -179,11 +174,7 @@ def _judged(task: Rounds, past: Past, decision: Decision) -> Decision:
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
-    """Read a record of the user.
-
-    Raises:
-        DataError: the file cannot be used.
-    """
+    """Read a record of the user; raise `DataError` if it cannot be used."""
     units, levels = task.identification.header.units, task.identification.operating_point
     known = replace(preparation, operating_point={**levels, **preparation.operating_point})
     data = read_data([path], units, known)
@@ -199,11 +190,7 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
 
 
 def continued(data: Record, step: float) -> Record:
-    """Join files whose times continue the times of the file before into one record.
-
-    Args:
-        step: the sample time.
-    """
+    """Join files whose times continue the times of the file before, after one `step`, into one record."""
     ends = np.cumsum(data.lengths)
     files = set(np.cumsum([samples for _, samples in data.files]).tolist())
     lengths = [data.lengths[0]]

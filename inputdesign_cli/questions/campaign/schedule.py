@@ -82,9 +82,8 @@ class Rules:
 
     def seed_of(self, number: int) -> int:
         """Return the seed of the record of the round with this number; each has its own."""
-        if not self.seed:
-            return number
-        return int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
+        own = np.random.SeedSequence([self.seed, number])
+        return int(own.generate_state(1)[0]) if self.seed else number
 
     def cap(self, first: float | None) -> float:
         """Return the largest cost of a sample; `first` is that of the first plan. Infinite without a cap."""

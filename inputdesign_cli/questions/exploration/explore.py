@@ -60,13 +60,10 @@ class Exploration:
 
 
 def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None = None) -> Exploration:
-    """Find a model of the plant that a log is of.
+    """Find a model of the plant that a log is of; raise `DataError` if it cannot be read or determines none.
 
     Args:
         only: the structure to take; None: the simplest that explains the log as well as any.
-
-    Raises:
-        DataError: the log cannot be read, or determines no model at all.
     """
     started = time.perf_counter()
     log = read_logs(paths, preparation)
