@@ -18,9 +18,10 @@ from tests.support.campaigns import SPEC, answered, applied, found, planned, wri
 def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
     assert len(planned(begun)) == 20  # a pilot of a tenth
     for number in range(1, 12):
-        code, out, _ = run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--json", "--no-figures")
+        record = applied(begun, tmp_path / f"r{number}.csv")
+        code, out, err = run("next", "c", record, "--json", "--no-figures")
+        assert code == 0, err
         result = json.loads(out)
-        assert code == 0
         if result["status"] != "running":
             break
     assert result["status"] == "stopped"
