@@ -8,6 +8,7 @@ and known to the tool only through its data, with the noise that the log has.
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 from pathlib import Path
@@ -175,7 +176,8 @@ def tutorial(folder: Path, images: Path) -> str:
         kept=("asked", "samples", "power", "model error", "signal", "proved"),
     )
     (found["white"],) = re.findall(r"white excitation: (\d+)", said)
-    (found["spectrum"],) = re.findall(r"spectrum alone would take (\d+)", said)
+    (least,) = re.findall(r"by the spectrum alone ([\d.]+)", said)
+    found["spectrum"] = str(math.ceil(float(least)))
     (found["record"],) = re.findall(r"signal +(\d+) samples", said)
     shown = ("estimate", "assessed", "verdict", "signal", "files")
     experiment(folder / "design" / "signal.csv", folder / "first.csv", seed=1)

@@ -32,7 +32,7 @@ def examples(name: str | None = None, *, output: Path | None = None) -> None:
     They are the examples of the documentation; `idesign check` compares their results with golden values.
     """
     from inputdesign_cli.outcome.run_directory import output_errors, write_text
-    from inputdesign_cli.specification.template import read_template
+    from inputdesign_cli.specification.loading import read_template
 
     found = {path.stem: path for path in sorted((shipped() / "specs").glob("*.yaml"))}
     if name is None:

@@ -41,7 +41,7 @@ _LEAST_DELAY = 1e-12
 _CUTOFFS = 5
 # Dead times are tried sample by sample up to _FINE samples, then in steps that grow by _GROWTH.
 _FINE, _GROWTH = 20, 1.1
-_SWEEPS, _MINIMA = 2, 6
+_SWEEPS, _MINIMA = 2, 8
 
 Place = tuple[int, int]
 

@@ -136,7 +136,7 @@ class _Held:
     def slopes(self, weight: Array) -> Array:
         """Return tr(Y psi_a psi_b^T) of pulses that are a number of values apart, (longest run, r)."""
         found = []
-        for apart in range(max(_RUNS)):
+        for apart in range(min(max(_RUNS), self.values)):
             shift = apart * self.hold
             found.append(
                 [

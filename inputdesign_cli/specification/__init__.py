@@ -1,7 +1,14 @@
 """Specifications: YAML in, frozen and validated objects out, every diagnostic with its line."""
 
-from inputdesign_cli.specification.loading import load_spec, parse_spec
-from inputdesign_cli.specification.model_file import is_prior, load_estimate
+from inputdesign_cli.specification.loading import (
+    SpecTemplate,
+    is_prior,
+    load_estimate,
+    load_spec,
+    parse_spec,
+    read_template,
+    same_content,
+)
 from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
 from inputdesign_cli.specification.models.loop import ClosedLoopError
@@ -11,7 +18,6 @@ from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.python_control import from_control
 from inputdesign_cli.specification.schema import json_schema
-from inputdesign_cli.specification.template import SpecTemplate, read_template, same_content
 
 __all__ = [
     "ClosedLoopError",

@@ -1,28 +1,36 @@
-"""YAML text or file to `Spec`; all diagnostics of a file come together."""
+"""YAML text or file to `Spec`, its variants before validation, and estimates in model files.
+
+All diagnostics of a file come together.
+"""
 
 from __future__ import annotations
 
 import copy
+import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path as FilePath
 
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification.checks.question import related, run_checks
-from inputdesign_cli.specification.models.experiment import Cost
+from inputdesign_cli.specification.models.experiment import Cost, Estimated
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
+from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.models.wording import show
 from inputdesign_cli.specification.plugins import install
-from inputdesign_cli.specification.schema import keep_inside
-from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.schema import keep_inside, named_files
+from inputdesign_cli.specification.yaml.files import is_outside, read_text
 from inputdesign_cli.specification.yaml.overrides import KEY, apply_includes, apply_overrides
-from inputdesign_cli.specification.yaml.places import Path, Places, Source
-from inputdesign_cli.specification.yaml.plain import Plain
+from inputdesign_cli.specification.yaml.places import Path, Places, Source, format_key
+from inputdesign_cli.specification.yaml.plain import Plain, fingerprint
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
 _WHOLE = 1e-9
@@ -31,8 +39,7 @@ _WHOLE = 1e-9
 def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
     """Add `samples` to each section with a `duration`: the largest number that fits.
 
-    An experiment without a length takes all that limits allow, unless the shortest one is asked for. The
-    validation reports durations and sample times that cannot be read.
+    An experiment without a length takes all that limits allow, unless the shortest one is asked for.
     """
     step = data.get("sample_time", 1.0)
     for name in ("experiment", "limits"):
@@ -76,20 +83,11 @@ def load_spec(
     confine: FilePath | None = None,
     design: bool | None = True,
 ) -> Spec:
-    """Read a spec file.
+    """Read a spec file, with `key.path=value` texts applied in order; `null` removes a key.
 
-    Args:
-        path: The YAML file.
-        overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
-        confine: The folder outside of which the spec may name no files.
-        design: Whether it must ask for a design, or for an analysis, that can be answered; None: only if it
-            has some key of a design.
-
-    Returns:
-        The checked spec, with defaults filled in.
-
-    Raises:
-        SpecError: With one diagnostic for everything that is wrong, in the order of the file.
+    Outside the folder `confine` the spec may name no files. With `design` it must ask for a design, or for
+    an analysis, that can be answered; None: only if it has some key of a design. Raises `SpecError`, with
+    everything that is wrong in the order of the file.
     """
     folder = FilePath(path).parent
     return parse_spec(
@@ -108,9 +106,7 @@ def parse_spec(
 ) -> Spec:
     """Read a spec from its text in YAML, as `load_spec` does from a file, with the same arguments.
 
-    Args:
-        file: The name in diagnostics.
-        folder: The folder that paths in the spec are relative to (default: the current folder).
+    `file` is its name in diagnostics; paths in it are relative to `folder`, by default the current one.
     """
     folder = folder or FilePath()
     return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
@@ -138,8 +134,8 @@ def read_tree(
 ) -> Tree:
     """Return the plain data of a spec with included files and overrides, not yet checked.
 
-    A file that lies outside `confine` is a diagnostic of the tree. Raises `SpecError`: The text is no mapping
-    in YAML, or a file cannot be included.
+    A file outside `confine` is a diagnostic of the tree. Raises `SpecError`: it is no mapping in YAML, or
+    a file cannot be included.
     """
     tree = read(text, file)
     check_mapping(tree)
@@ -267,3 +263,121 @@ def _reported(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]
         more = Diagnostic("more-errors", f"{left} more errors are not shown", "mend these first")
         found[_MOST_REPORTED:] = [more]
     return found
+
+
+@dataclass(frozen=True)
+class SpecTemplate:
+    """The text of a spec, its file, the overrides of all variants, and their data.
+
+    `included` are files whose blocks are in the data; outside `confine` the spec may name no files.
+    """
+
+    text: str
+    file: str
+    folder: FilePath
+    overrides: tuple[str, ...]
+    data: dict[str, Plain]
+    included: tuple[str, ...] = ()
+    confine: FilePath | None = None
+
+    def spec(self, overrides: Sequence[str]) -> Spec:
+        """Return the checked spec of one variant, without the `sweep` block; errors as of `load_spec`."""
+        every = [*self.overrides, *overrides, "sweep=null"]
+        return parse_spec(self.text, self.file, every, folder=self.folder, confine=self.confine)
+
+    def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
+        """Return the plain data of one variant, without the `sweep` block; only overrides are checked."""
+        tree = Tree(copy.deepcopy(self.data), Places())
+        apply_overrides(tree, [*overrides, "sweep=null"])
+        return tree.sound().data
+
+    def digest(self, data: dict[str, Plain]) -> str:
+        """Return the SHA-256 of a variant and of the contents of every file that it names."""
+        contents = {n: hashlib.sha256(read_regular(self.folder / n)).hexdigest() for n in self.files(data)}
+        return fingerprint({"spec": data, "files": contents} if contents else data)
+
+    def files(self, data: dict[str, Plain]) -> list[str]:
+        """Return the names of existing files that a variant names and may read."""
+        named = {name for _, name in named_files(data) if os.path.isfile(self.folder / name)}
+        return sorted(n for n in named if not (self.confine and is_outside(self.folder / n, self.confine)))
+
+    def sweep(self) -> Sweep | None:
+        """Return the checked `sweep` block, or None; `SpecError` with the place of every error in it."""
+        if "sweep" not in self.data:
+            return None
+        try:
+            return Sweep.model_validate(self.data["sweep"])
+        except ValidationError as error:
+            found, places = translate(error, self.data["sweep"], Sweep), read(self.text, self.file).places
+            absolute = [replace(one, path=("sweep", *one.path)) for one in found]
+            raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
+
+
+def read_template(
+    path: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    *,
+    confine: FilePath | None = None,
+    text: str | None = None,
+) -> SpecTemplate:
+    """Read a spec file, or its `text`, with `overrides` applied; nothing is checked yet.
+
+    Raises `SpecError`: it is no mapping in YAML, or an override or an included file is wrong.
+    """
+    text, file = read_text(path) if text is None else text, os.fspath(path)
+    folder = FilePath(path).parent
+    tree = read_tree(text, file, overrides, folder, confine).sound()
+    return SpecTemplate(text, file, folder, tuple(overrides), tree.data, tuple(tree.included), confine)
+
+
+def same_content(one: str, other: str) -> bool:
+    """Return whether two texts of a spec agree but for comments and layout; `SpecError` if not YAML."""
+    first, second = (read(text, "spec.yaml").data for text in (one, other))
+    return fingerprint(first) == fingerprint(second)
+
+
+# Sample times differ by this share at most, from rounding in a text.
+_SAME = 1e-6
+
+
+def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
+    """Return the block `estimate` of a file that the spec names at `key`; errors show nothing else of it.
+
+    Raises `SpecError`: `bad-model-file`; `wrong-estimate`, of another sample time; it cannot be read.
+    """
+    try:
+        text = read_text(spec.resolve_path(name))
+    except SpecError as error:
+        found = error.diagnostics[0]
+        hint = found.hint or "paths are relative to the folder of the spec"
+        raise spec.complain(found.code, found.message, hint=hint, key=key) from error
+    said = ""
+    try:
+        data = read(text, name).data
+        block = data.get("estimate") if isinstance(data, dict) else None
+        estimated = Estimated.model_validate(block)
+    except (SpecError, ValidationError) as error:
+        if isinstance(error, ValidationError):
+            first = translate(error, block, Estimated)[0]
+            said = f" ({first.code} at {format_key(['estimate', *first.path])})"
+        message = f"{name} is no model that identify wrote: it has no sound block estimate{said}"
+        hint = "name a model.yaml with estimate: {parameters: {..}, covariance: [[..]]}, positive definite"
+        raise spec.complain("bad-model-file", message, hint=hint, key=key) from error
+    step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
+    other = unit != spec.time_unit
+    # Older files have no sample time.
+    if isinstance(step, int | float) and (other or not isclose(step, spec.sample_time, rel_tol=_SAME)):
+        here = f"sample_time is {spec.sample_time:g} {spec.time_unit} here"
+        message = f"{name} is an estimate from samples {step:g} {unit} apart, and {here}"
+        hint = f"write sample_time: {step!r} and time_unit: {unit}, or take them by include: {name}"
+        raise spec.complain("wrong-estimate", message, hint=hint, key=key)
+    return estimated
+
+
+def is_prior(parameters: Mapping[str, float], covariance: Sequence[Sequence[float]]) -> bool:
+    """Return whether a later spec will accept an estimate: its covariance is clearly positive definite."""
+    try:
+        Estimated.model_validate({"parameters": parameters, "covariance": covariance})
+    except ValidationError:
+        return False
+    return True

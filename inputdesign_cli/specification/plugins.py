@@ -27,11 +27,7 @@ GROUPS = ("requirements", "spectra", "control_laws")
 
 @cache
 def added(group: str) -> dict[str, type[Section]]:
-    """Return the sections that installed packages add to a group, by key.
-
-    Raises:
-        SpecError: `bad-plug-in`, an entry point cannot be loaded, or is no section with a method `build`.
-    """
+    """Return the sections that installed packages add to a group, by key; `SpecError` (`bad-plug-in`)."""
     found: dict[str, type[Section]] = {}
     for point in points(f"idesign.{group}").values():
         try:
@@ -46,10 +42,7 @@ def added(group: str) -> dict[str, type[Section]]:
 
 @cache
 def install() -> None:
-    """Add the keys of all installed packages to the models of a spec.
-
-    Raises `SpecError`: `bad-plug-in`; a key exists already.
-    """
+    """Add the keys of all installed packages to the models of a spec; `SpecError` (`bad-plug-in`)."""
     sections = {group: added(group) for group in GROUPS}
     if not any(sections.values()):
         return

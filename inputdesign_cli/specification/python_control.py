@@ -28,22 +28,17 @@ def from_control(
     noise: Mapping[str, Plain] | None = None,
     **blocks: Plain,
 ) -> Spec:
-    """Return the spec with this system as its plant.
+    """Return the spec with this system as its plant: in discrete time with its dt, or in continuous time.
 
-    Args:
-        system: in discrete time with its dt, or in continuous time.
-        sample_time: of a system in continuous time that is sampled behind a hold; without, it stays in s.
-        delay: dead time of a system in continuous time, a number or rows of columns.
-        parameters: the estimated entries of a state-space system: {"k": ("B", 1, 0)}. Without, its transfer
-            functions are the plant, and all their coefficients are estimated.
-        known: names of parameters that are not estimated.
-        noise: the block; white noise of variance 1 where nothing is given.
-        blocks: other blocks of the spec: experiment, accuracy, spectrum ..
+    In continuous time, a `sample_time` samples it behind a hold, and `delay` is its dead time, a number or
+    rows of columns. `parameters` are the estimated entries of a state-space system: {"k": ("B", 1, 0)}.
+    Without, its transfer functions are the plant, and all their coefficients are estimated but `known`
+    ones. The `noise` is white of variance 1 by default; `blocks` are others of the spec: experiment,
+    accuracy, spectrum ..
 
-    Raises:
-        SpecError: `not-supported` for another kind of object; `not-sampled` for one in discrete time that
-            does not say its dt; `bad-argument` for an argument that does not go with the system;
-            `improper-transfer`, `inaccurate-conversion`; or an error of the spec.
+    Raises `SpecError`: `not-supported` for another kind of object; `not-sampled` without a dt; `bad-
+    argument` for an argument that does not go with the system; `improper-transfer`, `inaccurate-
+    conversion`; or of the spec.
     """
     import control
 

@@ -46,10 +46,7 @@ def json_schema() -> dict[str, Plain]:
 
 
 def _tidy(node: Plain) -> Plain:
-    """Remove entries that pydantic makes for Python alone.
-
-    They are null for absent keys, class names as titles, and defaults that are whole sections.
-    """
+    """Remove nulls, class names as titles and whole sections as defaults, which are for Python alone."""
     if isinstance(node, list):
         return [_tidy(item) for item in node]
     if not isinstance(node, dict):

@@ -22,12 +22,8 @@ def transfer_functions(
 ) -> list[list[Entry]]:
     """Return rows of columns of numerators and denominators without common factors.
 
-    Args:
-        A, B, C, D: (n, n), (n, r), (p, n) and (p, r).
-
-    Raises:
-        SpecError: `not-finite`; `inaccurate-conversion` if polynomials of floats have another response over
-            frequency than the states.
+    Raises `SpecError`: `not-finite`; `inaccurate-conversion` if polynomials of floats have another
+    response than the states.
     """
     A, B, C, D = (np.asarray(part, dtype=float) for part in (A, B, C, D))
     if not all(np.isfinite(part).all() for part in (A, B, C, D)):

@@ -15,15 +15,18 @@ from inputdesign_cli.questions.common.confidence import settled_alpha
 from inputdesign_cli.questions.task import build_task
 
 SPECS = Path(__file__).parents[2] / "specs"
-FIR = """
-plant: {B: [1.0, -0.4, 0.2]}
-noise: {variance: 1}
-experiment: {samples: 400}
-accuracy: {model_error: {absolute: 0.1, confidence: CONFIDENCE}}
-spectrum: {type: fir, order: 4}
+BASE = """
+plant: {%s}
+noise: {variance: %s}
+experiment: {samples: %d}
+accuracy: {model_error: {%s, confidence: CONFIDENCE}}
+%s
 """
-
-
+FIR = BASE % ("B: [1.0, -0.4, 0.2]", 1, 400, "absolute: 0.1", "spectrum: {type: fir, order: 4}")
+GAIN = BASE % ("B: [1.0]", 1, 200, "absolute: 0.1", "signal: {type: binary}")
+POLE = BASE % ("B: [0, 1], F: [1, -0.9]", 1, 60, "relative: 0.3, band: [0.01, 1]", "spectrum: {type: white}")
+LOW = "spectrum: {type: fir, order: 1}"
+TWO = BASE % ("B: [[[0.5], [0.2]], [[0.1], [0.8]]]", "[[1, 0], [0, 1]]", 1000, "absolute: 0.2", LOW)
 FEW = "{exact: 0.95, draws: 1000, runs: 0}"
 
 
@@ -77,22 +80,8 @@ def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
     assert exact["signal"]["confidence"]["exact"] > 0.93
 
 
-def test_an_analysis_of_the_design_needs_the_alpha_of_the_design():
-    design = solve(spec(FIR, FEW, "spectrum={type: white}")).result
-    power = design["power"]["excitation"][0]
-    found = analyse(spec(FIR, FEW, f"spectrum={{given: {{type: white, power: {power!r}}}}}")).result
-    assert found["model_error"]["alpha"] == pytest.approx(design["model_error"]["alpha"], rel=2e-3)
-
-
 def test_several_entries_keep_their_bounds_together():
-    text = """
-plant: {B: [[[0.5], [0.2]], [[0.1], [0.8]]]}
-noise: {variance: [[1, 0], [0, 1]]}
-experiment: {samples: 1000}
-accuracy: {model_error: {absolute: 0.2, confidence: CONFIDENCE}}
-spectrum: {type: fir, order: 1}
-"""
-    design = solve(spec(text, FEW)).result
+    design = solve(spec(TWO, FEW)).result
     # Two outputs without common noise: with white inputs of power p the four gains are independent, each of
     # variance 1 / (N p), and all four keep to 0.2 with the fourth power of what one does.
     one = scipy.stats.norm.ppf(0.5 + 0.5 * 0.95**0.25)
@@ -108,22 +97,6 @@ def test_it_says_when_there_is_none():
     with pytest.raises(InaccurateError, match="no alpha was found") as caught:
         settled_alpha(lambda alpha: 2.0 * alpha, 1.0)
     assert caught.value.diagnostics[0].code == "confidence-not-settled"
-
-
-GAIN = """
-plant: {B: [1.0]}
-noise: {variance: 1}
-experiment: {samples: 200}
-accuracy: {model_error: {absolute: 0.1, confidence: CONFIDENCE}}
-signal: {type: binary}
-"""
-POLE = """
-plant: {B: [0, 1], F: [1, -0.9]}
-noise: {variance: 1}
-experiment: {samples: 60}
-accuracy: {model_error: {relative: 0.3, band: [0.01, 1], confidence: CONFIDENCE}}
-spectrum: {type: white}
-"""
 
 
 @pytest.mark.slow
@@ -164,14 +137,18 @@ def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
     assert share == pytest.approx(found["model_error"]["alpha"] / plain["model_error"]["alpha"], rel=0.15)
 
 
-@pytest.mark.slow
-def test_an_analysis_calibrates_as_the_design_does():
-    runs = "{exact: 0.9, draws: 1000, runs: 500}"
-    design = solve(spec(POLE, runs)).result
+@pytest.mark.first(1)
+@pytest.mark.parametrize(
+    ("text", "runs", "close"),
+    [(FIR, 0, 2e-3), (POLE, 500, 0.12)],  # the latter two standard errors
+)
+def test_an_analysis_of_the_design_has_the_alpha_of_the_design(text, runs, close):
+    exact = FEW if text == FIR else f"{{exact: 0.9, draws: 1000, runs: {runs}}}"
+    design = solve(spec(text, exact, "spectrum={type: white}")).result
     power = design["power"]["excitation"][0]
-    found = analyse(spec(POLE, runs, f"spectrum={{given: {{type: white, power: {power!r}}}}}")).result
-    assert found["model_error"]["alpha"] == pytest.approx(design["model_error"]["alpha"], rel=0.12)  # 2 s.e.
-    assert found["model_error"]["confidence"]["runs"] == 500
+    found = analyse(spec(text, exact, f"spectrum={{given: {{type: white, power: {power!r}}}}}")).result
+    assert found["model_error"]["alpha"] == pytest.approx(design["model_error"]["alpha"], rel=close)
+    assert not runs or found["model_error"]["confidence"]["runs"] == runs
 
 
 def test_experiments_without_estimates_keep_no_confidence():

@@ -1,11 +1,22 @@
-"""r_u against the definition, cuts against r_u, admissible errors against what they promise."""
+"""Requirements against their definitions: r_u, cuts, admissible errors, criteria, ellipsoids."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
-from inputdesign_cli.accuracy import Absolute, ModelError, Relative, Sensitivity, Table, Weighted
+from inputdesign_cli.accuracy import (
+    Absolute,
+    Criterion,
+    EllipsoidError,
+    InformationTarget,
+    ModelError,
+    Relative,
+    Sensitivity,
+    Table,
+    Weighted,
+    WeightedVariance,
+)
 from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
@@ -13,18 +24,13 @@ from inputdesign_cli.plant import PolynomialModel, Rational
 from tests.support.plants import arx
 
 
-def random_information(size, seed):
+def information(size, seed, scale=1.0):
     root = np.random.default_rng(seed).normal(size=(size, size + 2))
-    return root @ root.T
+    return scale * root @ root.T
 
 
 def first_order_error(experiment, admissible, alpha, band=(0.0, np.pi)):
     return ModelError(experiment=experiment, band=band, entry=(0, 0), admissible=admissible, alpha=alpha)
-
-
-def plant_gradient(model, w):
-    """Of one input and output: (n, k)."""
-    return model.plant_gradient(w)[:, :, 0, 0]
 
 
 SINGLE = PolynomialModel.single([0, 3.6], F=[1, -0.7], C=[1, -0.9], D=[1, 0.2])
@@ -35,7 +41,7 @@ SINGLE = PolynomialModel.single([0, 3.6], F=[1, -0.7], C=[1, -0.9], D=[1, 0.2])
 )
 def test_error_bound_is_the_definition(model, entry):
     """alpha sqrt(lambda_max(T P T^T)) of (6), by plain matrices, of an entry or of the norm of G."""
-    M = random_information(model.theta.size, 1)
+    M = information(model.theta.size, 1)
     P = np.linalg.inv(M)
     requirement = ModelError(
         experiment=Experiment(model, 500),
@@ -58,7 +64,7 @@ def test_error_bound_is_the_definition(model, entry):
 def test_cut_is_equivalent_to_the_bound(first_order, frequency):
     """M >= V V^T exactly when r_u <= r_adm: scaled to ratio one, the cut is singular."""
     requirement = first_order_error(first_order, Relative(first_order.model, 0.01), 2.45)
-    M = random_information(3, 2)
+    M = information(3, 2)
     ratio = requirement.ratios(M, np.array([frequency]))[0]
     slack = np.linalg.eigvalsh(M * ratio**2 - requirement.cut(frequency).matrix)
     assert abs(slack[0]) < 1e-9 * slack[-1]
@@ -67,17 +73,17 @@ def test_cut_is_equivalent_to_the_bound(first_order, frequency):
 def test_error_bound_predicts_monte_carlo_of_the_first_order_expansion(first_order):
     """95 % of Gaussian theta lie within alpha = 2.4477 in the plant's two parameters, so |dG| <= r_u."""
     rng = np.random.default_rng(5)
-    M = first_order.to_raw(random_information(3, 3) * 1e4)
+    M = first_order.to_raw(information(3, 3) * 1e4)
     requirement = first_order_error(first_order, Absolute(1.0), np.sqrt(5.991464547))
     w = np.linspace(0, np.pi, 50)
     theta = rng.multivariate_normal(np.zeros(3), np.linalg.inv(M), size=20000)
-    errors = np.abs(theta @ plant_gradient(first_order.model, w).T)
+    errors = np.abs(theta @ first_order.model.plant_gradient(w)[:, :, 0, 0].T)
     inside = np.all(errors <= requirement.error_bound(M, w), axis=1).mean()
     assert inside >= 0.95 - 4 * np.sqrt(0.05 * 0.95 / 20000)
 
 
 def test_violations_find_the_worst_of_a_dense_grid(flexible):
-    M = random_information(6, 4)
+    M = information(6, 4)
     requirement = first_order_error(flexible, Relative(flexible.model, 0.25), 3.55, (1e-3, np.pi))
     dense = np.unique(np.concatenate([np.linspace(1e-3, np.pi, 50001), np.geomspace(1e-3, np.pi, 50001)]))
     worst = max(v.ratio for v in requirement.violations(M))
@@ -116,3 +122,107 @@ def test_vanishing_admissible_error_is_refused():
     assert error.value.diagnostics[0].code == "admissible-not-positive"
     below = dataclasses.replace(requirement, band=(0.0, 3.0))
     check_positive(below.admissible, below.grid, unit=1.0, named="rad/sample")
+
+
+DENSE = np.unique(np.concatenate([np.linspace(0.0, np.pi, 20001), np.geomspace(1e-4, np.pi, 20001)]))
+
+BAND = (0.0, np.pi)
+
+
+def test_target_is_met_exactly_at_its_ratio():
+    M, R = information(3, 1), information(3, 2)
+    ratio = InformationTarget(R).ratio(M)
+    slack = np.linalg.eigvalsh(ratio**2 * M - R)
+    assert abs(slack[0]) < 1e-9 * slack[-1]
+
+
+@pytest.mark.parametrize(
+    ("letter", "value"),
+    [
+        ("D", lambda M: np.linalg.slogdet(M)[1]),
+        ("A", lambda M: -np.trace(np.linalg.inv(M))),
+        ("E", lambda M: np.linalg.eigvalsh(M)[0]),
+        ("T", np.trace),
+    ],
+)
+def test_criteria_are_the_textbook_ones(letter, value):
+    """In scaled coordinates: M stands for G M G^T; and s M reaches level one at s = ratio^2."""
+    M, G = information(4, 3), np.random.default_rng(4).normal(size=(4, 4))
+    criterion = Criterion(letter, G)
+    assert criterion.value(criterion.level(M)) == pytest.approx(value(G @ M @ G.T), rel=1e-9)
+    assert criterion.level(criterion.ratio(M) ** 2 * M) == pytest.approx(1.0)
+
+
+def test_weighted_variance_is_the_definition(flexible):
+    """|W|^2 Lambda^* P Lambda over its limit, by complex arithmetic; the worst of a dense grid is found."""
+    W = Rational.build([0.3, 0.1], [1, -0.5])
+    model = flexible.model
+    M = information(6, 5, 1e3)
+    for relative in (False, True):
+        requirement = WeightedVariance(
+            experiment=flexible, band=BAND, entry=(0, 0), weight=W, limit=0.01, relative=relative
+        )
+        gradient = model.plant_gradient(DENSE)[:, :, 0, 0]
+        expected = np.einsum("ni,ij,nj->n", gradient.conj(), np.linalg.inv(M), gradient).real
+        expected *= np.abs(W.at(DENSE)) ** 2 / 0.01
+        if relative:
+            expected /= np.abs(model.plant_at(DENSE)[:, 0, 0]) ** 2
+        np.testing.assert_allclose(requirement.ratios(M, DENSE) ** 2, expected, rtol=1e-9)
+        worst = max(v.ratio for v in requirement.violations(M))
+        assert worst**2 >= expected.max() * (1 - 1e-9)
+
+
+MODELS = [
+    PolynomialModel.single([0, 3.6], F=[1, -0.7], C=[1, -0.9]),
+    PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.5, 0.7], variance=0.1),
+]
+
+
+@pytest.mark.parametrize("against", ["relative", "absolute"])
+@pytest.mark.parametrize("model", MODELS, ids=["bj", "arx"])
+def test_ellipsoid_bound_holds_on_the_ellipsoid_and_is_attained(model, against):
+    """Models sampled on the ellipsoid r^2 M never exceed the bound, and come close to it."""
+    experiment = Experiment(model, 500)
+    k = experiment.size
+    M = information(k, 7, 300.0)
+    admissible = Relative(model, 0.3) if against == "relative" else Absolute(0.4)
+    requirement = EllipsoidError(
+        experiment=experiment, band=BAND, entry=(0, 0), admissible=admissible, alpha=2.0, against=against
+    )
+    w = np.array([0.0, 0.2, 1.0, 2.5])
+    ratio = requirement.ratios(M, w)
+    half = np.linalg.inv(np.linalg.cholesky(M))
+    directions = np.random.default_rng(8).normal(size=(200000, k))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    index = {name: i for i, name in enumerate(model.names)}
+    for at, r in zip(w, ratio, strict=True):
+        d = 2.0 / r * directions @ half
+        q = np.exp(-1j * at)
+
+        def polynomial(letter, coefficients, d=d, q=q):
+            value = np.zeros(len(d), dtype=complex)
+            for lag, c in enumerate(coefficients):
+                change = d[:, index[f"{letter}{lag}"]] if f"{letter}{lag}" in index else 0.0
+                value = value + (c + change) * q**lag
+            return value
+
+        G = polynomial("b", model.B[0][0]) / (polynomial("a", model.A[0]) * polynomial("f", model.F[0][0]))
+        G0 = model.plant_at(np.array([at])).item()
+        error = np.abs(G - G0) / (np.abs(G) * 0.3 if against == "relative" else 0.4)
+        assert error.max() <= 1 + 1e-9
+        assert error.max() >= 0.97
+
+
+def test_ellipsoid_bound_is_the_first_order_one_in_the_limit():
+    """For a vanishing ellipsoid the linearisation is exact."""
+    model = MODELS[0]
+    experiment = Experiment(model, 500)
+    M = information(3, 9)
+    w = np.linspace(0.0, np.pi, 50)
+    exact, linear = (
+        kind(
+            experiment=experiment, band=BAND, entry=(0, 0), admissible=Relative(model, 1e-5), alpha=2.0
+        ).ratios(M, w)
+        for kind in (EllipsoidError, ModelError)
+    )
+    np.testing.assert_allclose(exact, linear, rtol=1e-4)

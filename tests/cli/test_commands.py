@@ -1,15 +1,19 @@
-"""Commands that design nothing: validate, check, examples, init, explain, schema."""
+"""Commands that design nothing: validate, check, examples, init, explain, schema, help."""
 
 import json
+import runpy
+import subprocess
 import sys
 from pathlib import Path
 from typing import get_args
 from xml.etree import ElementTree
 
 import pytest
+import typer
 
 import inputdesign_cli
 from inputdesign_cli import questions
+from inputdesign_cli.cli import app
 from inputdesign_cli.cli.reference import Kind
 from inputdesign_cli.error_codes import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
@@ -204,3 +208,39 @@ def test_schema(run):
 
 def test_version(run):
     assert run("--version") == (0, f"idesign {inputdesign_cli.__version__}\n", "")
+
+
+GROUP = typer.main.get_command(app)
+COMMANDS = dict(GROUP.commands)
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; sys.argv = ['idesign', '--help']\n"
+        "from inputdesign_cli.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: print(*sorted(sys.modules), file=sys.stderr)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[0] for name in ended.stderr.split()}
+    heavy = {"numpy", "scipy", "cvxpy", "clarabel", "matplotlib", "pydantic", "yaml", "control", "rich"}
+    assert "typer" in loaded
+    assert loaded & heavy == set()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_everything_is_documented(name, run):
+    command = COMMANDS[name]
+    assert len(command.help) > 20
+    for parameter in command.params:
+        assert parameter.help, parameter.name
+    code, out, err = run(name, "--help")
+    assert (code, err) == (0, "")
+    for parameter in command.params:
+        for option in parameter.opts if parameter.param_type_name == "option" else ():
+            assert option in out
+
+
+def test_the_page_about_the_command_line_is_up_to_date():
+    page = runpy.run_path(str(ROOT / "docs" / "make_cli_page.py"))["page"]()
+    assert (ROOT / "docs" / "cli.md").read_text(encoding="utf-8") == page, "run `make docs`"

@@ -269,17 +269,11 @@ def test_errors_of_standard_input_are_those_of_a_file_by_its_name(text, run, tmp
     assert "<stdin>:" in piped
 
 
-@pytest.mark.parametrize("name", ["", "  "])
-def test_an_empty_name_is_no_place(analyse, tmp_path, name):
-    code, err = analyse(write(tmp_path / "a.yaml", "one"), "-o", name)
-    assert code == 2
-    assert "empty" in err
-    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
-
-
 @pytest.mark.parametrize(
     ("options", "told"),
     [
+        (["-o", ""], "empty"),
+        (["-o", "  "], "empty"),
         (["-o", "/"], "the root of the file system is no directory for a run"),
         (["--confine", "nosuch"], "does not exist"),
         (["--confine", "a.yaml"], "is a file"),
@@ -291,6 +285,7 @@ def test_places_that_cannot_be_are_refused_before_anything_is_computed(run, verb
     assert code == 2
     assert told in " ".join(err.split())
     assert not verbs
+    assert [path.name for path in Path().iterdir()] == ["a.yaml"]
 
 
 def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):

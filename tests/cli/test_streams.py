@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from inputdesign_cli.cli import terminal as terminal_module
+from inputdesign_cli.cli.terminal import aligned, colourful, computing, status
+from inputdesign_cli.compute.watching import Counted, tell
 from tests.support.processes import running
 
 ROOT = Path(__file__).parents[2]
@@ -101,15 +104,32 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     assert not (tmp_path / "r").exists()
 
 
-BEGIN = """
+# A signal that comes while an object is finalised, while an import swallows it, while a class is made.
+
+
+PROGRAM = """
 import signal, sys, time
 import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
 from inputdesign_cli.cli.terminal import guarded
 
 _, number, where = sys.argv
 sys.argv = sys.argv[:1]
-"""
-END = """
+
+class Finalised:
+    def __del__(self):
+        signal.raise_signal(int(number))
+
+class Attribute:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(int(number))
+
+def work():
+    try:
+        {}
+        time.sleep(20)
+    finally:
+        print("tidied up")
+
 def run():
     cli.streams.prepare_signals()
     cli.typer.run(guarded(work)) if where == "guarded" else work()
@@ -118,44 +138,11 @@ cli.main = run
 command.main()
 """
 # A signal that comes while an object is finalised, while an import swallows it, while a class is made.
-WORK = {
-    "finalised": """
-class Finalised:
-    def __del__(self):
-        signal.raise_signal(int(number))
-
-def work():
-    try:
-        Finalised()
-        time.sleep(20)
-    finally:
-        print("tidied up")
-""",
-    "dropped": """
-def work():
-    try:
-        import dropping
-        time.sleep(20)
-    finally:
-        print("tidied up")
-""",
-    "wrapped": """
-class Attribute:
-    def __set_name__(self, owner, name):
-        signal.raise_signal(int(number))
-
-def work():
-    try:
-        type("Made", (), {"attribute": Attribute()})
-        time.sleep(20)
-    finally:
-        print("tidied up")
-""",
-}
+WORK = ("Finalised()", "import dropping", 'type("Made", (), dict(attribute=Attribute()))')
 
 
 @pytest.mark.first(6)
-@pytest.mark.parametrize("work", WORK)
+@pytest.mark.parametrize("work", WORK, ids=["finalised", "dropped", "wrapped"])
 @pytest.mark.parametrize("where", ["guarded", "outside"])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_is_neither_lost_nor_a_fault_whatever_python_does_meanwhile(
@@ -163,7 +150,7 @@ def test_a_signal_is_neither_lost_nor_a_fault_whatever_python_does_meanwhile(
 ):
     swallowed = f"try:\n    signal.raise_signal({int(number)})\nexcept BaseException:\n    pass\n"
     (tmp_path / "dropping.py").write_text(f"import signal\n{swallowed}")
-    command = [sys.executable, "-c", BEGIN + WORK[work] + END, str(int(number)), where]
+    command = [sys.executable, "-c", PROGRAM.format(work), str(int(number)), where]
     paths = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=paths)
     assert (done.returncode, "Traceback" in done.stderr, "internal" in done.stderr) == (code, False, False)
@@ -177,3 +164,86 @@ def test_names_that_are_no_text_end_in_no_fault(tmp_path, run):
     assert run("analyse", name, "-q", "--no-figures", "-o", "run") == (0, "", "")
     assert json.loads((tmp_path / "run" / "result.json").read_text())["made_from"] == [f"../{name}"]
     assert shell(f"{IDESIGN} report '{name}' -q", tmp_path)[0] == 2
+
+
+class Shown:
+    def __init__(self):
+        self.text = ""
+
+    def isatty(self):
+        return True
+
+    def write(self, text):
+        self.text += text
+
+    def flush(self):
+        pass
+
+
+def shown_by(monkeypatch):
+    """A terminal in place of standard error."""
+    monkeypatch.setenv("TERM", "xterm")
+    shown = Shown()
+    monkeypatch.setattr(sys, "stderr", shown)
+    return shown
+
+
+def test_a_long_computation_tells_how_far_it_is(monkeypatch):
+    terminal = shown_by(monkeypatch)
+    with computing("log.csv", quiet=False):
+        tell(Counted("starting points tried", 3, 30))
+        time.sleep(0.3)
+    assert "log.csv: computing ..." in terminal.text
+    assert "3 of 30" not in terminal.text, "there is no need to tell at once"
+    monkeypatch.setattr(terminal_module, "_PATIENCE", 0.0)
+    with computing("log.csv", quiet=False):
+        tell(Counted("starting points tried", 3, 30))
+        time.sleep(0.3)
+    assert "log.csv: starting points tried: 3 of 30 ..." in terminal.text
+    terminal.text = ""
+    with computing("log.csv", quiet=True):
+        tell(Counted("starting points tried", 3, 30))
+    assert terminal.text == ""
+
+
+@pytest.mark.parametrize(
+    ("variables", "expected"),
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
+)
+def test_no_color(monkeypatch, variables, expected):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert colourful(Shown()) is expected
+
+
+def test_neither_colour_nor_progress_goes_to_files(tmp_path, capsys):
+    with (tmp_path / "log").open("w") as file:
+        assert not colourful(file)
+    with status("working", quiet=False):
+        pass
+    assert capsys.readouterr() == ("", "")
+
+
+def test_progress_is_shown_on_a_terminal_and_cleared(monkeypatch):
+    terminal = shown_by(monkeypatch)
+    with status("[working] on it", quiet=False):
+        pass
+    assert "[working] on it" in terminal.text
+    assert terminal.text.endswith("\x1b[2K")
+
+
+def test_columns_are_aligned():
+    assert aligned([("a", "1"), ("bcd", "22")], right=[1]) == ["a     1", "bcd  22"]
+    assert aligned([("漢", "[x]"), ("bcd", "y")]) == ["漢   [x]", "bcd  y"]
+
+
+def test_lines_break_on_a_terminal_and_nowhere_else(monkeypatch):
+    rows = [("note", "one two three " * 10)]
+    assert len(aligned(rows, wrap=True)) == 1
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = aligned(rows, wrap=True)
+    assert max(map(len, lines)) <= 40
+    assert all(line.startswith("      ") for line in lines[1:])

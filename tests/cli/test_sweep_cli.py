@@ -76,12 +76,6 @@ def test_what_is_wrong_is_said_before_anything_is_written(run, tmp_path, argumen
     assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
 
 
-def test_a_report_of_nothing(run):
-    code, out, err = run("report", "nowhere")
-    assert (code, out) == (2, "")
-    assert "run-missing" in err
-
-
 def test_the_pace_of_a_sweep_counts_what_was_computed_now():
     progress = lambda *counts: SimpleNamespace(  # noqa: E731
         **dict(zip(("total", "passed", "computed", "failed"), counts, strict=True))

@@ -5,12 +5,17 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from inputdesign_cli import parse_spec, simulate, solve
+from inputdesign_cli.compute import interruptions
 from inputdesign_cli.compute.executor import InProcess, WorkerLostError
+from inputdesign_cli.compute.interruptions import bare_interruptions, interrupt
 from inputdesign_cli.compute.processes import Processes
+from inputdesign_cli.compute.watching import Counted, Round, tell, watching
 from tests.support import jobs
 from tests.support.processes import running
 
@@ -88,3 +93,112 @@ def alive(pid):
             return file.read().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+SPEC = """
+plant: {B: [0, 1], F: [1, -0.7]}
+noise: {variance: 1}
+experiment: {samples: 500}
+cost: {input_power: 1}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 4}
+"""
+
+
+def test_a_design_tells_its_rounds():
+    told = []
+    with watching(told.append):
+        result = solve(parse_spec(SPEC)).result
+    design = told[: result["solver"]["rounds"]]
+    assert [done.number for done in design] == list(range(1, len(design) + 1))
+    assert all(earlier.bound <= later.bound for earlier, later in pairwise(design))
+    assert design[-1].bound == result["objective"]["lower_bound"]
+    assert len(told) > len(design), "the bound over every spectrum has rounds of its own"
+
+
+def test_what_comes_after_the_design_is_counted():
+    """Fresh plants, then runs: what takes longest is not silent."""
+    told = []
+    uncertain = "uncertainty: {covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 70}\n"
+    with watching(told.append):
+        simulate(parse_spec(f"{SPEC}{uncertain}simulation: {{runs: 120}}\n"))
+    assert Counted("fresh plants", 70, 70) in told
+    assert [str(one) for one in told[-2:]] == ["simulated runs: 100 of 120", "simulated runs: 120 of 120"]
+
+
+def test_nobody_has_to_watch():
+    tell(Round(1, 2.0, 1.0, 3))
+    assert str(Round(1, 2.0, 1.0, 3)) == "round 1: 2, proved to 5.0e-01, 3 cuts"
+
+
+def ended(number):
+    """An end of which a compiled module makes an error of its own, which names it in words at most."""
+    with bare_interruptions():
+        try:
+            interrupt(number, None)
+        except BaseException:
+            raise ImportError("failed to import") from None
+
+
+@pytest.mark.parametrize(
+    ("number", "end", "code"), [(signal.SIGINT, KeyboardInterrupt, ()), (signal.SIGHUP, SystemExit, (129,))]
+)
+def test_an_end_that_another_error_hides_is_itself(number, end, code):
+    with pytest.raises(end) as raised:
+        ended(number)
+    assert raised.value.args == code
+
+
+def test_errors_without_an_end_stand():
+    with pytest.raises(SystemExit):
+        ended(signal.SIGTERM)
+    with pytest.raises(ValueError, match="wrong"), bare_interruptions():
+        raise ValueError("wrong")
+
+
+def test_an_import_that_lasts_too_long_is_interrupted(tmp_path, monkeypatch):
+    """As that of a module which runs a command."""
+    name = "inputdesign_cli.compute.interruptions"
+    (tmp_path / "lasting.py").write_text(
+        f"import sys\nfrom {name} import interrupt\ninterrupt(1, sys._getframe())\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(interruptions, "_PATIENCE", 0.0)
+    with pytest.raises(SystemExit) as raised, bare_interruptions():
+        __import__("lasting")
+    assert raised.value.code == 129
+
+
+class Dropping:
+    """A key that is interrupted while it is compared, and drops that."""
+
+    def __hash__(self):
+        return 1
+
+    def __eq__(self, _):
+        try:
+            interrupt(signal.SIGTERM, None)
+        except SystemExit:
+            return True
+
+
+def dropping(tidied):
+    with bare_interruptions():
+        try:
+            assert {Dropping(): 1}[Dropping()] == 1
+            time.sleep(20)
+        finally:
+            try:
+                raise ValueError("while it tidies up")
+            except ValueError:
+                time.sleep(0.3)
+            tidied.append(True)
+
+
+def test_an_end_that_is_dropped_comes_again_and_one_that_tidies_up_is_left_alone():
+    tidied = []
+    with pytest.raises(SystemExit) as raised:
+        dropping(tidied)
+    assert (raised.value.code, tidied) == (143, [True])
+    time.sleep(0.2)
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)

@@ -1,10 +1,18 @@
-"""The errors of the design against what is admitted, in panels of entries."""
+"""Errors against what is admitted, spectra, signals, fits and residuals of records, studies, the loop."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from inputdesign_cli.outcome.curves import BoundPanel
-from tests.support.curves import CURVES, G, W, bound, lines_by_label
+from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.outcome.curves import BoundPanel, ErrorBandCurves, FitCurves, FitPanel, SpectrumCurves
+from tests.support.curves import BANDS, CURVES, DENSITY, G, W, Z, bound, lines_by_label
+
+
+def legend_of(figure):
+    (legend,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    return [text.get_text() for text in legend.get_texts()]
 
 
 def test_bound_shows_every_error_and_marks_the_limiting_frequencies(page):
@@ -75,3 +83,174 @@ def test_ratios_far_below_the_limit_keep_their_shape(page):
     low, high = below.get_ylim()
     assert low > 0.01
     assert high > 1.0
+
+
+def test_the_spectrum_beside_the_white_level(page):
+    (axes,) = page(CURVES["spectrum"]).axes
+    lines = lines_by_label(axes)
+    np.testing.assert_array_equal(lines["Φᵤ, design"].get_ydata(), DENSITY)
+    assert set(lines["Φᵤ, white"].get_ydata()) == {1.7}
+    assert axes.get_yscale() == "linear"
+
+
+def test_a_spectrum_over_decades_is_logarithmic_and_not_endless(page):
+    (axes,) = page(CURVES["spectrum with zeros"]).axes
+    low, high = axes.get_ylim()
+    assert axes.get_yscale() == "log"
+    assert 1.0 < np.log10(high / low) < 7.0
+
+
+def test_lines_stand_as_stems_of_their_power(page):
+    (axes,) = page(CURVES["lines"]).axes
+    (stems,) = axes.collections
+    np.testing.assert_allclose(stems.get_segments(), [[[0.1553, 0.0], [0.1553, 0.1925]]])
+    assert any("0.1925" in label for label in lines_by_label(axes))
+
+
+def test_a_spectrum_of_no_lines_is_an_empty_page():
+    """What a design is that needs no excitation."""
+    nothing = SpectrumCurves(np.zeros(0), np.zeros((0, 1, 1)), lines=True, band=(0.0, 1.0))
+    assert draw(nothing).startswith(b"\x89PNG")
+
+
+def test_entries_that_coincide_share_a_curve_and_rounding_has_none(page):
+    above, _ = page(CURVES["matrix of one direction"]).axes
+    assert list(lines_by_label(above)) == ["|Φ₁₁| = |Φ₂₂|"]
+    assert [axes.get_xscale() for axes in page(CURVES["matrix"]).axes] == ["log", "log"]
+
+
+def test_the_certificate_says_what_it_means(page):
+    figure = page(CURVES["optimality"])
+    assert "no other spectrum can do better" in figure.get_suptitle()
+
+
+def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
+    figure = page(CURVES["long signal"])
+    record, histogram = figure.axes[:2]
+    assert "first 1000 of 3000 samples, 4 of 6 channels" in figure.axes[6].get_xlabel()
+    assert record.lines[0].get_xdata().size == 1000
+    assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(
+    ("moves", "label"),
+    [
+        (slice(0, 3000), "(s; first 400 of 3000 samples)"),
+        (slice(2000, 2400), "(s; samples 2001 to 2400 of 3000)"),
+    ],
+)
+def test_a_fit_is_shown_where_the_output_moves(page, moves, label):
+    y = np.zeros(3000)
+    y[moves] = np.sin(np.arange(3000.0))[moves]
+    axes = page(FitCurves(np.arange(3000.0), (FitPanel(y, y, y),))).axes
+    assert label in axes[-1].get_xlabel()
+    begin = 2000 if "2001" in label else 0
+    for line in (axes[0].lines[0], axes[1].lines[0]):
+        np.testing.assert_array_equal(line.get_xdata(), np.arange(begin, begin + 400.0))
+    np.testing.assert_array_equal(axes[0].lines[0].get_ydata(), y[begin : begin + 400])
+
+
+def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
+    figure = page(CURVES["predicted signal"])
+    record, _, below, _ = figure.axes
+    assert record.lines[0].get_drawstyle() == "steps-post"
+    assert (record.get_ylabel(), below.get_ylabel()) == ("valve (%)", "level (m)")
+    band = below.collections[0].get_paths()[0].vertices
+    np.testing.assert_allclose([band[:, 1].min(), band[:, 1].max()], [-1.0, 49.0 + 2.0 * 7.0], atol=1e-9)
+    assert legend_of(figure) == [
+        "to be applied, held between samples",
+        "limits",
+        "± 2 standard deviations of noise since the start",
+        "predicted output, from rest",
+    ]
+
+
+def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(page):
+    upper, lower = page(CURVES["fit"]).axes
+    assert "simulated from u (fit 83.2 %)" in lines_by_label(upper)
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), -0.1)
+    panels = page(CURVES["fit of two outputs"]).axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
+
+
+@pytest.mark.first(4)
+@pytest.mark.parametrize("outputs", [1, 2])
+@pytest.mark.parametrize("lengths", [(), (500,), (240, 260), (100, 150, 250)])
+def test_no_curve_goes_from_one_record_to_the_next(page, lengths, outputs):
+    """Between two records every curve has a gap, and their border is marked there; no sample is lost."""
+    y = np.arange(500.0)
+    figure = page(FitCurves(y, (FitPanel(y, y + 5.0, y - 5.0, 80.0),) * outputs, lengths))
+    begins = np.cumsum(lengths)[:-1]
+    for axes in figure.axes:
+        curves = [line for line in axes.lines if line.get_transform() == axes.transData]
+        for x, values in (line.get_data() for line in curves):
+            assert np.isnan(x).sum() == np.isnan(values).sum() == len(begins)
+            np.testing.assert_array_equal(x[~np.isnan(values)], y)
+            np.testing.assert_array_equal(x[np.flatnonzero(np.isnan(values)) + 1], begins)
+        marks = [line.get_xdata()[0] for line in axes.lines if line not in curves]
+        np.testing.assert_array_equal(marks, begins - 0.5)
+    assert ("another record begins" in legend_of(figure)) == bool(len(begins))
+
+
+def test_records_whose_border_is_not_shown_have_no_mark(page):
+    y = np.sin(np.arange(3000.0))
+    axes = page(FitCurves(np.arange(3000.0), (FitPanel(y, y, y),), (1500, 1500))).axes[0]
+    assert all(line.get_transform() == axes.transData for line in axes.lines)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.1])
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_prediction_that_is_the_simulation_is_one_curve_and_is_said_to_be(page, apart, outputs):
+    """A model with white noise predicts what it simulates, and one curve would hide the other."""
+    y, predicted = np.sin(np.arange(100.0)), np.sin(np.arange(100.0)) + 0.1
+    predicted[40:50] = np.nan  # a gap
+    panel = FitPanel(y, predicted, predicted + apart, 90.0)
+    figure = page(FitCurves(np.arange(100.0), (panel,) * outputs))
+    labels = legend_of(figure)
+    assert len(figure.axes[0].lines) == len(labels) == (3 if apart else 2)
+    assert any("ahead, and simulated from u" in label for label in labels) == (not apart)
+
+
+def test_a_colour_means_the_same_in_all_panels(page):
+    y = np.sin(np.arange(100.0))
+    one, other = FitPanel(y, y + 0.1, y + 0.1, 90.0), FitPanel(y, y + 0.1, y, 90.0, output=1)
+    assert [len(axes.lines) for axes in page(FitCurves(np.arange(100.0), (one, other))).axes] == [3, 3]
+
+
+def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
+    assert [axes.get_title() for axes in page(CURVES["residuals"]).axes] == ["with residual 1", "with u1"]
+    titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
+    assert titles == ["with residual 1", "with residual 2", "with u1", "", "", ""]
+
+
+def test_where_runs_leave_what_is_admitted_is_marked(page):
+    kept, missed = page(CURVES["error bands"]).axes[0], replace(BANDS, r_adm=np.where(W < 1, G, 0.3 * G))
+    assert not any("leave" in label for label in lines_by_label(kept))
+    (axes,) = page(ErrorBandCurves((missed,), "design", 100)).axes
+    (marked,) = [part for label, part in lines_by_label(axes).items() if "leave r_adm" in label]
+    assert marked.get_paths()[0].vertices[:, 0].min() >= 0.99
+    assert lines_by_label(axes)["r_adm, admitted"].get_linestyle() == "--"
+
+
+def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
+    (axes,) = page(CURVES["nyquist"]).axes
+    (discs,) = axes.collections
+    near = Z[150]
+    centre = 0.8 * near**2 / (1 - near)
+    offsets = discs.get_offsets()
+    assert np.hypot(offsets[:, 0] - centre.real, offsets[:, 1] - centre.imag).min() < 1e-9
+    np.testing.assert_allclose(discs.get_widths(), 0.2)
+    assert [circle.get_radius() for circle in axes.patches] == [0.5, 0.5]
+    assert not page(CURVES["nyquist without a bound"]).axes[0].patches
+
+
+def test_levels_and_deviations_are_told_apart(page):
+    """The operating point of the input is known, and that of the output is not."""
+    curves = CURVES["predicted signal"]
+    for levels, label, told in (
+        (False, "level (m)", "from rest"),
+        (True, "Δ level (m)", "deviation Δ from rest"),
+    ):
+        figure = page(replace(curves, levels=levels))
+        assert [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()] == ["valve (%)", label]
+        assert any(text.endswith(told) for text in legend_of(figure))

@@ -10,15 +10,28 @@ from itertools import combinations, product
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from inputdesign_cli.figures.plots import draw, draw_all, figure, painter
 from inputdesign_cli.figures.readings import readings
-from inputdesign_cli.figures.style import TYPE_SIZE, rendered
-from inputdesign_cli.outcome.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
+from inputdesign_cli.figures.studies import draw_campaign
+from inputdesign_cli.figures.style import TYPE_SIZE, painted, rendered
+from inputdesign_cli.figures.sweep import draw_trade
+from inputdesign_cli.figures.sweep_table import Trade
+from inputdesign_cli.outcome.curves import (
+    BoundCurves,
+    BoundPanel,
+    CampaignCurves,
+    FitCurves,
+    NyquistCurves,
+    OrderCurves,
+    ResponseCurves,
+    SignalCurves,
+)
 from inputdesign_cli.outcome.results import Results
-from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound
+from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound, lines_by_label
 from tests.support.outcomes import typed
 
 
@@ -183,3 +196,85 @@ def test_who_reads_values_is_told_of_which_panel_and_axis(curves, told):
     found = []
     rendered(painter(curves), seen=lambda page: found.extend(readings(page)))
     assert [panel["y"] for panel in found] == told
+
+
+@pytest.mark.parametrize("most", [1.02, 1.1, 1.64, 3.0, 7.0, 30.0, 2000.0])
+def test_the_worst_ratio_of_a_campaign_stands_beside_three_numbers_or_more(most):
+    ratios = np.array([most, np.sqrt(most), 0.99])
+    curves = CampaignCurves(np.array([10.0, 20.0, 30.0]), ratios, np.array([1.0, 2.0, 3.0]), 500)
+
+    def paint(page: Figure) -> None:
+        draw_campaign(page, curves, "s")
+
+    upper = painted(paint).axes[0]
+    upper.figure.canvas.draw()
+    low, high = upper.get_ylim()
+    labels = [tick for tick in upper.get_yticklabels() if tick.get_text()]
+    shown = [tick for tick in labels if low <= tick.get_position()[1] <= high]
+    assert len(shown) >= 3
+    assert len({tick.get_text() for tick in shown}) == len(shown)
+    assert [float(tick.get_text()) for tick in shown] == pytest.approx([t.get_position()[1] for t in shown])
+
+
+SIZES = np.array([2.0, 4.0])
+
+
+def looks(line):
+    return line.get_color(), str(line.get_linestyle()), line.get_marker(), line._dash_pattern[1]
+
+
+def apart(lines):
+    return len({str(looks(line)) for line in lines}) == len(lines)
+
+
+@pytest.mark.parametrize("families", [1, 6, 8, 20])
+def test_every_family_is_drawn_and_told_apart(page, families):
+    fits = {f"F{n}": (SIZES, np.array([90.0 - n, 80.0 - n])) for n in range(families)}
+    (axes,) = (figure := page(OrderCurves(fits, (2.0, 90.0), "OE"))).axes
+    named = {line.get_label(): line for line in axes.lines}
+    assert set(named) == {*fits, "chosen: OE"}
+    for family, (sizes, fit) in fits.items():
+        np.testing.assert_array_equal(named[family].get_xydata(), np.column_stack([sizes, fit]))
+    assert apart(list(named.values()))
+    assert {text.get_text() for text in figure.legends[0].get_texts()} == set(named)
+
+
+def test_fits_that_are_drawn_elsewhere_are_told(page):
+    told = [
+        page(OrderCurves({"OE": (SIZES, np.array([90.0, low]))}, (2.0, 90.0), "OE")).axes[0].get_ylabel()
+        for low in (10.0, -500.0)
+    ]
+    assert ["-20" in label for label in told] == [False, True]
+
+
+def test_every_amplitude_of_a_trade_is_drawn():
+    page = Figure()
+    texts = tuple(map(str, range(9)))
+    draw_trade(Trade(SIZES, "s", texts, np.arange(18.0).reshape(9, 2) + 1.0, False), page)
+    (axes,) = page.axes
+    drawn = lines_by_label(axes)
+    assert {f"amplitude {text}" for text in texts} <= set(drawn)
+    assert apart(list(drawn.values()))
+
+
+@pytest.mark.slow
+def test_ratios_of_nine_entries_are_told_apart(page):
+    panels = tuple(
+        BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=entry) for entry in product(range(3), repeat=2)
+    )
+    below = page(BoundCurves(panels)).axes[-1]
+    drawn = lines_by_label(below)
+    assert len(drawn) == 10  # the limit
+    assert apart(list(drawn.values()))
+
+
+def test_the_sign_of_every_gain_is_seen(page):
+    """Of G and of -G the magnitudes are the same, and the phases are half a turn apart."""
+    panels = tuple(
+        replace(SEEN, G=s * SEEN.G, model=s * SEEN.model, entry=(0, j)) for j, s in enumerate((1, -1))
+    )
+    drawn = lines_by_label(page(ResponseCurves(panels)).axes[-1])
+    assert list(drawn) == ["G₁₁", "G₁₂"]
+    one, other = (line.get_ydata() for line in drawn.values())
+    np.testing.assert_allclose(np.abs(other - one), 180.0)
+    np.testing.assert_allclose(one, np.degrees(np.angle(SEEN.model)), atol=1e-9)

@@ -103,38 +103,29 @@ def test_shortest_experiments_are_compared_with_the_samples_that_white_needs(pag
     assert [853.0, 853.0] in [list(line.get_ydata()) for line in page.axes[0].lines]
 
 
-def moments_table(alphas, entries, trace):
-    given = table({ALPHA: alphas}, trace)
+THREE = [("R_1_1", [1.0, 5.0, ""]), ("R_1_2", [1.0, 5.0, ""]), ("R_2_2", [1.0, 5.5, ""])]
+VANISHING = [("R_1_1", [1.0, 9.0]), ("R_1_2", [0.0, -2.0]), ("R_2_2", [1.0, 9.0])]
+TEN = [(f"R_{i}_{j}", [1.0, 2.0]) for i in range(1, 5) for j in range(i, 5)]
+
+
+@pytest.mark.parametrize(
+    ("alphas", "entries", "trace", "labels", "scale", "marked"),
+    [
+        (["0", "0.9", "1"], THREE, [2.0, 21.0, ""], ["R₁₁", "R₁₂", "R₂₂"], "log", [[1.0]]),
+        (["0", "1"], VANISHING, [2.0, 40.0], ["R₁₁", "R₁₂", "R₂₂"], "linear", []),
+        (["0", "1"], TEN, [4.0, 8.0], ["R₁₁", "R₂₂", "R₃₃", "R₄₄"], None, []),
+    ],
+)
+def test_moments_are_drawn_over_the_parameter(pages, tmp_path, alphas, entries, trace, labels, scale, marked):
+    """Infeasible points are marked; of large moments the diagonal is drawn."""
+    given = table({"accuracy.mean_squared_error.neglected_norm": alphas}, trace)
     given.columns.update({f"moments.entries.{name}": [str(v) for v in column] for name, column in entries})
     given.columns["moments.trace"] = [str(v) for v in trace]
-    return given
-
-
-ALPHA = "accuracy.mean_squared_error.neglected_norm"
-
-
-def test_moments_are_drawn_over_the_parameter_with_infeasible_points_marked(pages, tmp_path):
-    entries = [("R_1_1", [1.0, 5.0, ""]), ("R_1_2", [1.0, 5.0, ""]), ("R_2_2", [1.0, 5.5, ""])]
-    given = moments_table(["0", "0.9", "1"], entries, [2.0, 21.0, ""])
     assert [name for name, _ in sweep_figures(given)] == ["curves", "moments"]
     axes = pages(given, tmp_path)[-1].axes[0]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["R₁₁", "R₁₂", "R₂₂", "trace R"]
-    assert axes.get_yscale() == "log"
-    assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == [[1.0]]
-
-
-def test_moments_that_vanish_keep_a_linear_axis(pages, tmp_path):
-    entries = [("R_1_1", [1.0, 9.0]), ("R_1_2", [0.0, -2.0]), ("R_2_2", [1.0, 9.0])]
-    axes = pages(moments_table(["0", "1"], entries, [2.0, 40.0]), tmp_path)[-1].axes[0]
-    assert axes.get_yscale() == "linear"
-
-
-def test_of_large_moments_the_diagonal_is_drawn(pages, tmp_path):
-    entries = [(f"R_{i}_{j}", [1.0, 2.0]) for i in range(1, 5) for j in range(i, 5)]
-    axes = pages(moments_table(["0", "1"], entries, [4.0, 8.0]), tmp_path)[-1].axes[0]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["R₁₁", "R₂₂", "R₃₃", "R₄₄", "trace R"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [*labels, "trace R"]
+    assert scale in (None, axes.get_yscale())
+    assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == marked
 
 
 def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_is_named(pages, tmp_path):
@@ -150,18 +141,15 @@ def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_
     assert legend.get_title().get_text() == f"best: {N} = 40, {M} = 2, x = b"
 
 
-def test_the_points_have_the_ticks(pages, tmp_path):
+def test_the_points_have_the_ticks_unless_they_stand_too_close(pages, tmp_path):
     (page,) = pages(table({N: ["250", "500", "1000"]}, [3.0, 2.0, 1.0]), tmp_path)
     assert list(page.axes[0].get_xticks()) == [250.0, 500.0, 1000.0]
     assert page.get_suptitle() == f"best: {N} = 1000"
+    close = pages(table({M: ["1", "1.01", "40"]}, [3.0, 2.0, 1.0]), tmp_path)[-1]
+    assert 1.01 not in list(close.axes[0].get_xticks())
 
 
-def test_points_that_stand_too_close_have_common_ticks(pages, tmp_path):
-    (page,) = pages(table({M: ["1", "1.01", "40"]}, [3.0, 2.0, 1.0]), tmp_path)
-    assert 1.01 not in list(page.axes[0].get_xticks())
-
-
-def test_of_a_criterion_the_largest_is_the_best(pages, tmp_path):
+def test_of_a_criterion_the_largest_is_the_best():
     given = table({M: ["0", "4", "8"]}, [3.0, 4.5, 4.0], kind="D")
     assert given.best == ("objective.value", f"{M} = 4")
 

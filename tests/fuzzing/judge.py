@@ -19,8 +19,7 @@ from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import finished_result
-from tests.fuzzing.excitation import NotJudgedError
-from tests.fuzzing.textbook import findings
+from tests.fuzzing.textbook import NotJudgedError, findings
 
 # No input leads to these: they say that something is wrong with the program.
 _OURS_TO_MEND = ("internal-disagreement",)

@@ -1,15 +1,32 @@
-"""Batches of simulated runs: the same numbers on one process, on two, and on a cluster."""
+"""Simulated runs: batches, statistics, excitations, and losses of loops that agree with theory."""
 
 import os
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+import scipy.signal
+import scipy.stats
 
 from inputdesign_cli.compute.executor import InProcess
 from inputdesign_cli.compute.processes import Processes
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, ModelReference
+from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.identification.polynomial_rows import estimated_polynomials, least_squares
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.batches import run_batches
+from inputdesign_cli.monte_carlo.excitations import InPhase, Reapplied, Recorded, Redrawn
+from inputdesign_cli.monte_carlo.loop_error import error_filters, prefilter, study_losses
+from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
+from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix
+from inputdesign_cli.plant.polynomial import determinant_and_adjugate, multiply
+from inputdesign_cli.signal.lines import grid_lines
+from inputdesign_cli.signal.periodic import harmonics
+from inputdesign_cli.spectrum import LinesBasis
+from tests.support.loop_error import column, matrix_plant, random_plant
 
 
 def draw(job, runs, rng):
@@ -59,3 +76,263 @@ def test_a_batch_whose_processes_are_killed_is_said():
     with pytest.raises(IdesignError, match="a batch of 2 simulated runs has no result") as caught:
         run_batches(end, runs=2, size=2, seed=0, executor=Processes(1))
     assert caught.value.diagnostics[0].code == "worker-lost"
+
+
+@pytest.mark.parametrize(("successes", "runs"), [(0, 20), (17, 20), (20, 20), (415, 500)])
+def test_binomial_limits(successes, runs):
+    expected = scipy.stats.binomtest(successes, runs).proportion_ci(0.95, method="exact")
+    assert binomial_limits(successes, runs) == pytest.approx((expected.low, expected.high))
+
+
+def test_whitened_eigenvalues_do_not_depend_on_coordinates():
+    rng = np.random.default_rng(1)
+    M = np.array([[4.0, 1.0], [1.0, 1.0]])
+    theta = rng.standard_normal((400, 2)) @ np.linalg.inv(np.linalg.cholesky(M))
+    values = whitened_eigenvalues(theta, M)
+    T = np.array([[1e3, 2.0], [0.0, 1e-2]])
+    changed = whitened_eigenvalues(theta @ T.T, np.linalg.inv(T).T @ M @ np.linalg.inv(T))
+    np.testing.assert_allclose(values, changed, rtol=1e-9)
+    np.testing.assert_allclose(
+        values, np.linalg.eigvals(np.cov(theta.T) @ M)[np.argsort(np.linalg.eigvals(np.cov(theta.T) @ M))]
+    )
+    low, high = wishart_range(2, 400, rng)
+    assert low < values[0] <= values[1] < high
+
+
+SAMPLES = 2000
+GAINS = np.array([[1.0, 0.4], [0.3, -0.7]])
+POWERS = np.array([2.0, 3.0])
+
+
+def experiment(channels):
+    """A plant without memory to speak of: the finite sample shows little else than the spectrum."""
+    one = (np.ones(1),)
+    F = (one * channels,) * channels
+    B = tuple(tuple(np.array([0.0, gain]) for gain in row[:channels]) for row in GAINS[:channels])
+    covariance = np.array([[1.0, 0.4], [0.4, 0.5]])[:channels, :channels]
+    return Experiment(PolynomialModel(B, one, F, one, one, covariance), SAMPLES)
+
+
+def flat(method, channels, samples=SAMPLES):
+    return Redrawn.flat("f", method, POWERS[:channels], (0.0, np.pi), samples, 1.0)
+
+
+def check_information(tried, excitation):
+    """The information of the spectrum is the mean of that of the records."""
+    records = excitation.draw(20, SAMPLES, np.random.default_rng(1))
+    assert records.shape == (20, SAMPLES, tried.inputs)
+    exact = FiniteRecord(tried, SAMPLES, 1.0)
+    found = np.mean([exact.information(record) for record in records], axis=0)
+    expected = excitation.information(tried)
+    np.testing.assert_allclose(found, expected, atol=0.02 * np.abs(expected).max())
+    one = Recorded("r", records[0], 1.0)
+    np.testing.assert_allclose(one.information(tried), exact.information(records[0]))
+
+
+@pytest.mark.first(3)
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize("method", ["white", "prbs", "multisine", "binary"])
+def test_the_information_of_a_flat_excitation_is_that_of_its_records(method, channels):
+    check_information(experiment(channels), flat(method, channels))
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_the_information_of_sinusoids_is_that_of_their_records(channels):
+    w = 2 * np.pi * np.array([100, 300]) / 1000
+    amplitudes = np.array([[1.0, 2.0], [3.0, -1.0]])[:, :channels]
+    size = np.linalg.norm(amplitudes, axis=1)
+    basis = LinesBasis(w, amplitudes / size[:, None] + 0j, w, np.ones(channels))
+    check_information(experiment(channels), InPhase("i", w, amplitudes, basis, 0.5 * size**2))
+
+
+@pytest.mark.parametrize("method", ["white", "prbs", "multisine", "binary"])
+def test_flat_excitations_have_their_power_exactly(method):
+    records = flat(method, 2, 300).draw(5, 300, np.random.default_rng(2))
+    np.testing.assert_allclose(np.mean(records**2, axis=1), np.tile(POWERS, (5, 1)))
+
+
+def test_reapplied_records_are_those_of_the_excitation_so_many_times_each():
+    drawn = Redrawn.flat("design", "white", np.array([2.0]), (0.0, np.pi), 40, 1.0)
+    once = drawn.draw(3, 40, np.random.default_rng(7))
+    again = Reapplied(drawn, 3).draw(7, 40, np.random.default_rng(7))
+    np.testing.assert_array_equal(again, once[[0, 0, 0, 1, 1, 1, 2]])
+    assert not np.array_equal(once[0], once[1])
+
+
+W = np.linspace(0.05, 3.1, 9)
+
+
+def even_lines(samples, n=2):
+    L = harmonics(samples)
+    return grid_lines(np.broadcast_to(np.eye(n, dtype=complex), (L.size, n, n)), samples, 1.0)
+
+
+def target(n, *, matrix):
+    if not matrix:
+        return TransferMatrix.diagonal(Rational.build([0.0, 0.4], [1.0, -0.6]), n)
+    entries = [[[0.0, 0.4 if i == j else 0.05 * (i - j)] for j in range(n)] for i in range(n)]
+    return TransferMatrix.build(entries, [[[1.0, -0.6]] * n] * n)
+
+
+def arx(plant):
+    """The plant with white equation noise."""
+    return replace(plant, C=(np.ones(1),), D=(np.ones(1),))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_adjugate_and_determinant(n):
+    matrix = np.random.default_rng(n).standard_normal((4, n, n, 3))
+    det, adj = determinant_and_adjugate(matrix)
+    product = multiply(matrix, adj)
+    for i in range(n):
+        for j in range(n):
+            expected = np.zeros((4, product.shape[-1]))
+            if i == j:
+                expected[:, : det.shape[-1]] = det
+            np.testing.assert_allclose(product[:, i, j], expected, atol=1e-10)
+
+
+def filtered(plant, desired, theta):
+    """Return the filters (runs, len(W), n, n) behind r - v, and their denominators."""
+    numerator, denominator = error_filters(plant, desired, *estimated_polynomials(plant, theta))
+    q = np.exp(-1j * W)
+    above = np.einsum("kl,rijl->rkij", q[:, None] ** np.arange(numerator.shape[-1]), numerator)
+    below = denominator @ (q ** np.arange(denominator.shape[-1])[:, None])
+    return above / below[:, :, None, None] @ prefilter(desired).at(W), denominator
+
+
+def difference(plant, law, controller):
+    """Return the loop with a controller (len(W), n, n) less the loop that the law asks for."""
+    L = plant.plant_at(W) @ controller
+    return np.linalg.solve(np.eye(plant.outputs) + L, L) - law.complementary(W)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("matrix", [False, True])
+@pytest.mark.parametrize("common", [False, True])
+def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
+    rng = np.random.default_rng(10 * n + matrix)
+    bare = arx(column().plant if common and n == 2 else random_plant(rng, n))
+    T = target(n, matrix=matrix)
+    law, theta = ModelReference(T), bare.theta
+    theta = theta + 0.01 * rng.standard_normal((2, theta.size)) * np.abs(theta)
+    found, denominator = filtered(bare, DesiredLoop(T), theta)
+    for run in range(2):
+        expected = difference(bare, law, law.controller(bare.at(theta[run]).plant_at(W), W))
+        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
+        assert abs(denominator[run, 0]) > 0
+
+
+INVERSE = {
+    "zero outside": [[[0, 1.0, -1.5]]],
+    "pair outside, delay": [[[0, 0, 1.0, -2.0, 3.0]]],
+    "no zero": [[[0, 1.0]]],
+    "two channels": [[[0, 1.0], [0, 0, 1.8]], [[0, 1.0], [0, 0.9, 0.3]]],
+}
+
+
+def internal_model(name, variance=0.1):
+    B = INVERSE[name]
+    n = len(B)
+    plant = matrix_plant(A=[[1, -0.8], [1, -0.5]][:n], B=B, covariance=variance * np.eye(n))
+    law = InternalModel.build(plant, Rational.build([0.4], [1, -0.6]))
+    return LoopErrorProblem(plant, law, (PowerLimit("input", 1.0),), np.ones(n))
+
+
+@pytest.mark.parametrize("name", INVERSE)
+def test_each_estimate_keeps_its_own_zeros_in_the_loop(name):
+    """The filters against the loop of the controller that the law designs on each estimate."""
+    problem = internal_model(name)
+    plant, desired = problem.plant, problem.law.desired
+    rng = np.random.default_rng(5)
+    theta = plant.theta * (1 + 0.05 * rng.standard_normal((4, plant.theta.size)))
+    found, denominator = filtered(plant, desired, theta)
+    for run in range(4):
+        model = plant.at(theta[run])
+        law = InternalModel.build(model, Rational.build([0.4], [1, -0.6]))
+        expected = difference(plant, problem.law, law.controller(model.plant_at(W), W))
+        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
+        # No factor outside the circle is left: a loop with such a model is stable.
+        assert np.abs(np.roots(denominator[run])).max() < 1
+
+
+@pytest.mark.parametrize("name", ["zero outside", "two channels"])
+def test_losses_with_zeros_outside_agree_with_theory(name):
+    problem = internal_model(name, variance=0.01)
+    samples, runs, n = 2000, 300, problem.plant.outputs
+    found = study_losses(problem, {"white": even_lines(samples, n)}, samples=samples, runs=runs, seed=0)[
+        "white"
+    ]
+    assert found.unstable == 0
+    criterion, lines = problem.parametric(), even_lines(samples, n)
+    information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
+    squares = found.exact**2
+    error = squares.std(ddof=1) / np.sqrt(runs)
+    assert squares.mean() == pytest.approx(criterion.value(information), abs=4 * error)
+    assert error < 0.1 * squares.mean()
+    assert found.loss.mean() == pytest.approx(found.exact.mean(), rel=0.03)
+
+
+def test_least_squares_without_noise_is_exact():
+    plant = arx(random_plant(np.random.default_rng(0), 2))
+    u = np.random.default_rng(1).standard_normal((3, 400, 2))
+    y = np.zeros_like(u)
+    for i in range(2):
+        for j in range(2):
+            y[..., i] += scipy.signal.lfilter(plant.B[i][j], plant.A[i], u[..., j])
+    theta = least_squares(plant, u, y)
+    np.testing.assert_allclose(theta, np.broadcast_to(plant.theta, theta.shape), atol=1e-9)
+
+
+def test_least_squares_is_weighted_with_the_noise():
+    """Against the normal equations written out for one run with correlated noise and a common A."""
+    problem = column(variance=1.0)
+    covariance = np.array([[1.0, 0.6], [0.6, 2.0]])
+    plant = arx(problem.plant)
+    plant = replace(plant, covariance=covariance)
+    rng = np.random.default_rng(2)
+    u, y = rng.standard_normal((1, 200, 2)), rng.standard_normal((1, 200, 2))
+    inverse = np.linalg.inv(covariance)
+    normal, rhs = np.zeros((5, 5)), np.zeros(5)
+    for t in range(1, 200):
+        Phi = np.zeros((2, 5))
+        Phi[:, 0] = -y[0, t - 1]
+        Phi[0, 1:3] = u[0, t - 1]
+        Phi[1, 3:5] = u[0, t - 1]
+        normal += Phi.T @ inverse @ Phi
+        rhs += Phi.T @ inverse @ y[0, t]
+    np.testing.assert_allclose(least_squares(plant, u, y)[0], np.linalg.solve(normal, rhs), rtol=1e-9)
+
+
+def test_the_loss_of_the_column_agrees_with_theory():
+    problem = column()
+    samples, runs = 4000, 150
+    found = study_losses(problem, {"white": even_lines(samples)}, samples=samples, runs=runs, seed=0)["white"]
+    assert found.unstable == 0
+    error = found.loss.std(ddof=1) / np.sqrt(runs)
+    assert found.loss.mean() == pytest.approx(0.002835, abs=4 * error)
+    # Each run's sample average lies near its exact H2 norm, run by run.
+    assert np.corrcoef(found.loss, found.exact)[0, 1] > 0.99
+    assert found.exact.mean() == pytest.approx(found.loss.mean(), rel=0.03)
+    np.testing.assert_allclose(found.power, 1.0, rtol=0.02)
+
+
+def test_a_study_is_repeatable_and_treats_inputs_alike():
+    problem = column()
+    both = {"a": even_lines(500), "b": even_lines(500)}
+    study = study_losses(problem, both, samples=500, runs=7, seed=3)
+    np.testing.assert_array_equal(study["a"].loss, study["b"].loss)
+    again = study_losses(problem, both, samples=500, runs=7, seed=3)
+    np.testing.assert_array_equal(study["a"].loss, again["a"].loss)
+
+
+def test_unstable_loops_are_counted_and_left_out():
+    plant = arx(random_plant(np.random.default_rng(0), 1))
+    noisy = replace(plant, covariance=np.array([[400.0]]))
+    problem = LoopErrorProblem(
+        noisy, ModelReference(target(1, matrix=False)), (PowerLimit("input", 1.0),), np.ones(1)
+    )
+    found = study_losses(problem, {"white": even_lines(60, 1)}, samples=60, runs=80, seed=0)["white"]
+    assert found.unstable > 0
+    assert found.loss.size == 80 - found.unstable
+    assert np.all(np.isfinite(found.loss))

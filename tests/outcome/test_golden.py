@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -102,19 +103,14 @@ def test_execute_runs_the_verb_with_the_overrides(tmp_path, monkeypatch):
     assert execute(golden, golden.runs[1])["spec"] == expected
 
 
-def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch):
-    def fails(error):
-        def verb(spec):
-            raise error
-
-        return verb
-
+@pytest.mark.parametrize("error", [InfeasibleError([]), bad_spec("x", "y")])
+def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch, error):
     golden = load_golden(written(tmp_path, GOOD))
     monkeypatch.setattr("inputdesign_cli.questions.load_spec", lambda *a: a)
-    infeasible = InfeasibleError([])
-    monkeypatch.setattr("inputdesign_cli.questions.solve", fails(infeasible))
-    assert execute(golden, golden.runs[0]) is infeasible
-    monkeypatch.setattr("inputdesign_cli.questions.solve", fails(bad_spec("x", "y")))
+    monkeypatch.setattr("inputdesign_cli.questions.solve", Mock(side_effect=error))
+    if isinstance(error, InfeasibleError):
+        assert execute(golden, golden.runs[0]) is error
+        return
     with pytest.raises(SpecError):
         execute(golden, golden.runs[0])
 

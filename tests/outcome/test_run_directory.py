@@ -6,16 +6,21 @@ import json
 import os
 import pathlib
 import platform
+import subprocess
+import sys
 from contextlib import suppress
 from importlib import metadata
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome import replacing
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from tests.support.outcomes import typed
+from tests.support.processes import running
 from tests.support.run_directories import a_run, marks, names, write_with_figures
 
 
@@ -106,35 +111,31 @@ def contents(directory) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
-class Saboteur:
-    """Makes the n-th of the file operations of the run fail, and every operation before it work."""
+OPERATIONS = [
+    *((pathlib.Path, name) for name in ("write_bytes", "rename", "replace", "mkdir")),
+    (os, "fsync"),
+]
 
-    def __init__(self, monkeypatch, failing: int, error: BaseException):
-        self.count, self.failing, self.error = 0, failing, error
-        for owner, name in (
-            (pathlib.Path, "write_bytes"),
-            (pathlib.Path, "rename"),
-            (pathlib.Path, "replace"),
-            (pathlib.Path, "mkdir"),
-            (os, "fsync"),
-        ):
-            monkeypatch.setattr(owner, name, self.wrap(getattr(owner, name)))
 
-    def wrap(self, original):
+def sabotaged(write, failing, error):
+    """Write while one of the operations on files fails, and all before it work: how many there were."""
+    count = 0
+
+    def wrapped(original):
         def operation(*args, **kwargs):
-            self.count += 1
-            if self.count == self.failing:
-                raise self.error
+            nonlocal count
+            count += 1
+            if count == failing:
+                raise error
             return original(*args, **kwargs)
 
         return operation
 
-
-def count_operations(monkeypatch, write) -> int:
-    with monkeypatch.context() as patch:
-        saboteur = Saboteur(patch, -1, OSError())
+    with pytest.MonkeyPatch.context() as patch:
+        for owner, name in OPERATIONS:
+            patch.setattr(owner, name, wrapped(getattr(owner, name)))
         write()
-    return saboteur.count
+    return count
 
 
 ERRORS = [
@@ -146,16 +147,14 @@ CODES = {errno.ENOSPC: "output-full", errno.EACCES: "output-not-writable"}
 
 
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
-def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch, error, raised):
-    steps = count_operations(monkeypatch, lambda: write_run(a_run("first"), tmp_path / "probe"))
+def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, error, raised):
+    steps = sabotaged(lambda: write_run(a_run("first"), tmp_path / "probe"), -1, error)
     assert steps > 6
     for step in range(1, steps):
         place = tmp_path / f"step{step}"
         place.mkdir()
-        with monkeypatch.context() as patch:
-            Saboteur(patch, step, error)
-            with pytest.raises(raised) as caught:
-                write_run(a_run("first"), place / "a")
+        with pytest.raises(raised) as caught:
+            sabotaged(lambda place=place: write_run(a_run("first"), place / "a"), step, error)
         if raised is OutputError:
             assert caught.value.diagnostics[0].code == CODES[error.errno]
         assert names(place) == set(), step
@@ -163,9 +162,9 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
-def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(tmp_path, monkeypatch, error, raised):
+def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(tmp_path, error, raised):
     write_with_figures(a_run("first", optimality=True), tmp_path / "probe")
-    steps = count_operations(monkeypatch, lambda: write_run(a_run("second"), tmp_path / "probe"))
+    steps = sabotaged(lambda: write_run(a_run("second"), tmp_path / "probe"), -1, error)
     assert steps > 12
     old = tmp_path / "a"
     write_with_figures(a_run("first", optimality=True), old)
@@ -173,10 +172,8 @@ def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(tmp_path, monk
     before = contents(old)
     outcomes = []
     for step in range(1, steps + 1):
-        with monkeypatch.context() as patch:
-            Saboteur(patch, step, error)
-            with suppress(raised):
-                write_run(a_run("second"), old)
+        with suppress(raised):
+            sabotaged(lambda: write_run(a_run("second"), old), step, error)
         assert names(tmp_path) == {"a", "probe"}, step
         outcomes.append(contents(old) == before)
         if not outcomes[-1]:
@@ -214,9 +211,126 @@ def test_read_run_explains_what_is_wrong(tmp_path, files, code):
     with pytest.raises(DataError) as caught:
         read_run(tmp_path)
     assert caught.value.diagnostics[0].code == code
+    if not files:
+        with pytest.raises(DataError) as caught:
+            read_run(tmp_path / "nowhere")
+        assert caught.value.diagnostics[0].code == code
 
 
-def test_read_run_of_no_directory(tmp_path):
-    with pytest.raises(DataError) as caught:
-        read_run(tmp_path / "nowhere")
-    assert caught.value.diagnostics[0].code == "run-missing"
+@pytest.mark.parametrize("name", ["../precious.txt", "{}/precious.txt", "..", ".", "", "a/b", "x\0y", 7])
+def test_a_record_that_names_files_elsewhere_moves_none(tmp_path, name):
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine")
+    target = tmp_path / "a"
+    target.mkdir()
+    listed = name.format(tmp_path) if isinstance(name, str) else name
+    record = {"format": 1, "files": [listed]}
+    (target / "result.json").write_text(json.dumps(record))
+    # As if a writer had been killed in the middle, too.
+    for part in ("new", "old"):
+        (target / ".run.partial" / part).mkdir(parents=True)
+        (target / ".run.partial" / part / "result.json").write_text(json.dumps(record))
+    with pytest.raises((OutputError, DataError)) as caught:
+        write_run(a_run("first"), target)
+    assert caught.value.diagnostics[0].code == "output-not-a-run"
+    with pytest.raises(DataError):
+        read_run(target)
+    assert precious.read_text() == "mine"
+
+
+def test_links_in_a_run_directory_lead_nowhere(tmp_path):
+    (tmp_path / "elsewhere" / "new").mkdir(parents=True)
+    (tmp_path / "elsewhere" / "new" / "result.json").write_text("mine")
+    (tmp_path / "a").mkdir()
+    for name in (".run.partial", "signal.csv"):
+        (tmp_path / "a" / name).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OutputError):
+        write_run(a_run("first"), tmp_path / "a")
+    assert (tmp_path / "elsewhere" / "new" / "result.json").read_text() == "mine"
+
+
+def test_two_writers_take_turns(tmp_path, monkeypatch):
+    monkeypatch.setattr(replacing, "_PATIENCE", 0.05)
+    with replacing.workplace(tmp_path / "a"), pytest.raises(OutputError) as caught:
+        write_run(a_run("first"), tmp_path / "a")
+    assert caught.value.diagnostics[0].code == "output-busy"
+    write_run(a_run("first"), tmp_path / "a")
+
+
+def test_a_page_about_the_run_before_does_not_stay(tmp_path):
+    write_run(a_run("first"), tmp_path / "a")
+    page = '<html><head><meta name="generator" content="idesign 0.1.0"></head></html>'
+    (tmp_path / "a" / "report.html").write_text(page)
+    write_run(a_run("second"), tmp_path / "a")
+    assert "report.html" not in names(tmp_path / "a")
+    (tmp_path / "a" / "report.html").write_text("<html>mine</html>")
+    write_run(a_run("first"), tmp_path / "a")
+    assert (tmp_path / "a" / "report.html").read_text() == "<html>mine</html>"
+
+
+def test_a_run_into_the_current_folder_leaves_it_the_current_one(tmp_path, monkeypatch):
+    write_run(a_run("first"), tmp_path / "a")
+    monkeypatch.chdir(tmp_path / "a")
+    write_run(a_run("second"), pathlib.Path())
+    assert pathlib.Path.cwd() == tmp_path / "a"
+    assert marks(pathlib.Path()) == {"second"}
+
+
+SPECS = Path(__file__).parents[2] / "specs"
+
+# Names that Python on Windows does not have.
+BARE = """
+import os, signal, sys
+for name in ("fcntl", "resource", "pwd", "grp", "termios", "pty", "tty", "posix_ipc"):
+    sys.modules[name] = None
+for name in ("SIGHUP", "SIGALRM", "SIGKILL", "SIGUSR1", "SIGUSR2", "SIGPIPE", "SIGCHLD", "SIGQUIT", "SIGSTOP",
+             "SIGCONT", "setitimer", "alarm", "pause", "ITIMER_REAL", "pthread_sigmask"):
+    delattr(signal, name)
+for name in ("fork", "forkpty", "getuid", "geteuid", "getgid", "getegid", "killpg", "setsid", "mkfifo",
+             "sched_getaffinity", "O_NONBLOCK", "O_NOFOLLOW", "O_DIRECTORY", "O_CLOEXEC", "fchmod", "chown"):
+    delattr(os, name)
+from inputdesign_cli.__main__ import main
+"""
+DESIGN = BARE + "sys.argv[0] = 'idesign'\nmain()\n"
+
+
+WRITE = f"""{BARE}
+from pathlib import Path
+from inputdesign_cli.errors import OutputError
+from inputdesign_cli.outcome import replacing
+replacing._PATIENCE = 0.2
+try:
+    with replacing.workplace(Path(sys.argv[1])):
+        print("free", flush=True)
+        sys.stdin.read()
+except OutputError as error:
+    print(error.diagnostics[0].code)
+"""
+
+
+def python(program: str, *arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        cwd=cwd, input="", capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_spec_is_solved_twice_into_one_directory(tmp_path):
+    for _ in range(2):
+        done = python(
+            DESIGN, "solve", SPECS / "first_order.yaml", "-o", tmp_path / "run", "--no-figures", cwd=tmp_path
+        )
+        assert done.returncode == 0, done.stderr
+    assert "result.json" in os.listdir(tmp_path / "run")
+    assert os.listdir(tmp_path) == ["run"]
+
+
+def test_two_writers_of_one_directory_exclude_each_other(tmp_path):
+    target = tmp_path / "run"
+    command = [sys.executable, "-c", WRITE, str(target)]
+    with running(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline() == "free\n"
+        assert python(WRITE, target, cwd=tmp_path).stdout == "output-busy\n"
+        holder.communicate("")
+        assert python(WRITE, target, cwd=tmp_path).stdout == "free\n"

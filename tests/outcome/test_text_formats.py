@@ -1,15 +1,32 @@
-"""CSV loses nothing and hides nothing."""
+"""JSON, CSV, numbers in text and curves in files: nothing is lost or hidden."""
 
 import csv
 import io
+import json
+import math
 import struct
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, is_dataclass
+from fractions import Fraction
+from typing import Literal, get_args, get_type_hints
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+import scipy.signal
+from hypothesis import given, settings, strategies as st
 
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome import Outcome, OutcomeError, plain, read_plain
+from inputdesign_cli.outcome.codec import NULL, json_text, others
+from inputdesign_cli.outcome.record import FIGURES
 from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.run_directory import curves_json, read_curves
+from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_line, csv_rows, csv_text
+from tests.support.commands import caller
+from tests.support.curves import CURVES
 
 
 def bits(x: float) -> bytes:
@@ -85,3 +102,251 @@ def test_columns_are_read_back():
 def test_csv_refuses_what_is_no_table(columns):
     with pytest.raises(ValueError, match="column"):
         csv_text(Table(columns))
+
+
+SIZES = st.floats(1e-30, 1e30) | st.floats(-1e30, -1e-30) | st.just(0.0)
+
+
+@given(value=SIZES, digits=st.integers(2, 9))
+def test_what_is_rounded_is_on_its_side_and_near(value, digits):
+    down, up = (Fraction(rounded(value, digits)) for rounded in (rounded_down, rounded_up))
+    slack = abs(Fraction(value)) / 10**11
+    assert down - slack <= Fraction(value) <= up + slack
+    assert up - down <= abs(Fraction(value)) / 10 ** (digits - 1) + slack
+
+
+@pytest.mark.parametrize(("value", "down", "up"), [(3.14159265, "3.141", "3.142"), (0.5, "0.5", "0.5")])
+def test_numbers_that_have_their_digits_keep_them(value, down, up):
+    assert (rounded_down(value, 4), rounded_up(value, 4)) == (down, up)
+
+
+ROBUST = """
+plant:
+  A: [[1, -0.7], [1, 0.4]]
+  B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]]
+noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
+experiment: {samples: 120}
+accuracy: {model_error: {relative: 0.3}}
+spectrum: {type: fir, order: 2}
+signal: {candidates: 2}
+simulation: {runs: 4}
+uncertainty: {scenarios: 3, fresh: 20, intervals: {"a1[1]": [-0.72, -0.68], "b1[2,2]": [1.1, 1.3]}}
+"""
+ENTRIES = {"a1[1]", "a1[2]", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]"}
+
+
+def tables(directory):
+    """The header and the rows of each table of a run, by its name."""
+    found = {}
+    for path in directory.glob("*.csv"):
+        with path.open(newline="") as file:
+            header, *rows = csv.reader(file)
+        found[path.name] = header, rows
+    return found
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("verb", ["solve", "simulate", "campaign"])
+def test_rows_have_as_many_fields_as_the_header(monkeypatch, capsys, tmp_path, verb):
+    monkeypatch.chdir(tmp_path)
+    run = caller(monkeypatch, capsys)
+    (tmp_path / "s.yaml").write_text(ROBUST + "campaign: {block: 60}\n" * (verb == "campaign"))
+    assert run(verb, "s.yaml", "-o", "out", "--no-figures")[0] == 0
+    if verb == "campaign":
+        _, rows = tables(tmp_path / "out")["signal.csv"]
+        part = np.array(rows, dtype=float)
+        moved = part[:, 1:] @ [[1.0, 0.6], [-0.5, 1.2]]
+        moved = np.vstack([np.zeros(2), moved[:-1]]) + np.random.default_rng(1).normal(size=(len(part), 2))
+        lags = ([1, -0.7], [1, 0.4])
+        y = np.column_stack([scipy.signal.lfilter([1], lags[i], moved[:, i]) for i in range(2)])
+        np.savetxt(
+            "r.csv", np.column_stack([part, y]), delimiter=",", header="time_s,u1,u2,y1,y2", comments=""
+        )
+        assert run("next", "out", "r.csv", "--no-figures")[0] == 0
+    found = tables(tmp_path / "out")
+    assert {"solve": "scenarios.csv", "simulate": "signal.csv", "campaign": "rounds.csv"}[verb] in found
+    for name, (header, rows) in found.items():
+        assert {len(row) for row in rows} == {len(header)}, name
+        assert len(set(header)) == len(header), name
+    for name in {"scenarios.csv", "rounds.csv"} & set(found):
+        assert set(found[name][0]) >= ENTRIES
+
+
+@given(st.lists(st.text(st.characters(codec="utf-8"), min_size=1), min_size=1, max_size=5, unique=True))
+def test_any_name_is_read_back(names):
+    table = Table({name: np.array([i, 0.5]) for i, name in enumerate(names)})
+    found = csv_columns(csv_text(table).encode())
+    assert list(found) == names
+    assert [values[0] for values in found.values()] == list(range(len(names)))
+
+
+BAD = [math.nan, math.inf, np.array([1.0, np.nan]), complex(0, -math.inf)]
+
+
+@pytest.mark.parametrize(
+    ("bad", "kind", "told"),
+    [
+        *(({"deep": [one]}, ValueError, r"result\.deep\[0\]") for one in BAD),
+        *((one, TypeError, "result") for one in ({1: 2}, {"a": object()}, {"a": {1, 2}})),
+    ],
+)
+def test_json_has_no_nan_and_no_foreign_types(bad, kind, told):
+    with pytest.raises(kind, match=told):
+        plain(bad)
+
+
+@dataclass(frozen=True)
+class Part:
+    name: Literal["a", "b"]
+    value: float
+
+
+@dataclass(frozen=True)
+class Whole:
+    parts: tuple[Part, ...]
+    pair: tuple[int, float]
+    matrix: Array
+    response: ComplexArray
+    by_name: Mapping[str, Part]
+    empty: float | None = None
+    unstable: float | None = field(default=None, metadata=NULL)
+    several: float | tuple[float | None, ...] | None = None
+    rest: Mapping[str, object] = others()
+
+
+PLAIN = {
+    "parts": [{"name": "a", "value": 1.0}],
+    "pair": [3, 0.5],
+    "matrix": [[1.0, 2.0], [3.0, 4.0]],
+    "response": [{"re": 1.0, "im": -2.0}],
+    "by_name": {"x": {"name": "b", "value": 2.0}},
+    "unstable": None,
+    "several": [1.0, None],
+    "unknown_key": {"kept": [1, "2"]},
+}
+
+
+def test_plain_data_come_back_as_they_were():
+    assert plain(read_plain(Whole, PLAIN)) == PLAIN
+
+
+def test_values_have_the_types_of_their_fields():
+    whole = read_plain(Whole, PLAIN)
+    assert whole.parts == (Part("a", 1.0),)
+    assert whole.response[0] == 1.0 - 2.0j
+    assert whole.matrix.shape == (2, 2)
+    assert whole.empty is None
+    assert whole.rest == {"unknown_key": {"kept": [1, "2"]}}
+
+
+def test_numbers_of_numpy_are_read_as_plain_ones():
+    read = read_plain(Part, {"name": "a", "value": np.float64(2.0)})
+    assert type(read.value) is float
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("parts", [{"name": "c", "value": 1.0}]),
+        ("parts", [{"name": "a"}]),
+        ("parts", {"name": "a"}),
+        ("pair", [1]),
+        ("pair", [True, 1.0]),
+        ("matrix", [["x"]]),
+        ("by_name", [1]),
+        ("several", "text"),
+    ],
+)
+def test_what_has_another_form_is_an_error_that_names_the_place(key, value):
+    with pytest.raises(OutcomeError, match=f'"{key}'):
+        read_plain(Whole, {**PLAIN, key: value})
+
+
+@pytest.mark.slow
+@settings(deadline=None)
+@given(
+    st.dictionaries(st.sampled_from(list(PLAIN)), st.recursive(st.none() | st.floats() | st.text(), st.lists))
+)
+def test_whatever_is_written_there_nothing_else_is_raised(changes):
+    with suppress(OutcomeError):
+        read_plain(Whole, {**PLAIN, **changes})
+
+
+def sections(kind, seen):
+    """Every dataclass that a result is made of."""
+    for hint in get_type_hints(kind).values():
+        todo = [hint]
+        while todo:
+            one = todo.pop()
+            todo += get_args(one)
+            if is_dataclass(one) and one not in seen:
+                seen.add(one)
+                sections(one, seen)
+    return seen
+
+
+def test_a_section_has_one_field_at_most_for_keys_of_other_names():
+    for section in sections(Outcome, {Outcome}):
+        assert sum("others" in entry.metadata for entry in fields(section)) <= 1, section
+
+
+def test_json_of_numpy_and_complex_values():
+    value = {
+        "b": np.float64(0.1),
+        "a": np.arange(4).reshape(2, 2),
+        "flag": np.bool_(True),
+        "z": np.array([1 + 2j]),
+        "none": None,
+        "pair": (1, "µ"),
+    }
+    text = json_text(value)
+    assert json.loads(text) == {
+        "b": 0.1,
+        "a": [[0, 1], [2, 3]],
+        "flag": True,
+        "z": [{"re": 1.0, "im": 2.0}],
+        "none": None,
+        "pair": [1, "µ"],
+    }
+    assert list(json.loads(text)) == ["b", "a", "flag", "z", "none", "pair"]
+    assert "µ" in text
+    assert text.startswith('{\n "b": 0.1,\n')
+
+
+def same(one, other):
+    """Whether two values are of one kind, and equal to the digits that a figure shows."""
+    if is_dataclass(one):
+        return type(one) is type(other) and all(
+            same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)
+        )
+    if isinstance(one, np.ndarray):
+        alike = np.iscomplexobj(one) == np.iscomplexobj(other) and one.shape == other.shape
+        return alike and np.allclose(one, other, rtol=2e-7, atol=0.0, equal_nan=True)
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    return one == other
+
+
+def test_what_figures_show_comes_back_as_it_was(tmp_path):
+    (tmp_path / FIGURES).write_bytes(curves_json(CURVES))
+    found = read_curves(tmp_path)
+    assert list(found) == list(CURVES)
+    assert [name for name, made in CURVES.items() if not same(made, found[name])] == []
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"[]", b'{"a": 1}', b'{"a": {}}', b'{"a": {"kind": "Path"}}', b'{"a": {"kind": "LossCurves"}}',
+     b'{"a": {"kind": "ErrorCurves", "energy": "x"}}', b'{"a": {"kind": "BoundCurves", "panels": [3]}}'],
+)  # fmt: skip
+def test_what_is_no_such_file_is_told_by_its_name(content, tmp_path):
+    (tmp_path / FIGURES).write_bytes(content)
+    with pytest.raises(DataError, match=r"figures\.json") as caught:
+        read_curves(tmp_path)
+    assert caught.value.diagnostics[0].code == "run-unreadable"
+
+
+def test_a_run_of_an_older_version_has_none(tmp_path):
+    assert read_curves(tmp_path) == {}

@@ -1,9 +1,10 @@
-"""Noise that is coloured besides, or drifts: the same models by polynomials inside, and by differences."""
+"""Models built of others: coloured noise, drifts, other parameters; by polynomials and differences."""
 
 import numpy as np
 import pytest
 import scipy.signal
 
+from inputdesign_cli.expressions import Expression
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.information import Experiment, FiniteRecord
@@ -18,7 +19,7 @@ from inputdesign_cli.plant import (
     close_loop,
 )
 from inputdesign_cli.spectrum import FirBasis
-from tests.support.plants import arrays, descending
+from tests.support.plants import arrays, box_jenkins, descending
 
 W = np.concatenate([np.geomspace(1e-3, 0.1, 10), np.linspace(0.1, np.pi, 20)])
 C, D = np.array([1.0, 0.5, 0.2]), np.array([1.0, -0.7])
@@ -77,10 +78,8 @@ def test_drift_is_a_root_of_d_that_is_known(loop):
     """D (1 - q^-1) inside, its coefficients known: F_x and the noise information of the others."""
     drifting = Coloured(inside(), drift=(True,))
     whole = inside(np.convolve(D, [1, -1]))
-    known = Reparametrised(whole, Parametrisation.identity(whole.names, whole.theta, ["d1", "d2"]))
-    held = Reparametrised(drifting, Parametrisation.identity(drifting.names, drifting.theta, ["d1"]))
-    w = W[W > 0.02]
-    models = [Experiment(model, 50, loop=close_loop(model, PI) if loop else None) for model in (held, known)]
+    pair, w = (known(drifting, ["d1"]), known(whole, ["d1", "d2"])), W[W > 0.02]
+    models = [Experiment(model, 50, loop=close_loop(model, PI) if loop else None) for model in pair]
     gradients = [e.excitation_gradient(w) for e in models]
     np.testing.assert_allclose(gradients[0], gradients[1], rtol=1e-8, atol=1e-12)
     noises = [e.noise_gradient(w) for e in models]
@@ -167,11 +166,74 @@ def test_a_root_on_the_circle_may_be_known():
     seasonal = np.array([1.0, -2.0 * np.cos(0.4), 1.0])
     plant = PolynomialModel.single([0, 0.5], F=[1, -0.8], variance=0.01)
     coloured = Coloured(plant, D=(seasonal,), held=(True,))
-    model = Reparametrised(coloured, Parametrisation.identity(coloured.names, coloured.theta, ["d1", "d2"]))
-    experiment = Experiment(model, 100)
+    experiment = Experiment(known(coloured, ["d1", "d2"]), 100)
     white = FirBasis(1, 0).integrals(experiment.information_density, experiment.singularities)[0]
     impulse = np.eye(1, 400)[0]
     by_b = scipy.signal.lfilter(seasonal, [1, -0.8], np.roll(impulse, 1))
     by_f = scipy.signal.lfilter([0, -0.5], [1, -0.8], by_b)
     psi = np.stack([by_b, by_f])
     np.testing.assert_allclose(white, 100 / 0.01 * psi @ psi.T, rtol=1e-9)
+
+
+AT = np.array([0.05, 0.4, 1.3, 2.9])
+
+
+def known(model, names):
+    return Reparametrised(model, Parametrisation.identity(model.names, model.theta, names))
+
+
+def process(sampled=True) -> Reparametrised:
+    """K e^(-Ls) / (Ts + 1) with L one fifth of T, in K and T."""
+    K, T = 2.0, 3.3
+    inner = ContinuousModel.monic(
+        descending([[[K]]]), descending([[[T, 1.0]]]), np.eye(1), delay=((np.array([T / 5]),),)
+    )
+    terms = tuple(map(Expression.of, ("K/T", "1/T", "T/5")))
+    at = Parametrisation(("K", "T"), ("K", "T"), np.array([K, T]), np.ones(2, dtype=bool), terms)
+    return Reparametrised(SampledModel(inner, 0.7) if sampled else inner, at)
+
+
+MODELS = [process(), process(sampled=False), known(box_jenkins(), ["c1[2]", "b2[1,1]", "a1"])]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_gradients_are_differences(model):
+    step, theta = 1e-5, model.theta
+    exact = model.plant_gradient(AT)
+    assert exact.shape[1] == len(model.names) == theta.size
+    for k in range(theta.size):
+        unit = step * np.eye(theta.size)[k]
+        slope = (model.at(theta + unit).plant_at(AT) - model.at(theta - unit).plant_at(AT)) / (2 * step)
+        np.testing.assert_allclose(exact[:, k], slope, atol=1e-8)
+        assert model.in_plant[k] == np.any(slope != 0.0)
+
+
+def test_what_is_known_leaves_a_part_of_the_information():
+    """Knowing parameters is the same as deleting their rows and columns."""
+    model = box_jenkins()
+    names = ["c1[2]", "b2[1,1]", "a1"]
+    kept = [i for i, name in enumerate(model.names) if name not in names]
+    whole, part = (Experiment(m, 100) for m in (model, known(model, names)))
+    densities = [e.information_density(AT) for e in (whole, part)]
+    np.testing.assert_allclose(densities[1], densities[0][:, kept][:, :, kept], atol=1e-12)
+    np.testing.assert_allclose(part.noise_information, whole.noise_information[np.ix_(kept, kept)], rtol=1e-9)
+
+
+def test_a_loop_is_that_of_the_coefficients():
+    model = process()
+    C = TransferMatrix.build([[[0.1]]], [[(1.0, -1.0)]])
+    loop, inner = close_loop(model, C), close_loop(model.coefficients, C)
+    loop.check_stability()
+    np.testing.assert_allclose(loop.closed_poles, inner.closed_poles)
+    J = model.parametrisation.jacobian
+    expected = np.einsum("nlpr,lk->nkpr", inner.excitation_gradient(AT), J)
+    np.testing.assert_allclose(loop.excitation_gradient(AT), expected, atol=1e-12)
+
+
+def test_a_fraction_is_affine_where_nothing_free_bends_it():
+    inner = process(sampled=False).coefficients
+    assert np.array_equal(inner.bends(0, 0), [False, False, True])
+    assert not np.any(known(inner, ["delay"]).bends(0, 0))
+    assert np.all(process(sampled=False).bends(0, 0))
+    part = known(inner, ["delay"]).entry_fraction(0, 0, AT)
+    np.testing.assert_allclose(part.numerator / part.denominator, inner.plant_at(AT)[:, 0, 0])

@@ -1,4 +1,4 @@
-"""Difference equations against their definition, written out."""
+"""Difference equations, controllers in s as a computer runs them, and spectra of noise."""
 
 import subprocess
 import sys
@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from inputdesign_cli import parse_spec
+from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.plant import Rational, TransferMatrix, delayed, discretised, pid
 from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
+from inputdesign_cli.questions.building.system import build_model
 
 
 def by_definition(b, a, x):
@@ -51,3 +56,96 @@ def test_a_small_design_does_not_wait_for_what_it_does_not_need():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+H = 0.2
+W = np.linspace(0.01, np.pi, 30)
+SCIPY = {"tustin": "bilinear", "backward": "backward_diff", "zoh": "zoh"}
+
+
+@pytest.mark.parametrize("rule", SCIPY)
+@pytest.mark.parametrize("numerator", [[2.0, 3.0], [0.5], [1.0, 0.4, 2.0]])
+def test_a_transfer_function_is_that_of_scipy(rule, numerator):
+    factors = [[2.0, 1.0], [1.0, 0.7]]
+    found = discretised(numerator, factors, H, rule)
+    top, bottom, _ = scipy.signal.cont2discrete((numerator, np.polymul(*factors)), H, SCIPY[rule])
+    _, expected = scipy.signal.freqz(np.pad(top[0], (bottom.size - top.size, 0)), bottom, W)
+    np.testing.assert_allclose(found.at(W), expected, rtol=1e-10, atol=1e-12)
+    assert all(factor[0] == 1.0 for factor in found.denominator)
+
+
+@pytest.mark.parametrize("rule", SCIPY)
+def test_a_pid_is_the_sum_of_its_parts(rule):
+    """Each part by scipy; the integrator is exact."""
+    Kp, Ti, Td, Tf = 2.0, 3.0, 0.5, 0.1
+    found = pid(Kp, Ti, Td, Tf, H, rule)
+    expected = Kp * np.ones(W.size, dtype=complex)
+    for part in (([Kp / Ti], [1, 0]), ([Kp * Td, 0], [Tf, 1])):
+        top, bottom, _ = scipy.signal.cont2discrete(part, H, SCIPY[rule])
+        expected += scipy.signal.freqz(np.pad(top[0], (bottom.size - top.size, 0)), bottom, W)[1]
+    np.testing.assert_allclose(found.at(W), expected, rtol=1e-10)
+    assert found.denominator[0].tolist() == [1.0, -1.0]
+
+
+def test_backward_differences_need_no_filter():
+    found = pid(2.0, None, 0.5, 0.0, H, "backward")
+    np.testing.assert_allclose(found.numerator, [2.0 + 2.0 * 0.5 / H, -2.0 * 0.5 / H])
+    assert found.denominator == ()
+    late = delayed(found, 2)
+    np.testing.assert_allclose(late.at(W), found.at(W) * np.exp(-2j * W), rtol=1e-12)
+
+
+def test_a_row_keeps_a_factor_that_entries_share_once():
+    """Two PI controllers that drive one input have one integrator, and a third factor stays of its own."""
+    rows = [
+        [pid(2.0, 3.0, 0.0, 0.0, H, "zoh"), pid(1.0, 4.0, 0.5, 0.1, H, "zoh")],
+        [Rational(np.zeros(1))] * 2,
+    ]
+    made = TransferMatrix.of(rows)
+    for i in range(2):
+        for j in range(2):
+            np.testing.assert_allclose(made.at(W)[:, i, j], rows[i][j].at(W), rtol=1e-9, atol=1e-12)
+    assert np.sum(np.abs(made.poles - 1.0) < 1e-9) == 1
+
+
+PLANT = "plant: {B: [0, 1], F: [1, -0.5]}\n"
+
+
+def noise(text):
+    return NoiseSpectrum.of(build_model(parse_spec(f"{PLANT}{text}", design=False)))
+
+
+def test_of_a_moving_average():
+    k, period, periods = np.arange(1, 40), 81, 3
+    w = 2 * np.pi * k / period
+    found = noise("noise: {C: [1, -0.9], variance: 2.0}")
+    assert found.at(period, k)[:, 0] == pytest.approx(2.0 * (1.81 - 1.8 * np.cos(w)), rel=1e-12)
+    # Fejer's kernel weights the covariance of lag one by 1 - 1/N.
+    seen = 2.0 * (1.81 - 1.8 * (1 - 1 / (period * periods)) * np.cos(w))
+    assert found.averaged(period, k, periods)[:, 0] == pytest.approx(seen, rel=1e-12)
+
+
+def test_of_an_autoregression_through_a_record_shorter_than_its_memory():
+    a, period = 0.95, 24
+    k = np.arange(1, 12)
+    found = noise(f"noise: {{D: [1, -{a}], variance: 1.0}}").averaged(period, k, 1)[:, 0]
+    lags = np.arange(-period + 1, period)
+    r = a ** np.abs(lags) / (1 - a**2) * (1 - np.abs(lags) / period)
+    plain = [np.sum(r * np.cos(2 * np.pi * one * lags / period)) for one in k]
+    assert found == pytest.approx(plain, rel=1e-10)
+
+
+def test_of_correlated_outputs():
+    spec = parse_spec(
+        "plant: {B: [[[0, 1]], [[0, 2]]], F: [[[1, -0.5]], [[1, -0.2]]]}\n"
+        "noise: {C: [[1, 0.5], [1]], variance: [[1.0, 0.6], [0.6, 2.0]]}",
+        design=False,
+    )
+    found, k = NoiseSpectrum.of(build_model(spec)), np.array([3, 7])
+    w = 2 * np.pi * k / 20
+    assert found.at(20, k) == pytest.approx(np.stack([1.25 + np.cos(w), np.full(2, 2.0)], axis=1), rel=1e-12)
+
+
+def test_noise_that_hardly_forgets_is_refused():
+    with pytest.raises(InaccurateError, match="hardly forgets"):
+        noise("noise: {D: [1, -0.99999], variance: 1.0}")

@@ -134,16 +134,3 @@ def test_a_level_just_below_a_maximum_does_not_hide_it(seed):
         _, values = local_maxima(function, grid, function(grid), above=share * top)
         assert values.max() == pytest.approx(top, rel=1e-8)
     assert local_maxima(function, grid, function(grid), above=1.0001 * top)[0].size == 0
-
-
-def test_a_peak_that_the_finer_grid_keeps_below_the_level_is_not_polished():
-    asked = []
-
-    def function(w):
-        asked.append(np.size(w))
-        return np.cos(w - 1.0)
-
-    grid = np.linspace(0.0, np.pi, 101)
-    values = np.cos(grid - 1.0)
-    assert local_maxima(function, grid, values, above=1.03)[0].size == 0
-    assert sum(asked) <= 4 * 6

@@ -1,6 +1,4 @@
-"""Gradients of models against finite differences; sampling against scipy and python-control."""
-
-from dataclasses import replace
+"""Gradients of models against finite differences and formulas of the paper; sampling against scipy."""
 
 import control
 import numpy as np
@@ -9,6 +7,7 @@ import scipy.signal
 
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
 from tests.support.plants import arrays, arx, box_jenkins, descending, two_by_two
+from tests.support.random_plants import STRUCTURES, random_loop, random_model
 
 W = np.array([0.05, 0.4, 1.3, 2.9])
 COMMON = ContinuousModel.monic(
@@ -31,32 +30,8 @@ MODELS = {
 
 
 def moved(model, index, step):
-    """The model with one parameter changed: every coefficient that it stands for."""
-    if isinstance(model, SampledModel):
-        return SampledModel(moved(model.continuous_plant, index, step), model.sample_time)
-    parameter = model.parameters[index]
-    if isinstance(model, ContinuousModel):
-        field = "numerator" if parameter.letter == "b" else "denominator"
-    else:
-        field = parameter.letter.upper()
-    rows = getattr(model, field)
-
-    def bumped(values):
-        changed = values.copy()
-        changed[parameter.power] += step
-        return changed
-
-    if isinstance(rows[0], tuple):
-        new = tuple(
-            tuple(bumped(v) if (i, j) in parameter.places else v for j, v in enumerate(row))
-            for i, row in enumerate(rows)
-        )
-    elif len(rows) == 1:
-        new = (bumped(rows[0]),)
-    else:
-        outputs = {place[0] for place in parameter.places}
-        new = tuple(bumped(v) if i in outputs else v for i, v in enumerate(rows))
-    return replace(model, **{field: new})
+    """The model with one parameter changed."""
+    return model.at(model.theta + step * np.eye(model.theta.size)[index])
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -106,6 +81,9 @@ def test_names_carry_output_and_input():
     assert COMMON.names == ("b0[1,1]", "b1[1,1]", "b0[1,2]", "b0[2,2]", "b1[2,2]", "b2[2,2]", "a0", "a1")
     single = ContinuousModel.monic(descending([[[2.0]]]), descending([[[1.0, 3.0]]]), np.eye(1))
     assert single.names == ("b0", "a0")
+    delayed = PolynomialModel.single([0, 0, 0, 0.1, 0.2], A=[1, -0.5], C=[1, 0.1])
+    assert delayed.names == ("a1", "b3", "b4", "c1")
+    assert list(delayed.in_plant) == [True, True, True, False]
 
 
 @pytest.mark.parametrize("model", [two_by_two(), COMMON], ids=["strictly proper", "biproper"])
@@ -137,3 +115,60 @@ def test_widely_separated_time_constants_survive_sampling():
 def test_plant_of_any_scale_of_leading_coefficients_is_the_same():
     scaled = ContinuousModel.monic(arrays([[[4.0, 2.0]]]), arrays([[[2.0, 6.0, 2.0]]]), np.eye(1))
     np.testing.assert_allclose(scaled.theta, [2.0, 1.0, 1.0, 3.0])
+
+
+AROUND = np.array([0.0, 0.01, 0.3, 1.0, 2.5, np.pi])
+
+
+def polynomials(model, theta=None):
+    """A, B, C, D and F by letter, with the values of `theta` by the names of its parameters."""
+    values = dict(zip(model.names, model.theta if theta is None else theta, strict=True))
+    own = {"A": model.A[0], "B": model.B[0][0], "C": model.C[0], "D": model.D[0], "F": model.F[0][0]}
+    return {
+        letter: [values.get(f"{letter.lower()}{lag}", c) for lag, c in enumerate(p)]
+        for letter, p in own.items()
+    }
+
+
+def bode(polynomials, w):
+    """G and H by plain polynomial evaluation."""
+    z = np.exp(1j * w)
+    A, B, C, D, F = (sum(c * z ** (-i) for i, c in enumerate(polynomials[letter])) for letter in "ABCDF")
+    return B / (A * F), C / (A * D)
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_gradients_equal_finite_differences(structure):
+    """dG is the model's own, dH that of its H^-1 dH."""
+    model = random_model(np.random.default_rng(7), structure, 3)
+    G, H = bode(polynomials(model), AROUND)
+    np.testing.assert_allclose(model.plant_at(AROUND)[:, 0, 0], G, rtol=1e-10)
+    np.testing.assert_allclose(model.noise_at(AROUND)[:, 0, 0], H, rtol=1e-10)
+    dG = model.plant_gradient(AROUND)[:, :, 0, 0]
+    dH = model.noise_gradient(AROUND)[:, :, 0, 0] * H[:, None]
+    h = 1e-6
+    for k, step in enumerate(h * np.eye(len(model.names))):
+        up, down = (bode(polynomials(model, model.theta + sign * step), AROUND) for sign in (1, -1))
+        for analytic, plus, minus in ((dG, up[0], down[0]), (dH, up[1], down[1])):
+            difference = (plus - minus) / (2 * h)
+            np.testing.assert_allclose(
+                analytic[:, k], difference, rtol=1e-5, atol=1e-5 * np.abs(analytic).max()
+            )
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("closed", [False, True])
+def test_prediction_gradient_equals_the_formulas_of_the_paper(structure, closed):
+    """F_u = Lambda_G / H and F_r, F_v of (15), where no pole is near the circle to spoil the division."""
+    rng = np.random.default_rng(11)
+    model = random_model(rng, structure, 2)
+    loop = random_loop(rng, model, closed=closed)
+    G, H = bode(polynomials(model), AROUND)
+    C = loop.controller.at(AROUND)[:, 0, 0] if closed else np.zeros_like(G)
+    S = 1 / (1 + C * G)
+    dG, dH = model.plant_gradient(AROUND)[:, :, 0, 0], model.noise_gradient(AROUND)[:, :, 0, 0] * H[:, None]
+    source = loop if closed else model
+    excited = (source.excitation_gradient if closed else source.input_gradient)(AROUND)[:, :, 0, 0]
+    noise = source.noise_gradient(AROUND)[:, :, 0, 0]
+    np.testing.assert_allclose(excited, (S / H)[:, None] * dG, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(noise, dH / H[:, None] - (C * S)[:, None] * dG, rtol=1e-8, atol=1e-8)

@@ -41,50 +41,6 @@ def model(*, delay=0.4, sample_time=H, gain=K, direct=D, places=(*PLACES, ("dela
     return StateSpaceModel(matrices, tuple(places), COVARIANCE, sample_time)
 
 
-def response(found, w):
-    """G and H by the textbook, without the code under test: samples by an exponential of small steps."""
-    m, n = found.matrices, found.order
-    z = np.exp(1j * w)[:, None, None]
-    if found.sample_time is None:
-        Ad, early, late, lag, direct = m.A, m.B, 0.0 * m.B, 0, 0
-    else:
-        lag, left = divmod(m.delay, H)
-
-        def driven(t):
-            s = np.linspace(0.0, t, 4001)
-            steps = np.array([scipy.linalg.expm(m.A * x) @ m.B for x in s[::100]])
-            return scipy.integrate.simpson(steps, x=s[::100], axis=0)
-
-        Ad, early = scipy.linalg.expm(m.A * H), driven(H - left)
-        late, direct = driven(H) - early, int(lag) + (left > 0)
-    R = np.linalg.inv(z * np.eye(n) - Ad)
-    G = m.C @ R @ (early * z**-lag + late * z ** -(lag + 1)) + m.D * z ** -float(direct)
-    return G, np.eye(2) + m.C @ R @ m.K
-
-
-def slopes(of, theta, step=1e-6):
-    return np.stack([(of(theta + d) - of(theta - d)) / (2 * step) for d in step * np.eye(theta.size)], axis=1)
-
-
-@pytest.mark.parametrize("sample_time", [H, None], ids=["held", "discrete"])
-def test_responses_and_gradients(sample_time):
-    """The direct term is late by whole samples, and what it tells of the dead time is not counted."""
-    scale = 1.0 if sample_time else 0.3
-    places = (*PLACES, *([("delay", 0, 0)] if sample_time else []))
-    found = model(sample_time=sample_time, delay=0.4 if sample_time else 0.0, places=places)
-    found = found.at(found.theta * scale if sample_time is None else found.theta)
-    G, _ = response(found, W)
-    np.testing.assert_allclose(found.plant_at(W), G, rtol=1e-7, atol=1e-7)
-    w, theta = W[::6], found.theta
-    expected = slopes(lambda x: response(found.at(x), w)[0], theta)
-    np.testing.assert_allclose(found.plant_gradient(w), expected, atol=2e-7)
-    _, noise = response(found, w)
-    in_noise = np.linalg.inv(noise)[:, None] @ slopes(lambda x: response(found.at(x), w)[1], theta)
-    np.testing.assert_allclose(found.noise_gradient(w), in_noise, atol=1e-7)
-    by_input = np.linalg.inv(noise)[:, None] @ expected
-    np.testing.assert_allclose(found.input_gradient(w), by_input, atol=5e-7)
-
-
 def through_states(A, B, C, z):
     """C (z I - A)^-1 B, as its real and its imaginary part, each analytic in A, B (a pair of parts) and C."""
     shifted, turn = z.real * np.eye(len(A)) - A, z.imag * np.eye(len(A))
@@ -116,13 +72,17 @@ def analytic(m, delay, z, sample_time):
 
 
 @pytest.mark.parametrize("sample_time", [H, None], ids=["held", "discrete"])
-def test_gradients_by_complex_steps(sample_time):
-    """Every entry and the dead time, by steps along the imaginary axis."""
+def test_responses_and_gradients(sample_time):
+    """Responses, and their slopes in every entry and the dead time by steps along the imaginary axis.
+
+    The direct term is late by whole samples, and what it tells of the dead time is not counted.
+    """
     places = (*PLACES, *([("delay", 0, 0)] if sample_time else []))
     found = model(sample_time=sample_time, delay=0.4 if sample_time else 0.0, places=places)
     found = found if sample_time else found.at(0.3 * found.theta)
-    w, step = W[:4], 1e-30
-    exact = found.plant_gradient(w), found.noise_gradient(w)
+    w, step = W[::6], 1e-30
+    exact, response = (found.plant_gradient(w), found.noise_gradient(w)), found.plant_at(w)
+    by_input = found.input_gradient(w)
     for index, (letter, i, j) in enumerate(places):
         moved = {k: v.astype(complex) for k, v in zip("ABCDK", found.matrices[:5], strict=True)}
         delay = complex(found.matrices.delay)
@@ -133,11 +93,18 @@ def test_gradients_by_complex_steps(sample_time):
         for n, z in enumerate(np.exp(1j * w)):
             ways = analytic(moved, delay, z, sample_time)
             expected, in_noise = (x[0].imag / step + 1j * x[1].imag / step for x in ways)
-            at_rest = np.eye(2) + ways[1][0].real + 1j * ways[1][1].real
+            G, noise = (x[0].real + 1j * x[1].real for x in ways)
+            at_rest = np.eye(2) + noise
+            np.testing.assert_allclose(response[n], G, rtol=1e-7, atol=1e-7)
+            np.testing.assert_allclose(by_input[n, index], np.linalg.solve(at_rest, expected), atol=5e-7)
             np.testing.assert_allclose(exact[0][n, index], expected, rtol=1e-8, atol=1e-11)
             np.testing.assert_allclose(
                 exact[1][n, index], np.linalg.solve(at_rest, in_noise), rtol=1e-8, atol=1e-11
             )
+
+
+def past(signal, t, lag):
+    return signal[t - lag] if t >= lag else np.zeros(2)
 
 
 def simulated(found, r, e):
@@ -145,10 +112,6 @@ def simulated(found, r, e):
     Ad, early, late = found.held
     m, x = found.matrices, np.zeros(2)
     y, u, c = np.zeros_like(e), np.zeros_like(r), np.zeros((len(r), 2))
-
-    def past(signal, t, lag):
-        return signal[t - lag] if t >= lag else np.zeros(2)
-
     for t in range(len(r)):
         c[t, 0] = past(c, t, 1)[0] + 0.9 * past(y, t, 1)[0] - 0.8 * past(y, t, 2)[0]
         c[t, 1] = 0.5 * past(c, t, 1)[1] + 0.2 * past(y, t, 1)[1] + 0.1 * past(y, t, 2)[1]
@@ -162,13 +125,10 @@ def predicted(found, y, u):
     """The one-step prediction, sample by sample."""
     Ad, early, late = found.held
     m, x, out = found.matrices, np.zeros(2), np.zeros_like(y)
-
-    def past(t, lag):
-        return u[t - lag] if t >= lag else np.zeros(2)
-
     for t in range(len(y)):
-        out[t] = m.C @ x + m.D @ past(t, found.direct_lag)
-        x = Ad @ x + early @ past(t, found.lag) + late @ past(t, found.lag + 1) + m.K @ (y[t] - out[t])
+        out[t] = m.C @ x + m.D @ past(u, t, found.direct_lag)
+        held = early @ past(u, t, found.lag) + late @ past(u, t, found.lag + 1)
+        x = Ad @ x + held + m.K @ (y[t] - out[t])
     return out
 
 
@@ -224,29 +184,16 @@ def test_records():
 MOTOR = {"J": 0.02, "R": 1.5, "K": 0.3}
 
 
-def motor(known=(), **words):
+def motor(known=()):
     """Position and speed of a motor: theta' = w, w' = (K u - (b + K^2 / R) w R / R) / J."""
     terms = [("A", 1, 1, "-(0.01 + K**2/R)/J"), ("B", 1, 0, "K/(R*J)")]
-    matrices = Matrices(
-        np.array([[0, 1], [0, -1.0]]),
-        np.array([[0], [1.0]]),
-        np.array([[1, 0]]),
-        np.zeros((1, 1)),
-        np.zeros((2, 1)),
-        0.0,
-    )
+    start = np.array([[0, 1], [0, -1.0]]), np.array([[0], [1.0]]), np.array([[1, 0]])
+    matrices = Matrices(*start, np.zeros((1, 1)), np.zeros((2, 1)), 0.0)
     plain = StateSpaceModel(matrices, tuple(t[:3] for t in terms), 1e-4 * np.eye(1), 0.05)
     free = np.array([name not in known for name in MOTOR])
-    return Reparametrised(
-        plain,
-        Parametrisation(
-            tuple(MOTOR),
-            tuple(MOTOR),
-            np.array(list(MOTOR.values())),
-            free,
-            tuple(Expression(t[3]) for t in terms),
-        ),
-    ).at(np.array(list(MOTOR.values()))[free])
+    names, values = tuple(MOTOR), np.array(list(MOTOR.values()))
+    expressions = tuple(Expression(t[3]) for t in terms)
+    return Reparametrised(plain, Parametrisation(names, names, values, free, expressions)).at(values[free])
 
 
 def test_a_motor_is_its_transfer_function():

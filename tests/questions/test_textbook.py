@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from tests.fuzzing.excitation import NotJudgedError
 from tests.fuzzing.judge import written
-from tests.fuzzing.textbook import findings
+from tests.fuzzing.textbook import NotJudgedError, findings
 
 SPECS = {
     # Many samples: what a line tells of all of them, not of one, decides whether it can go.

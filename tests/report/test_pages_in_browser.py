@@ -49,18 +49,8 @@ SWEEPS = {
 }
 
 
-NAMES = (
-    "open",
-    "closed",
-    *KINDS,
-    "assessed",
-    "explored",
-    *SWEEPS,
-    "campaign begun",
-    "campaign",
-    "waiting",
-    "wrong",
-)
+NAMES = [*KINDS, *SWEEPS, "open", "closed", "assessed", "explored", "campaign", "campaign begun"]
+NAMES += ["waiting", "wrong"]
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,14 @@
-"""Records of every kind, of one input and of two: periods, hold, ramp, chosen lines, and their spectra."""
+"""Records of every kind, of one input and of two, their spectra, and what delivered records attain."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import FiniteRecord
+from inputdesign_cli.questions.common.record import worst_ratio
 from inputdesign_cli.signal.evaluation import Target
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.lines import DesignedSpectrum
@@ -13,6 +16,7 @@ from inputdesign_cli.signal.multisine import gaussian_record
 from inputdesign_cli.signal.selection import best_record
 from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from tests.support.random_plants import random_case
 from tests.support.signals import COLOURED, block_spectrum, of_two_inputs
 
 KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "steps"]
@@ -76,7 +80,7 @@ def test_the_hold_is_allowed_for(spectrum):
     np.testing.assert_allclose(found[inside], wanted[inside], atol=1e-9 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("chosen", ["odd", (1, 4, 9, 20)])
+@pytest.mark.parametrize("chosen", ["odd", 8, (1, 4, 9, 20)])
 @pytest.mark.parametrize("spectrum", ["moving average", "two inputs"])
 def test_chosen_lines_keep_the_powers_of_the_inputs(chosen, spectrum):
     period = 240 // SPECTRA[spectrum].inputs
@@ -84,7 +88,10 @@ def test_chosen_lines_keep_the_powers_of_the_inputs(chosen, spectrum):
     wanted = SPECTRA[spectrum].lines(period).powers.sum(axis=0)
     np.testing.assert_allclose(lines.powers.sum(axis=0), wanted)
     used = np.rint(lines.frequencies * period / (2 * np.pi)).astype(int)
-    assert set(used) == (set(range(1, period // 2 + 1, 2)) if chosen == "odd" else set(chosen))
+    if chosen == 8:
+        assert used.size == 8
+    else:
+        assert set(used) == (set(range(1, period // 2 + 1, 2)) if chosen == "odd" else set(chosen))
 
 
 @pytest.mark.parametrize("spectrum", SPECTRA)
@@ -143,3 +150,46 @@ def test_given_lines_are_made_as_they_are_given(first_order):
     np.testing.assert_allclose(regressors @ fit[0], samples, atol=1e-8)
     amplitude = np.hypot(fit[0][:2], fit[0][2:])
     assert amplitude[0] == pytest.approx(amplitude[1], rel=1e-6)
+
+
+EXTRA = {500: 0.10, 5000: 0.03}
+
+
+def delivered(seed, samples, **settings):
+    """The design of a random case for so many samples, its record, and what that attains, all recomputed."""
+    case = random_case(seed)
+    question = Question(
+        case.experiment(samples), FirBasis(1, case.order), "cost", [case.requirement], cost=case.cost
+    )
+    design = solve_design(question, tolerance=1e-6)
+    problem, x = design.problem, design.result.x
+    designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
+    target = Target(worst_ratio(problem.requirements), True, case.cost, designed)
+    plant = FiniteRecord(problem.experiment, samples)
+    spectrum = DesignedSpectrum.of(FirBasis(1, x.size - 1), x)
+    record = best_record(SignalGenerator(spectrum, SignalSettings(**settings), samples), plant, target)
+    cost = sum(weight * plant.mean_squares(kind, record.samples)[0] for kind, weight in case.cost.items())
+    ratio = target.worst_ratio(plant.information(record.samples))
+    return record, ratio, cost / designed - 1
+
+
+def check(seed, samples, **settings):
+    record, ratio, extra = delivered(seed, samples, **settings)
+    assert record.met
+    assert ratio <= 1 + 1e-9
+    assert extra == pytest.approx(record.extra_power, abs=1e-9)
+    assert extra <= EXTRA[samples]
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [0, 9, 12, 14])
+def test_some_random_designs(seed):
+    check(seed, 500)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("samples", [500, 5000])
+@pytest.mark.parametrize("method", ["filtered_noise", "multisine"])
+@pytest.mark.parametrize("seed", range(20))
+def test_random_designs(seed, samples, method):
+    check(seed, samples, method=method)

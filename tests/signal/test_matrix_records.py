@@ -1,4 +1,4 @@
-"""Records of matrix spectra: lines, multisines, causal factors and low-order filters."""
+"""Spectral factors, scalar and matrix; lines, multisines and low-order filters of matrix spectra."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,13 @@ from inputdesign_cli.signal.periodic import (
     shaped_noise,
 )
 from inputdesign_cli.signal.rational import rational_filter
-from inputdesign_cli.signal.spectral_factor import matrix_factor
+from inputdesign_cli.signal.spectral_factor import (
+    SpectralFactor,
+    autocorrelation,
+    matrix_factor,
+    spectral_factor,
+)
+from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_error import adjoint, column, random_hermitian
 
 TAPS = np.array([[[2.0, 0.0], [0.5, 1.0]], [[0.6, 0.3], [-0.4, 0.2]]])
@@ -126,3 +132,29 @@ def test_low_order_filters_of_the_column_are_stable_and_nearly_as_good(order):
     assert criterion.value(M) < {2: 6.3e-6, 4: 5.3e-6}[order]
     u = filter_.filtered(100_000, np.random.default_rng(1))
     np.testing.assert_allclose((u**2).mean(axis=0), filter_.power(), rtol=0.1)
+
+
+@pytest.mark.parametrize("order", [0, 1, 5, 40, 200])
+def test_spectral_factor_of_a_known_factor(order):
+    """Random zeros inside the circle: the minimum-phase factor is recovered."""
+    rng = np.random.default_rng(order)
+    taps = rng.normal(size=order + 1) * 0.7 ** np.arange(order + 1)
+    factor = spectral_factor(autocorrelation(taps))
+    assert factor.residual < 1e-12
+    w = np.linspace(0, np.pi, 257)
+    response = np.abs(np.exp(-1j * np.outer(w, np.arange(order + 1))) @ factor.taps) ** 2
+    wanted = FirBasis(1, order).density(autocorrelation(taps), w)
+    np.testing.assert_allclose(response, wanted, rtol=1e-9, atol=1e-11 * wanted.max())
+
+
+def test_spectral_factor_with_zeros_on_the_circle():
+    """(1 - q^-1)^2 touches zero at DC, of order four in Phi: the residual still vanishes."""
+    factor = spectral_factor(autocorrelation(np.array([1.0, -2.0, 1.0])))
+    assert factor.residual < 1e-10
+
+
+def test_filtered_noise_has_the_autocovariances():
+    taps = np.array([1.0, 0.8, 0.3])
+    x = SpectralFactor(taps, 0.0).filtered(200_000, np.random.default_rng(1))
+    for lag, expected in enumerate(autocorrelation(taps)):
+        assert np.mean(x[: x.size - lag] * x[lag:]) == pytest.approx(expected, abs=0.03)

@@ -1,14 +1,30 @@
-"""Ready-made signals: what the textbooks say of them."""
+"""Ready-made signals, and those of few levels: shift registers, converters, ramps, when to switch."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
+from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.ready_made import ReadyMade, make_signal
+from inputdesign_cli.signal.constraints import largest_move, ramped
+from inputdesign_cli.signal.evaluation import Target
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.signal.levels import few_levels
+from inputdesign_cli.signal.limits import Bounds
+from inputdesign_cli.signal.lines import DesignedSpectrum, grid_lines
+from inputdesign_cli.signal.multisine import multisine_record
+from inputdesign_cli.signal.prbs import register_length
 from inputdesign_cli.signal.ready_made import equal_lines, excites, scaled
-from inputdesign_cli.signal.settings import SignalSettings
+from inputdesign_cli.signal.selection import best_record, better_switching
+from inputdesign_cli.signal.settings import Quantiser, SignalSettings
+from inputdesign_cli.spectrum import FirBasis
+from tests.support.signals import COLOURED, block_spectrum, of_two_inputs, periodogram
 
 
 def made(kind, samples, inputs=1, *more, odd=False, **settings):
@@ -17,10 +33,11 @@ def made(kind, samples, inputs=1, *more, odd=False, **settings):
     )
 
 
-@pytest.mark.parametrize("bits", [3, 7, 10])
+@pytest.mark.parametrize("bits", [2, 3, 7, 10])
 def test_a_prbs_is_white_over_its_period(bits):
     period = 2**bits - 1
     u = made("prbs", 2 * period, bits=bits)
+    assert register_length(period) == bits
     assert set(np.unique(u)) == {-1.0, 1.0}
     assert np.array_equal(u[:period], u[period:])
     lag = np.fft.irfft(np.abs(np.fft.rfft(u[:period, 0])) ** 2, period) / period
@@ -149,3 +166,156 @@ def test_a_chirp_that_is_shorter_than_a_turn_is_refused_with_the_samples_that_co
     assert min(ends) == pytest.approx(0.0, abs=1e-9)
     if band[1] <= 1.0:  # a few samples for each turn
         assert max(ends) < 3.0
+
+
+def rng(seed=0):
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize(("kind", "values"), [("binary", {-1.0, 1.0}), ("ternary", {-1.0, 0.0, 1.0})])
+def test_levels_of_one_input_and_their_spectrum(kind, values):
+    """Few levels only, and a spectrum nearer to the wanted one than that of the signs of noise."""
+    samples = 512
+    lines = grid_lines(FirBasis(1, 3).density(COLOURED, 2 * np.pi * np.arange(257) / samples), samples, 1.0)
+    power = lines.totals
+
+    def misfit(x):
+        found = np.sqrt(periodogram(x))
+        wanted = np.sqrt(power)
+        return 1 - (found @ wanted) ** 2 / (found @ found) / (wanted @ wanted)
+
+    record = few_levels(lines, samples, rng(), kind_of(kind).nearest)[:, 0]
+    assert set(np.unique(np.sign(record))) <= values
+    assert np.unique(np.abs(record[record != 0.0])).size == 1
+    signs = [
+        misfit(np.sign(multisine_record(lines, samples, rng(seed), "orthogonal")[:, 0])) for seed in range(10)
+    ]
+    assert misfit(record) < 0.35 * min(signs)
+
+
+@pytest.mark.parametrize(("kind", "number"), [("binary", 2), ("ternary", 3)])
+@pytest.mark.parametrize("samples", [480, 481])
+def test_few_levels_at_several_inputs(kind, number, samples):
+    """Levels of the powers of the inputs, and a matrix spectrum nearer than that of clipped multisines."""
+    lines = grid_lines(of_two_inputs(2 * np.pi * np.arange(121) / 240), 240, 1.0)
+    record = few_levels(lines, samples, rng(), kind_of(kind).nearest)
+    assert record.shape == (samples, 2)
+    assert all(np.unique(column).size == number for column in record.T)
+    np.testing.assert_allclose(np.mean(record[:480] ** 2, axis=0), lines.mean_squares, rtol=0.01)
+    wanted = of_two_inputs(2 * np.pi * np.arange(121) / 240)
+
+    def error(x):
+        return np.linalg.norm(block_spectrum(x[:480], 2) - wanted) / np.linalg.norm(wanted)
+
+    def signs(seed):
+        return np.sign(multisine_record(lines, 480, rng(seed), "orthogonal")) * np.sqrt(lines.mean_squares)
+
+    assert error(record) < 0.8 * min(error(signs(seed)) for seed in range(5))
+
+
+def test_quantiser():
+    converter = Quantiser(bits=3, span=4.0, offset=1.4)  # values -4, -3, .., 3
+    assert converter.step == 1.0
+    assert converter.operating_point == 1.0
+    np.testing.assert_array_equal(converter.steps(np.array([-9.0, -0.4, 0.6, 9.0])), [-5, 0, 1, 2])
+    assert converter.reach() == 2.0
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.5, 3.0])
+def test_far_switches_make_a_trapezoid(rate):
+    """Straight lines between the corners: a switch at t leads to the other level 2 / rate samples after."""
+    switches, level = [0, 13, 40, 71], 1.0
+    values, corners, heights = np.empty(90), [-1.0], [0.0]
+    for at in switches:
+        values[at:] = level
+        corners += [at - 1.0, at - 1.0 + (level - heights[-1]) * level / rate]
+        heights += [heights[-1], level]
+        level = -level
+    expected = np.interp(np.arange(90), [*corners, 90.0], [*heights, heights[-1]])
+    np.testing.assert_allclose(ramped(values, rate), expected, atol=1e-12)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 2**32 - 1), st.floats(0.01, 5.0))
+def test_slow_records_are_followed_as_they_are_and_others_at_full_speed(seed, rate):
+    values = np.random.default_rng(seed).normal(size=60)
+    found = ramped(values, rate)
+    assert largest_move(found) <= rate * (1 + 1e-12)
+    moves = np.abs(np.diff(found, prepend=0.0))
+    assert np.all((found == values) | (moves >= rate * (1 - 1e-9)))
+    np.testing.assert_array_equal(ramped(0.999 * found, rate), 0.999 * found)
+
+
+def test_the_search_finds_switches_that_are_known():
+    """Of all signals of two levels the sign of a sinusoid has the largest product with it."""
+    wave = np.sin(2 * np.pi * (np.arange(60) + 0.5) / 20)
+    best = np.abs(wave).sum()
+    start = np.where(np.random.default_rng(0).random((60, 1)) < 0.5, -2.0, 2.0)
+
+    def figure(values):
+        return 2.0 - float(wave @ values[:, 0]) / (2.0 * best) + 1e-12
+
+    found = better_switching(start, figure, np.random.default_rng(1), 5000)
+    np.testing.assert_array_equal(found[:, 0], 2.0 * np.sign(wave))
+
+
+def test_the_search_keeps_what_is_best_and_ends_where_it_is_enough():
+    rng, start, asked = np.random.default_rng(2), np.ones((30, 2)), []
+
+    def figure(values):
+        asked.append(values)
+        return 3.0 - float(np.mean(values[:, 1] < 0.0)) * 4.0
+
+    found = better_switching(start, figure, rng, 300, 1.0)
+    assert figure(found) == min(map(figure, list(asked))) <= 1.0
+    assert set(np.unique(found)) <= {-1.0, 1.0}
+    first = len(asked)
+    better_switching(found, figure, rng, 300, 1.0)
+    assert len(asked) == first + 1
+    np.testing.assert_array_equal(start, 1.0)
+
+
+def test_a_pace_that_does_not_lead_there_ends_the_search_and_so_does_its_time():
+    start, asked = np.ones((40, 1)), []
+
+    def figure(values):
+        asked.append(values)
+        return 2.0 - 1e-4 * len(asked)
+
+    better_switching(start, figure, np.random.default_rng(3), 600, 1.0)
+    assert len(asked) == 101
+    better_switching(start, figure, np.random.default_rng(3), 600)
+    assert len(asked) == 101 + 601
+    with time_limit(0.0):
+        assert better_switching(start, figure, np.random.default_rng(3), 600) is start
+
+
+@pytest.mark.parametrize("quantiser", [None, Quantiser(5, 0.8)], ids=["plain", "converter"])
+@pytest.mark.parametrize(("periods", "hold"), [(1, 1), (2, 1), (1, 2)])
+def test_every_sample_is_at_a_level_or_moves_at_the_rate(first_order, quantiser, periods, hold):
+    """With the limits exact, whatever the converter; the height is the largest that they leave."""
+    experiment = replace(first_order, samples=240)
+    spectrum = DesignedSpectrum.of(FirBasis(1, 2), np.array([1.0, 0.7, 0.3]), inputs=1)
+    settings = SignalSettings("slewed", periods=periods, hold=hold, candidates=1, most_candidates=1)
+    bounds = Bounds(
+        amplitude=np.array([0.72]),
+        rate=np.array([0.32]),
+        quantisers=() if quantiser is None else (quantiser,),
+    )
+    generator = SignalGenerator(spectrum, settings, 240)
+    plant = FiniteRecord(experiment, 240)
+    target = Target(lambda M: 1e6 / np.sqrt(np.trace(M)), meets=True)  # out of reach
+    record = best_record(generator, plant, target, bounds)
+    assert not record.met
+    u = record.samples[::hold, 0]
+    np.testing.assert_array_equal(np.repeat(u, hold), record.samples[:, 0])
+    step = 0.05 if quantiser is not None else None
+    most, fastest = (0.72, 0.32) if step is None else (0.7, 0.3)
+    moves = np.abs(np.diff(u, prepend=0.0))
+    assert np.abs(u).max() <= 0.72
+    assert moves.max() <= 0.32
+    levels = np.isclose(np.abs(u), most, rtol=1e-9)
+    assert levels.any()
+    assert np.all(levels | np.isclose(moves, fastest, rtol=1e-9))
+    if step is not None:
+        np.testing.assert_allclose(u / step, np.rint(u / step), atol=1e-9)

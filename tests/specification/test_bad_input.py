@@ -31,11 +31,9 @@ Row = tuple[str, str, str, dict[str, str | None]]
 
 ROWS: list[Row] = [
     # keys
-    ("unknown-key", "plants", 'did you mean "plant"', {"§plants": "1"}),
     ("unknown-key", "sampletime", 'did you mean "sample_time"', {"§sampletime": "1"}),
     ("unknown-key", "Ts", 'did you mean "sample_time"', {"§Ts": "1"}),
     ("unknown-key", "alpha", "belongs under accuracy.model_error", {"§alpha": "2"}),
-    ("unknown-key", "noise.vairance", "", {"noise": "{variance: 1, §vairance: 2}"}),
     ("unknown-key", "plant.limits", "belongs at the top level", {"plant": "{B: [0, 1], §limits: {}}"}),
     ("missing-key", "plant", '"plant"', {"plant": None}),
     ("missing-key", "noise", "variance: 1", {"noise": None}),
@@ -49,20 +47,13 @@ ROWS: list[Row] = [
     # kinds of values
     ("wrong-shape", "plant", "mapping", {"plant": "§3"}),
     ("wrong-shape", "noise", "mapping", {"noise": "§[1]"}),
-    ("wrong-shape", "spectrum", "mapping", {"spectrum": "§fir"}),
-    ("wrong-shape", "accuracy.model_error", "mapping", {"accuracy": "{model_error: §0.01}"}),
-    ("wrong-shape", "uncertainty.intervals.b1", "two numbers, not 1", {
-        "uncertainty": "{intervals: {b1: §[0.7]}}"}),
     ("wrong-shape", "uncertainty.intervals.b1", "two numbers, not 3", {
         "uncertainty": "{intervals: {b1: §[0.7, 0.8, 0.9]}}"}),
     ("not-a-number", "sample_time", "true", {"sample_time": "§true"}),
     ("not-a-number", "sample_time", 'the text "yes"', {"sample_time": "§yes"}),
-    ("not-a-number", "sample_time", "a list", {"sample_time": "§[1]"}),
     ("not-a-number", "sample_time", "write 10", {"sample_time": "§010"}),
     ("not-a-number", "sample_time", "decimal number", {"sample_time": "§0x10"}),
     ("not-a-number", "sample_time", "underscores: 1000", {"sample_time": "§1_000"}),
-    ("not-a-number", "sample_time", "1:30", {"sample_time": "§1:30"}),
-    ("not-a-number", "sample_time", "2001-01-01", {"sample_time": "§2001-01-01"}),
     ("not-a-number", "sample_time", "decimal point: 0.5", {"sample_time": "§0,5"}),
     ("not-a-number", "sample_time", "write 0.005", {"sample_time": "§5 ms"}),
     ("not-a-number", "sample_time", "remove the quotes", {"sample_time": "§'1e-3'"}),
@@ -70,23 +61,18 @@ ROWS: list[Row] = [
     ("not-a-number", "accuracy.model_error.relative", "0.01 where a fraction", {
         "accuracy": "{model_error: {relative: §1%}}"}),
     ("not-finite", "sample_time", "finite", {"sample_time": "§.inf"}),
-    ("not-finite", "sample_time", "finite", {"sample_time": "§-.INF"}),
-    ("not-finite", "sample_time", "finite", {"sample_time": "§.nan"}),
     ("not-finite", "sample_time", "too large", {"sample_time": "§1e400"}),
     ("not-finite", "sample_time", "too large", {"sample_time": "§" + "9" * 5000}),
     ("not-finite", "sample_time", "too small", {"sample_time": "§1e-400"}),
     ("out-of-range", "sample_time", "greater than 0, not 0", {"sample_time": "§0"}),
-    ("out-of-range", "sample_time", "greater than 0, not -1", {"sample_time": "§-1"}),
     ("unknown-word", "time_unit", 'did you mean "min"', {"time_unit": "§minutes"}),
     ("unknown-word", "objective", 'did you mean "least_cost"', {"objective": "§least-cost"}),
-    ("unknown-word", "objective", "the number 3", {"objective": "§3"}),
     ("not-a-text", "title", "a list", {"title": "§[a]"}),
     ("not-a-whole-number", "experiment.samples", "500 or 501", {"experiment": "{samples: §500.5}"}),
     ("out-of-range", "experiment.samples", "at least 1", {"experiment": "{samples: §0}"}),
     ("out-of-range", "experiment.samples", "at most", {"experiment": "{samples: §1e30}"}),
     # YAML that is read but not wanted
     ("yaml-tag", "plant.B", "remove the tag", {"plant": "{B: §!!python/tuple [0, 1]}"}),
-    ("yaml-tag", "sample_time", "float", {"sample_time": "§!!float 1"}),
     ("yaml-merge-key", "plant.<<", "alias", {"plant": "{B: [0, 1], §<<: {F: [1]}}"}),
     ("bad-key", "plant", "not a word", {"plant": "{B: [0, 1], §[1]: 2}"}),
     ("bad-text", "title", "U+0001", {"title": '§"\\x01"'}),
@@ -101,7 +87,6 @@ ROWS: list[Row] = [
         "accuracy": "{model_error: {relative: 1, §alpha: 2, confidence: 0.9}}"}),
     ("out-of-range", "accuracy.model_error.confidence", "write 0.95 for 95 percent", {
         "accuracy": "{model_error: {relative: 1, confidence: §95}}"}),
-    ("out-of-range", "accuracy.model_error.relative", "greater than 0", {"accuracy": "{model_error: {relative: §0}}"}),
     ("bad-band", "accuracy.model_error.band", "ascend", {"accuracy": "{model_error: {relative: 1, band: §[2, 1]}}"}),
     ("bad-band", "accuracy.model_error.band", "two frequencies", {
         "accuracy": "{model_error: {relative: 1, band: §[2]}}"}),
@@ -124,11 +109,7 @@ ROWS: list[Row] = [
         "accuracy": "{application: {parameters: §[b1, f1], hessian: [[1]], gamma: 100}}"}),
     ("wrong-shape", "accuracy.application.parameters", "more than once", {
         "accuracy": "{application: {parameters: §[b1, b1], hessian: [[1, 0], [0, 1]], gamma: 100}}"}),
-    ("missing-key", "accuracy.application.gamma", '"gamma"', {
-        "accuracy": "{§application: {parameters: [b1], hessian: [[1]]}}"}),
     ("out-of-range", "accuracy.standard_deviation.b1", "greater than 0", {"accuracy": "{standard_deviation: {b1: §0}}"}),
-    ("wrong-shape", "accuracy.standard_deviation", "empty", {"accuracy": "{§standard_deviation: {}}"}),
-    ("missing-key", "accuracy.weighted_variance.max", '"max"', {"accuracy": "{§weighted_variance: {}}"}),
     ("improper-transfer", "accuracy.weighted_variance.weight.continuous.numerator", "degree 1", {
         "accuracy": "{weighted_variance: {max: 1, weight: {continuous: {numerator: §[1, 1]}}}}"}),
     ("missing-key", "accuracy.closed_loop_error.control", "model_reference", {
@@ -158,7 +139,6 @@ ROWS: list[Row] = [
     ("out-of-range", "plant.regression.estimated", "at least 1", {
         **REGRESSION, "plant": "{regression: {estimated: §0, neglected: 2}}"}),
     # objective and limits
-    ("needs-limits", "accuracy.criterion", "limits its power", {"accuracy": "{criterion: §D}"}),
     ("needs-limits", "limits", "limits its power", {"accuracy": "{criterion: D}", "§limits": "{samples: 100}"}),
     ("needs-limits", "objective", "shortest", {"objective": "§shortest_experiment"}),
     ("contradictory-objective", "objective", "remove the target", {
@@ -180,14 +160,11 @@ ROWS: list[Row] = [
     ("wrong-shape", "limits.output_power", "outputs is 1", {"limits": "{output_power: §[1, 2]}"}),
     ("conflicting-keys", "limits.input_power.min", "larger than max", {"limits": "{input_power: {min: §2, max: 1}}"}),
     ("missing-key", "limits.input_power", "max or min", {"limits": "{§input_power: {}}"}),
-    ("out-of-range", "limits.spectrum.max", "greater than 0", {"limits": "{spectrum: {max: §0}}"}),
-    ("out-of-range", "limits.amplitude", "greater than 0", {"limits": "{amplitude: §0}"}),
     # spectrum
     ("missing-key", "spectrum", "type: white", {"§spectrum": "{order: 3}"}),
     ("unknown-word", "spectrum.type", 'did you mean "multisine"', {"spectrum": "{type: §multi-sine, lines: 3}"}),
     ("unsuitable-key", "spectrum.basis", "type: polynomial", {"spectrum": "{type: fir, §basis: legendre}"}),
     ("unsuitable-key", "spectrum.type", "given", {"spectrum": "{§type: fir, given: {type: white, power: 1}}"}),
-    ("unknown-key", "spectrum.ordr", 'did you mean "order"', {"spectrum": "{type: fir, §ordr: 3}"}),
     ("missing-key", "spectrum.order", "type: polynomial", {"§spectrum": "{type: polynomial, band: [0, 1]}"}),
     ("missing-key", "spectrum", "lines or frequencies", {"§spectrum": "{type: multisine}"}),
     ("not-increasing", "spectrum.frequencies", "follows", {"spectrum": "{type: multisine, frequencies: §[1, 0.5]}"}),
@@ -195,7 +172,6 @@ ROWS: list[Row] = [
     ("bad-band", "spectrum.frequencies[1]", "outside limits.band", {
         "spectrum": "{type: multisine, frequencies: [1, §2]}", "limits": "{band: [0, 1.5]}"}),
     ("missing-key", "spectrum.given", "type: white", {"spectrum": "{§given: {power: 1}}"}),
-    ("missing-key", "spectrum.given.power", '"power"', {"spectrum": "{§given: {type: white}}"}),
     ("unsuitable-key", "spectrum.given.amplitudes", "type: multisine", {
         "spectrum": "{given: {type: white, power: 1, §amplitudes: [1]}}"}),
     ("wrong-shape", "spectrum.given.amplitudes", "1 amplitude, and", {
@@ -203,33 +179,25 @@ ROWS: list[Row] = [
     ("wrong-shape", "spectrum.given.power", "inputs is 1", {"spectrum": "{given: {type: white, power: §[1, 2]}}"}),
     # signal, solver, simulation
     ("unsuitable-key", "signal.phases", "type: multisine", {"signal": "{type: binary, §phases: random}"}),
-    ("out-of-range", "signal.seed", "at least 0", {"signal": "{seed: §-1}"}),
-    ("wrong-shape", "signal.offset", "inputs is 1", {"signal": "{offset: §[1, 2]}"}),
     ("out-of-range", "solver.tolerance", "less than 0.01", {"solver": "{tolerance: §0.1}"}),
     ("unknown-word", "solver.method", "exchange, lmi or alternating", {"solver": "{method: §simplex}"}),
     ("unknown-word", "simulation.compare[1]", "white", {"simulation": "{compare: [white, §whit]}"}),
     ("wrong-shape", "simulation.compare", "must be a list", {"simulation": "{compare: §white}"}),
     ("unstable-polynomial", "simulation.plant.A", "radius 2", {"simulation": "{plant: {B: [0, 1], A: §[1, -2]}}"}),
-    ("wrong-shape", "simulation.plant", "2 inputs", {"simulation": "{§plant: {B: [[[1], [1]]]}}"}),
     ("wrong-shape", "simulation.plant", "not sampled", {"simulation": f"{{§plant: {CONTINUOUS}}}"}),
     ("conflicting-keys", "simulation.noise.relative_std", "variance", {
         "simulation": "{noise: {variance: 1, §relative_std: 0.1}}"}),
     ("missing-key", "simulation.noise", "variance or relative_std", {"simulation": "{§noise: {C: [1]}}"}),
     # report
     ("wrong-shape", "report.ellipses[0]", "two different parameters", {"report": "{ellipses: [§[b1]]}"}),
-    ("wrong-shape", "report.ellipses[1]", "two different", {"report": "{ellipses: [[b1, f1], §[b1, b1]]}"}),
     ("not-a-text", "report.ellipses[0][1]", "a parameter name", {"report": "{ellipses: [[b1, §2]]}"}),
     # polynomials
     ("not-monic", "plant.F", "divide all its coefficients by 2: [1, -0.25]", {"plant": "{B: [1], F: §[2, -0.5]}"}),
     ("not-monic", "plant.F", "did you mean [1, -0.7]?", {"plant": "{B: [1], F: §[-0.7, 1]}"}),
-    ("not-monic", "plant.A", "ascending", {"plant": "{B: [1], A: §[0, 1]}"}),
-    ("not-monic", "noise.C", "not 3", {"noise": "{variance: 1, C: §[3]}"}),
     ("unstable-polynomial", "plant.F", "radius 1.7 at 0 rad", {"plant": "{B: [1], F: §[1, -1.7]}"}),
-    ("unstable-polynomial", "plant.F", "radius 1.7 at 3.142 rad", {"plant": "{B: [1], F: §[1, 1.7]}"}),
     # z^2 + 1.21: roots +-1.1j, a quarter turn
     ("unstable-polynomial", "plant.F", "radius 1.1 at 1.571 rad", {"plant": "{B: [1], F: §[1, 0, 1.21]}"}),
     ("unstable-polynomial", "plant.F", "radius 1 at", {"plant": "{B: [1], F: §[1, 1]}"}),
-    ("unstable-polynomial", "noise.D", "radius", {"noise": "{variance: 1, D: §[1, -2]}"}),
     ("unstable-polynomial", "plant.A", "experiment.controller", {"plant": "{B: [0, 1], A: §[1, -2]}"}),
     ("unstable-polynomial", "plant.A[1]", "radius 3", {
         "plant": "{B: [[[0, 1]], [[0, 2]]], A: [[1], §[1, -3]]}"}),
@@ -242,16 +210,12 @@ ROWS: list[Row] = [
     ("wrong-shape", "plant.B", "empty", {"plant": "{B: §[]}"}),
     ("wrong-shape", "plant.B", "rows of columns", {"plant": "{B: §[[0, 1], [0, 2]]}"}),
     ("wrong-shape", "plant.B", "list of coefficients", {"plant": "{B: §1}"}),
-    ("wrong-shape", "plant.B", "rows", {"plant": "{B: §[[[0, [1]]]]}"}),
-    ("not-a-number", "plant.B[1]", '"x"', {"plant": "{B: [0, §x]}"}),
     ("not-a-number", "plant.B[0][1][0]", '"x"', {"plant": "{B: [[[0, 1], [§x]]]}"}),
     ("wrong-shape", "plant.B", "same number of columns", {"plant": "{B: §[[[1], [1]], [[1]]]}"}),
     ("wrong-shape", "plant.F", "2 x 2", {"plant": "{B: [[[0, 1], [0, 2]], [[0, 3], [0, 4]]], F: §[1, -0.5]}"}),
     ("wrong-shape", "plant.A", "3 polynomials for 2 outputs", {
         "plant": "{B: [[[0, 1]], [[0, 2]]], A: §[[1], [1], [1]]}"}),
     # continuous time
-    ("unstable-polynomial", "plant.continuous.denominator", "s = 1", {
-        "plant": "{continuous: {numerator: [1], denominator: §[1, -1]}}"}),
     ("unstable-polynomial", "plant.continuous.denominator", "s = 0", {
         "plant": "{continuous: {numerator: [1], denominator: §[1, 0, 1]}}"}),
     ("unstable-polynomial", "plant.continuous.denominator[1]", "left half", {
@@ -266,12 +230,6 @@ ROWS: list[Row] = [
         "plant": "{continuous: {numerator: [[[1], [1]]], denominator: §[[[1, 1]], [[1, 1]]]}}"}),
     ("unsuitable-key", "plant.B", "continuous-time plant", {
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, §B: [1]}"}),
-    ("unknown-word", "plant.sample", "zoh", {
-        "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §foh}"}),
-    ("unknown-word", "plant.sample", "must be zoh", {
-        "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §foh}"}),
-    ("unknown-word", "plant.sample", 'did you mean "zoh"?', {
-        "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §zho}"}),
     ("unknown-word", "plant.sample", "must be zoh", {
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §true}"}),
     ("unknown-word", "experiment.controller.pid.sample", "must be tustin, backward or zoh", {
@@ -282,20 +240,13 @@ ROWS: list[Row] = [
     ("unsuitable-key", "spectrum.type", "not sampled", {"plant": CONTINUOUS, "spectrum": "{type: §fir}"}),
     ("unsuitable-key", "accuracy.model_error.weight", "continuous: ", {
         "plant": CONTINUOUS, "accuracy": "{model_error: {absolute: 1, §weight: {numerator: [1]}}}"}),
-    ("unsuitable-key", "limits.spectrum.max", "continuous: ", {
-        "plant": CONTINUOUS, "limits": "{spectrum: {§max: {numerator: [1]}}}"}),
     # noise
-    ("out-of-range", "noise.variance", "greater than 0", {"noise": "{variance: §0}"}),
     ("not-positive-definite", "noise.variance", "covariance", {"plant": MIMO, "noise": "{variance: §[[1, 2], [2, 1]]}"}),
     ("not-symmetric", "noise.variance", "(2, 1)", {"plant": MIMO, "noise": "{variance: §[[1, 0.1], [0.2, 1]]}"}),
     ("wrong-shape", "noise.variance", "square", {"plant": MIMO, "noise": "{variance: §[[1, 0]]}"}),
     ("wrong-shape", "noise.variance", "2 x 2, but the plant has 1 output", {"noise": "{variance: §[[1, 0], [0, 1]]}"}),
     ("wrong-shape", "noise.C", "3 polynomials", {"plant": MIMO, "noise": "{variance: 1, C: §[[1], [1], [1]]}"}),
     # experiment, cost
-    ("zero-leading-coefficient", "experiment.controller.denominator", "0", {
-        "experiment": "{controller: {numerator: [1], denominator: §[0, 1]}}"}),
-    ("zero-polynomial", "experiment.controller.numerator", "zero", {
-        "experiment": "{controller: {numerator: §[0], denominator: [1]}}"}),
     ("wrong-shape", "experiment.controller", "2 inputs", {
         "plant": MIMO, "experiment": "{§controller: {numerator: [1]}}"}),
     ("not-positive-definite", "experiment.prior.information", "semidefinite", {
@@ -303,8 +254,6 @@ ROWS: list[Row] = [
     ("wrong-shape", "experiment.prior.parameters", "1 x 1", {
         "experiment": "{prior: {information: [[1]], parameters: §[b1, f1]}}"}),
     ("no-cost", "cost", "free", {"§cost": "{input_power: 0}"}),
-    ("out-of-range", "cost.input_power", "at least 0", {"cost": "{input_power: §-1}"}),
-    ("wrong-shape", "cost.input_power", "inputs is 1", {"cost": "{input_power: §[1, 2]}"}),
 ]  # fmt: skip
 
 
@@ -343,69 +292,39 @@ def test_the_complaint_names_code_key_place_and_remedy(row, diagnostics):
         assert phrase not in diagnostic.message + diagnostic.hint
 
 
-def test_all_complaints_come_together_in_the_order_of_the_file(diagnostics):
-    text = (
-        "title: many\n"
-        "sampletime: 1\n"
-        "plant: {B: [0, x], F: [2, 1]}\n"
-        "accuracy:\n"
-        "  model_error: {relative: -1, confidence: 95, alpha: 2}\n"
-        "limits: {band: [2, 1]}\n"
-        "signal: {type: binary, phases: random}\n"
-    )
+MANY = (
+    "title: many\n"
+    "sampletime: 1\n"
+    "plant: {B: [0, x], F: [2, 1]}\n"
+    "accuracy:\n"
+    "  model_error: {relative: -1, confidence: 95, alpha: 2}\n"
+    "limits: {band: [2, 1]}\n"
+    "signal: {type: binary, phases: random}\n"
+)
+NOISE = "noise: {variance: 1}\n"
+TOGETHER = {
+    "in the order of the file": (MANY, "noise sampletime plant.B[1] plant.F accuracy.model_error.relative "
+        "accuracy.model_error.confidence limits.band signal.phases"),
+    # A broken controller makes the unstable plant no mistake; a broken requirement is asked all the same.
+    "no consequences": (NOISE + "plant: {B: [0, 1], A: [1, -2]}\n"
+        "experiment: {controller: {numerator: [x], denominator: [1]}}\naccuracy: {model_error: {relative: x}}\n",
+        "experiment.controller.numerator[0] accuracy.model_error.relative"),
+    "several in a section": (NOISE + "plant: {B: [0, 1], F: [1, x]}\n"
+        "accuracy: {model_error: {relative: 0.01, alpha: 2, confidence: 0.9, band: [0, x]}}\n",
+        "plant.F[1] accuracy.model_error.alpha accuracy.model_error.band[1]"),
+    "a missing choice": (NOISE + "plant: {B: [0, 1]}\naccuracy: {model_error: {band: [2, 1]}}\n",
+        "accuracy.model_error accuracy.model_error.band"),
+    "misspelt is not missing": ("plant: {b: [0, 1]}\nnose: {variance: 1}\nacuracy: {model_error: {relative: 1}}\n",
+        "plant.b nose acuracy"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOGETHER)
+def test_which_complaints_come_together(name, diagnostics):
+    text, keys = TOGETHER[name]
     found, _ = diagnostics(text)
-    assert [(c.location.line, c.code) for c in found] == [
-        (1, "missing-key"),
-        (2, "unknown-key"),
-        (3, "not-a-number"),
-        (3, "not-monic"),
-        (5, "out-of-range"),
-        (5, "out-of-range"),
-        (6, "bad-band"),
-        (7, "unsuitable-key"),
-    ]
-
-
-def test_a_mistake_does_not_cause_further_complaints(diagnostics):
-    # A broken controller must not make the unstable plant a second mistake, nor a broken requirement
-    # leave nothing asked.
-    found, _ = diagnostics(
-        "plant: {B: [0, 1], A: [1, -2]}\nnoise: {variance: 1}\n"
-        "experiment: {controller: {numerator: [x], denominator: [1]}}\n"
-        "accuracy: {model_error: {relative: x}}\n"
-    )
-    assert [c.key for c in found] == ["experiment.controller.numerator[0]", "accuracy.model_error.relative"]
-
-
-def test_a_mistake_does_not_hide_another_in_the_same_section(diagnostics):
-    found, _ = diagnostics(
-        "plant: {B: [0, 1], F: [1, x]}\nnoise: {variance: 1}\n"
-        "accuracy: {model_error: {relative: 0.01, alpha: 2, confidence: 0.9, band: [0, x]}}\n"
-    )
-    assert [c.key for c in found] == [
-        "plant.F[1]",
-        "accuracy.model_error.alpha",
-        "accuracy.model_error.band[1]",
-    ]
-
-
-def test_a_missing_choice_is_reported_beside_a_broken_sibling(diagnostics):
-    found, _ = diagnostics(
-        "plant: {B: [0, 1]}\nnoise: {variance: 1}\naccuracy: {model_error: {band: [2, 1]}}\n"
-    )
-    assert [(c.code, c.key) for c in found] == [
-        ("missing-key", "accuracy.model_error"),
-        ("bad-band", "accuracy.model_error.band"),
-    ]
-
-
-def test_a_misspelt_key_is_not_missing_as_well(diagnostics):
-    found, _ = diagnostics("plant: {b: [0, 1]}\nnose: {variance: 1}\nacuracy: {model_error: {relative: 1}}\n")
-    assert [(c.key, c.hint) for c in found] == [
-        ("plant.b", 'did you mean "B"?'),
-        ("nose", 'did you mean "noise"?'),
-        ("acuracy", 'did you mean "accuracy"?'),
-    ]
+    assert [c.key for c in found] == keys.split()
+    assert [c.location.line for c in found] == sorted(c.location.line for c in found)
 
 
 ASKED = "\nnoise: {variance: 1}\naccuracy: {standard_deviation: {gain: 0.1}}\n"

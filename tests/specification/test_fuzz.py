@@ -30,16 +30,17 @@ quick = settings(
 
 
 def read_or_complain(text, overrides=()):
-    error = None
     try:
         spec = parse_spec(text, "f.yaml", overrides)
     except SpecError as caught:
-        error = caught
-    if error is None:
-        again = parse_spec(spec.to_yaml())
-        assert again.sha256 == spec.sha256
-        assert again.model_dump() == spec.model_dump()
+        check(caught)
         return
+    again = parse_spec(spec.to_yaml())
+    assert again.sha256 == spec.sha256
+    assert again.model_dump() == spec.model_dump()
+
+
+def check(error):
     assert error.diagnostics
     for diagnostic in error.diagnostics:
         assert diagnostic.code in explanations(), diagnostic
@@ -62,15 +63,9 @@ words = st.sampled_from(
 )
 
 
-@quick
-@given(st.lists(words, max_size=60).map(" ".join))
-def test_words_of_the_language_in_any_order(text):
-    read_or_complain(text)
-
-
-@quick
-@given(st.text(max_size=80))
-def test_any_text(text):
+@settings(quick, max_examples=60)
+@given(st.lists(words, max_size=60).map(" ".join) | st.text(max_size=80))
+def test_words_of_the_language_in_any_order_and_any_text(text):
     read_or_complain(text)
 
 

@@ -51,7 +51,6 @@ def test_it_is_json_and_closed(schema):
     [
         "limits: {input_power: 1}",
         "limits: {input_power: [1, 2]}",
-        "limits: {input_power: {max: 1}}",
         "limits: {spectrum: {max: {table: a.csv}}}",
         "spectrum: {given: {signal: u.csv}}",
         "accuracy: {information: [[1]]}",
@@ -77,6 +76,9 @@ def test_it_accepts_shorthands(extra, schema):
         GOOD + "experiment: {samples: 0.5}",
         GOOD.replace("[0, 1]", "[]"),
         GOOD.replace("B:", "b:"),
+        GOOD + "spectrum: {typ: fir}",
+        GOOD + "sweep: {set: {a: 3}}",
+        GOOD + "sweep: {}",
     ],
 )
 def test_it_refuses(text, schema):
@@ -91,11 +93,6 @@ def test_an_editor_accepts_the_shipped_specs(schema, path):
     jsonschema.Draft202012Validator(schema).validate(read(path.read_text(), path.name).data)
 
 
-@pytest.mark.parametrize("wrong", ["spectrum: {typ: fir}", "sweep: {set: {a: 3}}", "sweep: {}"])
-def test_an_editor_refuses_what_is_no_spec(schema, wrong):
-    assert not accepts(read(GOOD + wrong, "x").data, schema)
-
-
 ESTIMATED = {
     "plant alone": "plant: {B: [0, 1], F: [1, -0.5]}",
     "colour": "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {C: [1, -0.2]}",
@@ -106,16 +103,40 @@ ESTIMATED = {
 
 
 @pytest.mark.parametrize("text", ESTIMATED.values(), ids=ESTIMATED)
-def test_a_spec_to_estimate_from_needs_no_noise_and_no_question(text, schema):
+def test_only_a_spec_to_estimate_from_needs_no_noise_and_no_question(text, schema):
     assert accepts(read(text, "x").data, schema)
     validate(parse_spec(text, design=None))
+    for asked in ("accuracy: {criterion: D}", "limits: {input_power: 1}", "spectrum: {type: white}"):
+        assert not accepts(read(f"{text}\n{asked}", "x").data, schema)
+        with pytest.raises(SpecError):
+            parse_spec(f"{text}\n{asked}", design=None)
 
 
-@pytest.mark.parametrize("text", ESTIMATED.values(), ids=ESTIMATED)
-@pytest.mark.parametrize(
-    "asked", ["accuracy: {criterion: D}", "limits: {input_power: 1}", "spectrum: {type: white}"]
-)
-def test_who_asks_for_a_design_needs_the_noise(text, asked, schema):
-    assert not accepts(read(f"{text}\n{asked}", "x").data, schema)
-    with pytest.raises(SpecError):
-        parse_spec(f"{text}\n{asked}", design=None)
+DESIGN = "noise: {variance: 1}\naccuracy: {criterion: D}\nlimits: {input_power: 1, band: [0, 1]}\n"
+PLANTS = [
+    "{parameters: {K: 2.1, T: 180, L: 25}, continuous: {numerator: [K], denominator: [T, 1], delay: L}}",
+    "{parameters: {g: 0.3, p: 0.8}, B: [0, g], F: [1, -p], known: [p]}",
+    "{continuous: {gain: 2.1, time_constant: 180, dead_time: 25}, sample: zoh}",
+    "{continuous: {gain: [[1, 2]], damping: [[1, 2]], natural_frequency: [[1, 2]]}, sample: zoh}",
+    "{continuous: {numerator: [[[1], [2]]], denominator: [1, 1], delay: [[0, 2]]}, sample: zoh}",
+]
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize("plant", PLANTS)
+def test_the_schema_and_the_models_take_the_same_words(plant, schema):
+    text = f"plant: {plant}\n{DESIGN}"
+    assert accepts(read(text, "x").data, schema)
+    spec = parse_spec(text)
+    assert parse_spec(spec.to_yaml()).plant == spec.plant
+
+
+def test_a_named_parameter_is_changed_by_an_override():
+    spec = parse_spec(f"plant: {PLANTS[1]}\n{DESIGN}", overrides=["plant.parameters.p=0.5"])
+    assert spec.plant.F == (1.0, -0.5)
+
+
+def test_a_coefficient_that_is_a_word_tells_of_parameters():
+    with pytest.raises(SpecError) as caught:
+        parse_spec(f"plant: {{B: [0, K]}}\n{DESIGN}")
+    assert "parameters: {K: 2.1}" in caught.value.diagnostics[0].hint

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, graded_grid
@@ -11,10 +12,13 @@ from inputdesign_cli.spectrum import (
     Functional,
     LinesBasis,
     PolynomialBasis,
+    directed_scale,
     hmat,
     hvec,
+    smat,
     svec,
 )
+from inputdesign_cli.spectrum.directions import best_directions, every_direction
 from tests.support.plants import arx, paper_experiment
 
 DISCRETE = Experiment(arx(), 20).whitened(1.0)
@@ -95,6 +99,7 @@ def test_faces_hold_spectra_and_the_white_one_has_power_one(name):
     assert eigenvalues.min() >= -1e-9 * eigenvalues.max()
     power = basis.integrals(lambda w: experiment.power_density("input", w), experiment.singularities)
     assert power @ basis.even == pytest.approx(1.0, rel=1e-10)
+    np.testing.assert_allclose(price.vector @ face.columns, svec(np.eye(face.order)), atol=1e-9)
     factor = basis.factor(face, svec(Y @ Y.T))
     np.testing.assert_allclose(of_gram(basis, factor @ factor.conj().T), x, atol=1e-9 * np.abs(x).max())
 
@@ -104,6 +109,8 @@ def test_the_price_is_attained_and_never_exceeded(name):
     basis, experiment = FAMILIES[name]
     price, value = functionals(basis, experiment)
     pricing = basis.price(price, value, np.linspace(0.01, 2.0, 300))
+    everywhere = np.linspace(*getattr(basis, "band", (0.0, np.pi)), 4001)
+    assert pricing.scale >= directed_scale(price, value, everywhere)[0] - 1e-12
     best = basis.products(pricing.directions[:, -1:])[:, 0]
     assert price.at(best) == pytest.approx(pricing.scale * value.at(best), rel=1e-9)
     rng = np.random.default_rng(6)
@@ -112,8 +119,9 @@ def test_the_price_is_attained_and_never_exceeded(name):
         assert price.at(x) >= pricing.scale * value.at(x)
 
 
-def test_enlarged_faces_keep_the_solution():
-    basis = PolynomialBasis(2, 20, (0.0, 2.0))
+@pytest.mark.parametrize("hermitian", [False, True])
+def test_enlarged_faces_keep_the_solution(hermitian):
+    basis = PolynomialBasis(2, 20, (0.0, 2.0), hermitian)
     price, value = functionals(basis, PAPER)
     face = basis.first_face(price)
     assert face.order < basis.gram_order
@@ -152,12 +160,13 @@ def test_coefficients_in_any_basis_are_the_same_spectrum(kind, hermitian):
     )
 
 
-def test_hvec_keeps_inner_products():
+@pytest.mark.parametrize(("vector", "matrix", "turn"), [(svec, smat, 0.0), (hvec, hmat, 1.0j)])
+def test_vectors_of_matrices_keep_inner_products(vector, matrix, turn):
     rng = np.random.default_rng(9)
-    A, B = (rng.normal(size=(5, 5)) + 1j * rng.normal(size=(5, 5)) for _ in range(2))
+    A, B = (rng.normal(size=(5, 5)) + turn * rng.normal(size=(5, 5)) for _ in range(2))
     A, B = A + A.conj().T, B + B.conj().T
-    assert hvec(A) @ hvec(B) == pytest.approx(np.trace(A @ B).real)
-    np.testing.assert_allclose(hmat(hvec(A)), A)
+    assert vector(A) @ vector(B) == pytest.approx(np.trace(A @ B).real)
+    np.testing.assert_allclose(matrix(vector(A)), A)
 
 
 @pytest.mark.parametrize("experiment", [PAPER, SINGLE], ids=["two inputs", "one input"])
@@ -188,3 +197,60 @@ def test_flat_basis_prices_its_one_spectrum():
     w = np.array([0.5, 2.5])
     np.testing.assert_allclose(basis.density(np.ones(1), w)[:, 0, 0], [np.pi / 4, 0.0])
     assert basis.price(price, value, w).scale == pytest.approx(price.at(basis.even) / value.at(basis.even))
+
+
+def test_lines_pick_up_the_density_at_their_frequencies():
+    lines = LinesBasis.at(np.array([0.3, 1.0, 2.0]), 1)
+    np.testing.assert_allclose(lines.integrals(lambda w: w**2, np.zeros(0)), [0.09, 1.0, 4.0])
+
+
+def test_each_frequency_is_judged_by_itself_and_one_without_a_price_is_left_out():
+    rng = np.random.default_rng(5)
+    half = rng.standard_normal((6, 2, 3, 2)) @ np.array([1.0, 1.0j])
+    price, value = (np.einsum("nij,nkj->nik", h, h.conj()) for h in (half, half[::-1]))
+    price[0] = 0.0
+    ratios, directions = best_directions(price, value)
+    assert ratios[0] == -np.inf
+    for n in range(6):
+        ratio, direction = best_directions(price[[n]], value[[n]])
+        assert ratio[0] == ratios[n]
+        np.testing.assert_allclose(np.abs(direction[0] @ directions[n].conj()), 1.0)
+    expected = [scipy.linalg.eigh(value[n], price[n], eigvals_only=True)[-1] for n in range(1, 6)]
+    np.testing.assert_allclose(ratios[1:], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e-15, 1e9])
+def test_ratios_do_not_depend_on_the_units_of_the_channels(unit):
+    """v^* value v / v^* price v is the same for v and for the same input in another unit."""
+    rng = np.random.default_rng(11)
+    roots = rng.standard_normal((2, 5, 3, 3)) + 1j * rng.standard_normal((2, 5, 3, 3))
+    price, value = roots @ roots.conj().swapaxes(2, 3)
+    expected = np.array(
+        [scipy.linalg.eigh(v, p, eigvals_only=True) for v, p in zip(value, price, strict=True)]
+    )
+    scale = np.diag([1.0, unit, 1.0])
+    ratios, _ = every_direction(scale @ price @ scale, scale @ value @ scale)
+    np.testing.assert_allclose(ratios, expected, rtol=1e-9)
+
+
+def test_a_dear_channel_does_not_make_a_cheap_one_dearer():
+    """By adding a share of what all cost to each, a bound on every spectrum was off by 2e6."""
+    price, value = np.diag([1e30, 1.0])[None], np.diag([1e30, 2.0])[None]
+    ratios, _ = best_directions(price, value)
+    np.testing.assert_allclose(ratios, 2.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("corner", [1e-4, 1e-2, 1.0])
+@pytest.mark.parametrize("next_to_zero", [[], [1e-18], [2e-13], [3e-14, 1e-9]])
+def test_the_best_frequency_beside_one_that_costs_nothing_has_a_price(corner, next_to_zero):
+    """price w^2, value w^2 / (1 + (w / corner)^2): the best is w -> 0, wherever the grid has its points."""
+
+    def functional(density):
+        return Functional(np.zeros(1), density)
+
+    price, value = functional(lambda w: w**2), functional(lambda w: w**2 / (1.0 + (w / corner) ** 2))
+    grid = np.concatenate([[0.0], next_to_zero, np.geomspace(3e-6, np.pi, 400)])
+    scale, peaks = directed_scale(price, value, grid)
+    assert scale == pytest.approx(1.0, rel=1e-9)
+    # As good as zero itself, and as dear as that allows.
+    assert peaks[0] == pytest.approx(1e-5 * corner, rel=0.3)

@@ -1,21 +1,28 @@
-"""A sweep runs every point once, notes what fails, and never mixes with anything else."""
+"""A sweep runs every point once, notes what fails, and never mixes with anything else; also from Python."""
 
 import hashlib
+import itertools
 import json
 import multiprocessing
+import pkgutil
 import subprocess
 import sys
 
+import numpy as np
+import pandas
 import pytest
 
+import inputdesign_cli
+from inputdesign_cli import load_spec, parse_spec, questions, sweep
 from inputdesign_cli.compute.processes import Processes
-from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, SpecError
+from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.figures.sweep_table import read_sweep
-from inputdesign_cli.sweeps.plan import build_plan
+from inputdesign_cli.specification import Sweep
+from inputdesign_cli.sweeps.plan import Axis, Grid, build_grid, build_plan, parse_settings
 from inputdesign_cli.sweeps.points import Layout
 from inputdesign_cli.sweeps.running import Row, list_points, scalars, table_lines
 from tests.support.processes import running
-from tests.support.sweep_files import rows, run_sweep, timeless_files, timeless_rows
+from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files, timeless_rows
 
 
 def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
@@ -95,16 +102,10 @@ def test_failures_are_rows_with_reasons(spec, stub, tmp_path):
 def test_a_failure_that_is_mended_leaves_no_trace(spec, stub, tmp_path, monkeypatch):
     out = tmp_path / "out"
     run_sweep(spec, ["experiment.samples=6,7"], directory=out)
-    from inputdesign_cli import questions
-
     solve = questions.solve
-    monkeypatch.setattr(questions, "solve", lambda s: solve(s.model_copy(update={"experiment": six(s)})))
+    monkeypatch.setattr(questions, "solve", lambda s: solve(s.with_(**{"experiment.samples": 6})))
     assert run_sweep(spec, ["experiment.samples=6,7"], directory=out, rerun_failed=True).failures == 0
     assert list((out / "failures").iterdir()) == []
-
-
-def six(spec):
-    return spec.experiment.model_copy(update={"samples": 6})
 
 
 def test_fail_fast_stops_and_keeps_what_is_done(spec, stub, tmp_path):
@@ -126,13 +127,6 @@ def test_an_interrupt_leaves_a_table(spec, stub, tmp_path):
         run_sweep(spec, ["experiment.samples=10,20,30"], directory=out, watch=stop)
     assert [row["status"] for row in rows(out)] == ["optimal", "optimal", "pending"]
     assert run_sweep(spec, ["experiment.samples=10,20,30"], directory=out).computed == 1
-
-
-def test_a_misspelt_key_is_refused_before_anything_is_written(spec, stub, tmp_path):
-    with pytest.raises(SpecError) as caught:
-        run_sweep(spec, ["spectrum.ordr=1,2"], directory=tmp_path / "out")
-    assert caught.value.diagnostics[0].code == "unknown-key"
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_verb_that_is_not_there_is_refused(spec, tmp_path):
@@ -171,18 +165,6 @@ def test_listing_writes_nothing(spec, stub, tmp_path):
     listed = list(list_points(build_plan(spec, ["experiment.samples=6,7,8"]), out))
     assert [point.status for point in listed] == ["done", "failed", "pending"]
     assert (out / "points" / listed[0].key / "result.json").is_file()
-
-
-def test_other_peoples_directories_are_left_alone(spec, stub, tmp_path):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "notes.txt").write_text("mine")
-    with pytest.raises(OutputError) as caught:
-        run_sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
-    assert caught.value.diagnostics[0].code == "output-not-a-sweep"
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["notes.txt"]
-    with pytest.raises(OutputError) as caught:
-        run_sweep(spec, ["experiment.samples=10,20"], directory=spec)
-    assert caught.value.diagnostics[0].code == "output-not-a-directory"
 
 
 HOLD = """
@@ -247,8 +229,6 @@ def test_processes_give_what_one_process_gives(spec, tmp_path):
 
 def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):
     def full(outcome, directory, figures):
-        from inputdesign_cli.errors import Diagnostic
-
         raise OutputError(Diagnostic("output-full", "no space"))
 
     monkeypatch.setattr("inputdesign_cli.outcome.run_directory.write_run", full)
@@ -290,3 +270,164 @@ def test_a_layout_reads_results_before_failures(tmp_path):
     result = {"format": 1, "spec_sha256": hashlib.sha256(b"").hexdigest()}
     layout.adopt("k", {"spec.yaml": b"", "result.json": json.dumps(result).encode()})
     assert layout.read("k") == result
+
+
+def test_no_public_name_is_that_of_a_module():
+    """A module that is imported takes the place of the function of its name."""
+    modules = {module.name for module in pkgutil.iter_modules(inputdesign_cli.__path__)}
+    assert modules & {name for name in inputdesign_cli.__all__ if name != "__version__"} == set()
+
+
+def test_a_file_and_a_spec_give_the_same_frame(spec, stub, tmp_path):
+    varied = {"experiment.samples": np.array([10, 20]), "spectrum.order": "0:2:1"}
+    frames = [
+        sweep(str(spec), ["experiment.samples=10,20", "spectrum.order=0:2:1"]),
+        sweep(spec, varied),
+        sweep(load_spec(spec), varied),
+        sweep(parse_spec(SPEC + "sweep: {set: {experiment.samples: [10, 20], spectrum.order: '0:2:1'}}")),
+    ]
+    for frame in frames:
+        assert isinstance(frame, pandas.DataFrame)
+        pandas.testing.assert_frame_equal(frame.drop(columns="time_s"), frames[0].drop(columns="time_s"))
+        assert "run" not in frame
+    expected = [100 / n + 1 / (1 + m) for n in (10, 20) for m in (0, 1, 2)]
+    np.testing.assert_allclose(frames[0]["objective.value"], expected)
+
+
+def test_a_spec_names_files_from_its_folder(tmp_path, stub, monkeypatch):
+    text = SPEC.replace("{relative: 0.1}", "{table: r.csv}")
+    (tmp_path / "r.csv").write_text("frequency,r_adm\n0.1,1\n3.2,1\n")
+    stated = parse_spec(text, folder=tmp_path)
+    monkeypatch.chdir("/")
+    first = sweep(stated, "experiment.samples=10,20", directory=tmp_path / "out")
+    assert list(first["status"]) == ["optimal", "optimal"]
+    (tmp_path / "r.csv").write_text("frequency,r_adm\n0.1,2\n3.2,1\n")
+    sweep(stated, "experiment.samples=10,20", directory=tmp_path / "out")
+    assert stub == [10, 20, 10, 20]
+
+
+def test_a_directory_keeps_the_runs(spec, stub, tmp_path):
+    out = tmp_path / "out"
+    for _ in range(2):
+        frame = sweep(spec, {"experiment.samples": [10, 20]}, directory=out)
+    assert stub == [10, 20]
+    assert list(frame["run"]) == [row["run"] for row in rows(out)]
+    assert all((out / run).is_dir() for run in frame["run"])
+
+
+def test_points_without_a_result_are_rows(spec, stub):
+    frame = sweep(spec, {"experiment.samples": [6, 7, 9]})
+    assert list(frame["status"]) == ["optimal", "infeasible", "error"]
+    assert np.isfinite(frame["objective.value"]).tolist() == [True, False, False]
+
+
+def test_nothing_to_vary_is_an_error(spec, stub):
+    for settings in ((), {}, {"experiment.samples": 5}):
+        with pytest.raises(SpecError):
+            sweep(spec, settings)
+    assert stub == []
+
+
+def texts(*settings):
+    fixed, axes = parse_settings(settings)
+    return fixed, {axis.key: axis.texts for axis in axes}
+
+
+@pytest.mark.parametrize(
+    ("setting", "values"),
+    [
+        ("a=1,2,3", ("1", "2", "3")),
+        ("a= 1 , 2", ("1", "2")),
+        ("a=0:40:5", ("0", "5", "10", "15", "20", "25", "30", "35", "40")),
+        ("a=0:0.3:0.1", ("0", "0.1", "0.2", "0.3")),
+        ("a=0:1:0.4", ("0", "0.4", "0.8")),
+        ("a=3:1:-1", ("3", "2", "1")),
+        ("a=1e-3:2e-3:1e-3", ("0.001", "0.002")),
+        ("a=100:300:100", ("100", "200", "300")),
+        ("a={type: white},{type: fir, order: 3}", ("{type: white}", "{type: fir, order: 3}")),
+        ("a=[1, -0.5],[1, -0.6]", ("[1, -0.5]", "[1, -0.6]")),
+        ("a='x, y',\"z\"", ("'x, y'", '"z"')),
+        ("a=it's,b", ("it's", "b")),
+    ],
+)
+def test_values_of_a_setting(setting, values):
+    assert texts(setting) == ([], {"a": values})
+
+
+def test_a_single_value_holds_for_all_points():
+    assert texts("a=1", "b=[1, 2]", "c=1,2", "d=x = y") == (["a=1", "b=[1, 2]", "d=x = y"], {"c": ("1", "2")})
+
+
+@pytest.mark.parametrize(
+    ("setting", "code"),
+    [("a=0:40", "bad-range"), ("a=0:40:0", "bad-range"), ("a=0:40:-1", "bad-range"),
+     ("a=0:1:1e-9", "bad-range"), ("a=nan:4:1", "bad-range"), ("a=0:.inf:1", "bad-range"),
+     ("a=0:4:-Infinity", "bad-range"), ("a=1,,2", "bad-override"), ("a=1,2 a=3,4", "sweep-twice")],
+)  # fmt: skip
+def test_bad_settings(setting, code):
+    with pytest.raises(SpecError) as caught:
+        parse_settings(setting.split())
+    assert caught.value.diagnostics[0].code == code
+
+
+@pytest.mark.parametrize("lengths", [(1,), (3, 1), (2, 4, 3), (1, 2, 1, 2)])
+def test_a_grid_is_the_product_of_its_axes(lengths):
+    axes = [Axis(f"k{i}", tuple(map(str, range(n)))) for i, n in enumerate(lengths)]
+    assert list(Grid(tuple(axes))) == list(itertools.product(*(axis.texts for axis in axes)))
+
+
+def test_a_zipped_grid_goes_side_by_side():
+    grid = build_grid(None, [Axis("a", ("1", "2")), Axis("b", ("3", "4"))], zipped=True)
+    assert list(grid) == [("1", "3"), ("2", "4")]
+    assert grid.overrides(grid[1]) == ["a=2", "b=4"]
+
+
+@pytest.mark.parametrize(
+    ("axes", "zipped", "code"),
+    [
+        ([], False, "sweep-empty"),
+        ([Axis("a", ("1", "2")), Axis("b", ("3",) * 3)], True, "sweep-lengths"),
+        ([Axis("a", ("1",) * 1001), Axis("b", ("1",) * 1000)], False, "sweep-too-large"),
+    ],
+)
+def test_grids_that_are_refused(axes, zipped, code):
+    with pytest.raises(SpecError) as caught:
+        build_grid(None, axes, zipped=zipped)
+    assert caught.value.diagnostics[0].code == code
+
+
+BLOCK = {"set": {"a": [1, "white", {"type": "fir"}], "b": "0:0.2:0.1"}}
+
+
+def test_the_block_of_a_spec_and_the_command_line():
+    block = Sweep.model_validate(BLOCK)
+    grid = build_grid(block, [], zipped=False)
+    assert [axis.texts for axis in grid.axes] == [("1", "white", '{"type": "fir"}'), ("0", "0.1", "0.2")]
+    replaced = build_grid(block, [Axis("a", ("7", "8")), Axis("c", ("x", "y"))], zipped=False)
+    assert {axis.key: axis.texts for axis in replaced.axes} == {
+        "a": ("7", "8"), "b": ("0", "0.1", "0.2"), "c": ("x", "y")
+    }  # fmt: skip
+    assert build_grid(Sweep.model_validate(grid.block()), [], zipped=False) == grid
+
+
+GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
+
+
+@pytest.mark.parametrize(
+    ("block", "code", "key"),
+    [
+        ("sweep: {set: {a.b: 3}}\n", "wrong-shape", "sweep.set.a.b"),
+        ("sweep: {set: {a.b: []}}\n", "wrong-shape", "sweep.set.a.b"),
+        ("sweep: {set: {a.b: 0:4}}\n", "bad-range", "sweep.set.a.b"),
+        ("sweep: {set: [1, 2]}\n", "wrong-shape", "sweep.set"),
+        ("sweep: {zip: true}\n", "missing-key", "sweep.set"),
+        ("sweep: {sett: {a: [1]}}\n", "unknown-key", "sweep.sett"),
+    ],
+)
+def test_a_bad_block_is_a_complaint_of_the_spec(block, code, key):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(GOOD + block, "x.yaml")
+    diagnostic = caught.value.diagnostics[0]
+    assert diagnostic.code == code
+    assert diagnostic.key == key
+    assert diagnostic.location.line == 4

@@ -3,12 +3,24 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
-from inputdesign_cli.errors import Diagnostic, IdesignError, InfeasibleError, Location, OutputError, SpecError
-from inputdesign_cli.wizard.composing import compose, with_spectrum
-from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, in_their_words, question
-from tests.wizard.test_wizard import ENGINEER
+from inputdesign_cli import parse_spec
+from inputdesign_cli.errors import (
+    DataError,
+    Diagnostic,
+    IdesignError,
+    InfeasibleError,
+    Location,
+    OutputError,
+    SpecError,
+)
+from inputdesign_cli.wizard import composing
+from inputdesign_cli.wizard.composing import Conversation, compose, with_spectrum
+from inputdesign_cli.wizard.plants import system_of
+from inputdesign_cli.wizard.questions import KEYS, in_their_words, question
+from tests.support.wishes import ENGINEER
 
 GOOD = {
     "plant": "gain 2, time constant 180 s, dead time 25 s",
@@ -227,10 +239,6 @@ def test_a_file_that_cannot_be_written_is_no_fault_of_an_answer():
     assert caught.value.diagnostics == (Diagnostic("output-full", "there is no space left"),)
 
 
-def test_every_question_is_tried():
-    assert set(HOSTILE) == {one.key for one in QUESTIONS}
-
-
 @pytest.mark.slow
 def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
     """The peak of |S| of this loop is 4.04 dB."""
@@ -266,3 +274,122 @@ def test_a_controller_is_asked_for_only_where_there_is_none(loop, key):
     (told,) = error.value.diagnostics
     assert told.key == key
     assert ("let a controller hold" in told.hint) == (key == "loop")
+
+
+ANSWERS = GOOD | {"limits": "none", "drift": "no", "loop": "open", "signals": "any", "converter": "no"}
+
+
+def answered(talk, until=None):
+    """The conversation, answered as in ANSWERS up to the question of a key."""
+    while (one := talk.question) is not None and one.key != until:
+        assert talk.answer(ANSWERS[one.key]) is None, one.key
+    return talk
+
+
+def test_every_bad_answer_is_told_by_its_question_which_comes_again(tmp_path):
+    talk = Conversation({}, "x", tmp_path)
+    for key in KEYS:
+        for text in ("a kettle", "rest nothing.csv"):
+            assert talk.question.key == key
+            (told,) = talk.answer(text).diagnostics
+            assert (told.code, told.key) == ("bad-answer", key), text
+            assert talk.draft is None
+        assert talk.answer(ANSWERS[key]) is None
+    assert talk.question is None
+    assert talk.draft.spec().accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
+
+
+def test_what_only_all_answers_together_tell_leads_back_to_its_question(tmp_path):
+    """The loop of Skogestad's rule has a peak of 1.59 here: 1 dB cannot be asked of it."""
+    talk = answered(Conversation({"wish": "PI loop with 1 dB"}, "x", tmp_path), "converter")
+    assert talk.answer("no").diagnostics[0].code == "admissible-not-positive"
+    assert (talk.question.key, talk.draft) == ("wish", None)
+    assert talk.answer("PI loop with 6 dB") is None
+    assert talk.draft is not None
+
+
+def test_the_loop_that_a_wish_needs_is_asked_for_by_the_wish(tmp_path):
+    talk = answered(Conversation({"plant": "tank", "wish": "PI loop with 6 dB"}, "x", tmp_path), "loop")
+    told = talk.answer("open")
+    assert "no rule of tuning is at hand" in str(told)
+    assert talk.question.key == "wish"
+
+
+def test_a_plant_is_understood_once(tmp_path, monkeypatch):
+    """A log takes seconds to be explored."""
+    seen = []
+    real = composing.understand_plant
+    monkeypatch.setattr(composing, "understand_plant", lambda *a: (seen.append(a[0]), real(*a))[1])
+    answered(Conversation({}, "x", tmp_path))
+    assert seen == [ANSWERS["plant"]]
+
+
+def test_of_a_log_the_noise_is_not_asked(tmp_path):
+    talk = Conversation({"plant": "log log.csv", "wish": "prediction within 5 % up to 0.1"}, "x", tmp_path)
+    assert talk.question.key == "range"
+    known = {key: text for key, text in ANSWERS.items() if key not in ("noise", "drift", "converter")}
+    assert Conversation({**known, "plant": "log log.csv"}, "x", tmp_path).question.key == "converter"
+    assert Conversation(known, "x", tmp_path).question.key == "noise"
+
+
+_TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"num": [2], "den": [0, 0]}', "den of p.json is zero"),
+        ('{"num": [0], "den": [1, 1]}', "num of p.json is zero"),
+        ('{"num": [1, 2, 3], "den": [1, 1]}', "num of p.json has more entries than den"),
+        ("[1]", "valid dictionary"),
+        ('{"num": [NaN], "den": [1, 1]}', "num.0: "),
+        ('{"num": [1], "den": [1, Infinity]}', "den.1: "),
+        ('{"den": [1, 1]}', "num: Field required"),
+        ('{"num": [true], "den": [1, 1]}', "num.0: "),
+        ('{"num": [1], "den": [1, 1], "delay": "x"}', "delay: "),
+        ('{"num": [[1]], "den": [1, 1]}', "num.0: "),
+        ('{"num": 3, "den": [1, 1]}', "num: Input should be a valid list"),
+        ("[" * 100_000, "does not hold"),
+        ('{"num": [1], "den": [1, 1], "dealy": 25}', "dealy: Extra inputs are not permitted"),
+        ('{"num": [1], "den": [1, 1], "delay": null}', "delay: "),
+        ('{"num": [1], "den": [1, 1], "delay": NaN}', "delay: "),
+        ('{"num": [2], "den": [1, 0]}', 'write its dead time ("delay": 5), however small, or the lag'),
+        ('{"num": [2], "den": [1, 0, 1], "delay": 5}', "has no stable pole"),
+    ],
+)
+def test_what_is_wrong_is_told(tmp_path, text, words):
+    file = tmp_path / "p.json"
+    file.write_text(text)
+    with pytest.raises((SpecError, DataError)) as error:
+        system_of(file)
+    assert words in str(error.value)
+
+
+def test_an_integrator_is_known(tmp_path):
+    (tmp_path / "p.json").write_text(json.dumps(_TANK))
+    loop = "PI Kp 0.0005, Ti 3000"
+    draft = compose(GOOD | {"plant": "p.json", "loop": loop}, "s", tmp_path)
+    assert (draft.spec().sample_time, draft.spec().plant.continuous.delays) == (5.0, ((25.0,),))
+    plant = parse_spec(draft.text, design=False).plant
+    assert plant.kind == "continuous"
+    assert {one.label for one in plant.named_parameters} == {"b1", "b0", "a1", "L"}
+    matrix = plant.continuous
+    s = 1j * np.array([1e-4, 1e-2, 1.0])
+    found = np.polyval(matrix.numerator_matrix[0][0], s) / np.polyval(matrix.denominator_matrix[0][0], s)
+    assert found == pytest.approx(np.polyval(_TANK["num"], s) / np.polyval(_TANK["den"], s), rel=1e-12)
+
+
+def test_a_pure_integrator_is_sampled_by_its_dead_time(tmp_path):
+    """As the template `tank`: 0.05 exp(-5 s)/s."""
+    (tmp_path / "p.json").write_text(json.dumps({"num": [0.05], "den": [1, 0], "delay": 5}))
+    draft = compose(GOOD | {"plant": "p.json", "loop": "PI Kp 0.8, Ti 60"}, "s", tmp_path)
+    assert "sample_time: 2  # half the dead time, or a little less" in draft.text
+    plant = draft.spec().plant
+    assert {one.label for one in plant.named_parameters} == {"b0", "L"}
+
+
+def test_a_zero_that_cancels_the_integrator_leaves_none(tmp_path):
+    for name, num, den in (("a", [2, 0], [180, 1, 0]), ("b", [2], [180, 1])):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"num": num, "den": den}))
+    one, other = (system_of(tmp_path / f"{name}.json") for name in "ab")
+    assert one.lines[1:] == other.lines[1:]

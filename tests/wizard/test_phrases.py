@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard.composing import compose
-from tests.wizard.test_wizard import ENGINEER
+from tests.support.wishes import ENGINEER
 
 PHRASES = {
     "plant": [
@@ -105,9 +105,16 @@ def test_hertz_are_no_radians():
     assert (float(low), float(high)) == pytest.approx((2 * np.pi / 3600, 0.005 * 2 * np.pi), rel=1e-4)
 
 
-@pytest.mark.parametrize("text", ["gain 2,5, time constant 180", "gain 2, time constant 2,5 min"])
-def test_a_decimal_comma_is_no_separator(text):
-    with pytest.raises(SpecError, match="number with a comma"):
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("gain 2,5, time constant 180", "number with a comma"),
+        ("gain 2, time constant 2,5 min", "number with a comma"),
+        ("gain 2, time constant 180 s, each within 12,5 %", "12,5 is a number with a comma"),
+    ],
+)
+def test_a_decimal_comma_is_no_separator_and_is_told_whole(text, told):
+    with pytest.raises(SpecError, match=told):
         written("plant", text)
 
 
@@ -130,11 +137,6 @@ def test_noise_at_rest_has_its_own_sample_time(tmp_path, every, head):
 def test_a_unit_is_that_of_both_ends_of_a_band(said):
     low, high = json.loads(entry("band", written("wish", f"Bode plot within 5 % {said}")).split("]")[0] + "]")
     assert (low, high) == pytest.approx((0.002 * np.pi, 0.01 * np.pi), rel=1e-5)
-
-
-def test_a_number_with_a_comma_is_told_whole():
-    with pytest.raises(SpecError, match="12,5 is a number with a comma"):
-        written("plant", "gain 2, time constant 180 s, each within 12,5 %")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Maximise quadratic forms of a few lags over all signals of given letters, by dynamic programming.
 
-A signal takes its values, one a sample, from an alphabet of letters: vectors (r,) of what the inputs may be.
+A signal takes its values, one a sample, from an alphabet of letters: vectors (r,) of the inputs.
 The form sum_t u_t^T Q_0 u_t + 2 sum_k u_t^T Q_k u_(t-k), k < m, is a sum over windows of m letters. Walks on
 the graph of windows are the signals, so that its largest mean is that of the best cycle.
 """
@@ -108,8 +108,9 @@ class Windows:
 
     def largest_sum(self, form: Array, samples: int) -> tuple[float, Array]:
         """Return the largest form (m, r, r) of records of this length from rest, and that record."""
-        if self.length > samples:  # lags beyond the record do not count
-            return Windows(self.letters, max(samples, 2)).largest_sum(form[: max(samples, 2)], samples)
+        fewest = max(samples, 2)
+        if self.length > fewest:  # lags beyond the record do not count
+            return Windows(self.letters, fewest).largest_sum(form[:fewest], samples)
         size, m = len(self.letters), self.length
         rewards = self._rewards(form)
         values = np.zeros(self.states)

@@ -121,10 +121,7 @@ def _certified(
                 fixed_lower += w * row.bound
     if price is None:
         raise ValueError("a goal with s needs an upper limit")
-    # Of several costs each is that of a plant; their densities are looked at where they may change fast.
-    paid = np.flatnonzero(proof.costs) if proof.costs.size > 1 else np.zeros(0, dtype=int)
-    grid = problem.gradients.grid_of(sorted({*weighty_ones(weights), *paid.tolist()}))
-    lift = lifted = 0.0
+    grid, lift, lifted = _grid(problem, weights, proof.costs), 0.0, 0.0
     if any(row.form is not None for row in rows):
         grid = problem.with_form_grid(grid)
         price, lift = _lifted(problem, price, grid)
@@ -139,8 +136,7 @@ def _certified(
         scaled = float(np.sum(weights * problem.scaled_information))
         spent = upper + t * (scaled - lower - scaled_required)
         bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
-    if bound <= 0.0:
-        t = 0.0
+    t = t if bound > 0.0 else 0.0
     forms = [(row, w) for row, w in zip(rows, of_rows, strict=True) if row.form is not None]
     shares = np.zeros(len(problem.limits))
     for row, w in zip(rows, of_rows, strict=True):
@@ -157,6 +153,12 @@ def _certified(
         form=unit * _raised(sum(w * row.form for row, w in forms), lift) if forms else None,
         form_share=unit * (lifted + sum(w * row.bound for row, w in forms)),
     )
+
+
+def _grid(problem: Problem, weights: NDArray[np.float64], costs: Array) -> Array:
+    """Return the frequencies at which the plants that matter, and whose cost is paid, may change fast."""
+    paid = np.flatnonzero(costs) if costs.size > 1 else np.zeros(0, dtype=int)
+    return problem.gradients.grid_of(sorted({*weighty_ones(weights), *paid.tolist()}))
 
 
 def _lifted(problem: Problem, price: Functional, grid: Array) -> tuple[Functional, float]:

@@ -50,7 +50,7 @@ class RecordBound:
 
 
 def amplitude_of(limits: tuple[PowerLimit, ...], inputs: int) -> Array | None:
-    """Return the largest modulus of each input (r,); None where one has no limit."""
+    """Return the largest modulus of each input (r,); None if one has no limit."""
     found = np.full(inputs, np.inf)
     for limit in limits:
         if limit.implied and limit.kind == "input":
@@ -73,7 +73,7 @@ def bound_over_records(
         hold: the samples for which each value is held.
 
     Returns:
-        None where no such bound is known: in a loop, without an amplitude, for costs of outputs.
+        None if no bound is known: in a loop, without an amplitude, for costs of outputs.
     """
     inputs = problem.experiment.inputs
     amplitude = amplitude_of(problem.limits, inputs)

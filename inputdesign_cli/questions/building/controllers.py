@@ -21,11 +21,7 @@ from inputdesign_cli.specification.models.transfer import DiscreteMatrix
 def controller_matrix(
     controller: loop.Controller, sample_time: float, channels: tuple[int, int]
 ) -> TransferMatrix:
-    """Return C of the loop u = r - C y.
-
-    Args:
-        channels: numbers of inputs and of outputs.
-    """
+    """Return C of the loop u = r - C y, for these numbers of inputs and outputs."""
     match controller:
         case DiscreteMatrix():
             return TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
@@ -64,32 +60,23 @@ class Process:
 
 
 def loop_controller(spec: Spec, stated: loop.LoopMargin, model: Model) -> loop.Controller | None:
-    """Return C of the loop to be kept: tuned, stated, or the controller of the experiment.
+    """Return C of the loop to be kept: tuned on the model, stated, or of the experiment.
 
-    An uncertain plant has settings for each scenario, since the rules will be applied to the estimate.
-
-    Args:
-        model: of the plant of the spec, possibly with other values of its named parameters.
-
-    Raises:
-        SpecError: `not-supported` for plants that the rules are not made for.
+    An uncertain plant has settings for each scenario, since the rules will be applied to the estimate. Raises
+    `SpecError` (`not-supported`) for plants that the rules are not made for.
     """
     if stated.tuning is None:
         return stated.controller or spec.experiment.controller
-    return loop.PidController(pid=tuned(process_of(_with_values(spec, model)), stated.tuning))
-
-
-def _with_values(spec: Spec, model: Model) -> Spec:
-    """Return the spec with the values of a model for the named parameters of its plant."""
     if spec.plant.kind != "continuous":
-        return spec
+        return loop.PidController(pid=tuned(process_of(spec), stated.tuning))
     values = dict(zip(model.names, model.theta.tolist(), strict=True))
     changes: dict[str, object] = {
         ".".join(("plant", *map(str, known.place))): values[known.label]
         for known in spec.plant.named_parameters
         if values.get(known.label, known.value) != known.value
     }
-    return spec.with_(**changes) if changes else spec
+    there = spec.with_(**changes) if changes else spec
+    return loop.PidController(pid=tuned(process_of(there), stated.tuning))
 
 
 def tuned(process: Process, tuning: loop.Tuning) -> loop.Pid:
@@ -113,10 +100,7 @@ def tuned(process: Process, tuning: loop.Tuning) -> loop.Pid:
 
 
 def process_of(spec: Spec) -> Process:
-    """Return gain, time constant and dead time of the nominal plant; the half rule shares a second lag.
-
-    Raises `SpecError`: `not-supported`.
-    """
+    """Return the nominal plant, by the half rule if it has a second lag; or raise `SpecError`."""
     plant = spec.plant
 
     def refuse(why: str) -> SpecError:

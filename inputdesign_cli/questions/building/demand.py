@@ -42,11 +42,7 @@ def check_model(spec: Spec, model: Model) -> None:
 
 
 def check_effects(spec: Spec, experiment: Experiment) -> None:
-    """Refuse plants with a parameter that changes G by no more than rounding.
-
-    The change is a shift by the whole value; a parameter that is zero must have some effect on G. Raises
-    `SpecError`: `without-effect`.
-    """
+    """Refuse a parameter that changes G by no more than rounding (`SpecError`, `without-effect`)."""
     model, (lo, hi) = experiment.model, experiment.band
     w = np.union1d(np.linspace(lo, hi, _PROBES + 1)[1:-1], np.geomspace(max(lo, 1e-4 * hi), hi, _PROBES)[:-1])
     G, slope = np.abs(model.plant_at(w)), np.abs(model.plant_gradient(w))
@@ -68,8 +64,7 @@ def check_effects(spec: Spec, experiment: Experiment) -> None:
 def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
     """Refuse convex designs that do not fit into memory, or whose first rounds exceed the time limit.
 
-    A program has a matrix inequality of the order of the information matrix for each frequency that binds.
-    Raises `SpecError`: `too-large`.
+    A program has a matrix inequality for each frequency that binds. Raises `SpecError`: `too-large`.
     """
     size = experiment.size
     if basis.size * size**2 * 8 > _MOST_BYTES:
@@ -97,10 +92,7 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
 
 
 def check_record(spec: Spec, parameters: int) -> None:
-    """Refuse records that are too long; without a section `signal` they are left out later.
-
-    Raises `SpecError`: `too-large`.
-    """
+    """Refuse records that are too long, if a signal is asked for; raises `SpecError` (`too-large`)."""
     room = longest_record(parameters, spec.plant.outputs)
     samples = spec.signal_samples
     stated = "signal" in spec.model_fields_set and spec.goal != "shortest_experiment"
@@ -134,8 +126,8 @@ _MARGIN = 0.01
 def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     """Return the experiment with a finite information matrix: its band starts at the lowest line.
 
-    Near a pole at z = 1 outside a loop, the gradient of the prediction has no bound. The information of any
-    power there has no bound either. Raises `SpecError`: `infinite-information`.
+    Near a pole at z = 1 outside a loop, gradient and information of any power have no bound. Raises
+    `SpecError`: `infinite-information`, `infinite-output`.
     """
     source = experiment.model if experiment.loop is None else experiment.loop
     if not experiment.model.continuous:

@@ -36,10 +36,7 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
 
 
 def implied_limits(spec: Spec) -> list[PowerLimit]:
-    """Return the limits on powers that follow from limits on single samples: a^2 from |u| <= a.
-
-    Values that are held over h samples move once in h samples.
-    """
+    """Return the limits on powers that follow from limits on samples and moves: a^2 from |u| <= a."""
     kinds: list[PowerKind] = ["input", "output", "moves"]
     most = [*stated_peaks(spec), stated_moves(spec) if spec.plant.sampled else None]
     return [
@@ -52,10 +49,7 @@ def implied_limits(spec: Spec) -> list[PowerLimit]:
 
 
 def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
-    """Return the bounds on the density of the excitation at every frequency of its band.
-
-    Raises `SpecError` or `DataError`: a curve cannot be used, or the lower bound crosses the upper one.
-    """
+    """Return the bounds on the density of the excitation at every frequency of its band."""
     stated = spec.limits.spectrum
     if stated is None:
         return []
@@ -87,10 +81,7 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
 def _level(
     spec: Spec, curve: Curve, key: str, band: tuple[float, float]
 ) -> tuple[Callable[[Array], Array], Array, ComplexArray, float | None]:
-    """Return the level over frequency in rad/sample, its kinks, points of fast change, and its zero.
-
-    Raises `SpecError`: `bad-limit`, it is infinite somewhere in the band.
-    """
+    """Return the level over frequency, its kinks, points of fast change, and its zero; or raise."""
     nowhere, smooth = np.zeros(0), np.zeros(0, dtype=complex)
     if isinstance(curve, float | int):
         constant = float(curve)

@@ -62,16 +62,10 @@ def required_band(
 def build_model_errors(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> list[OnModelError]:
-    """Return the bounds on the model error, stated or of a loop, in raw coordinates.
+    """Return the bounds on the model error, stated or of a loop: one for each entry of G, or of the norm.
 
-    There is one for each entry of G that is present, or one of the norm; none if none is asked for.
-
-    Args:
-        nominal: the plant of the spec, if the experiment is on a scenario; r_adm may follow from either.
-
-    Raises:
-        SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
-        DataError: the table cannot be used.
+    On a scenario, r_adm may follow from the `nominal` plant. Raises `SpecError`: the form is not
+    supported, or r_adm is not positive somewhere in the band. Or `DataError`: the table cannot be used.
     """
     error = spec.accuracy.error
     if error is None:
@@ -124,7 +118,18 @@ def _on_entry(
         admissible = accuracy.Weighted(admissible, weight)
     bound: Callable[..., OnModelError] = accuracy.ModelError
     if error.region == "ellipsoid":
-        _check_fraction(spec, model, entry)
+        message = hint = ""
+        if entry is None:
+            message = "region: ellipsoid is for the entries of G one by one, not for the norm of the error"
+            hint = "use region: first_order, or norm: entry with relative, absolute or table"
+        elif np.any(model.bends(*entry)):
+            named = units.entry(*entry) or "G"
+            message = f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not"
+            hint = (
+                "use region: first_order for this structure (A and F, sampled from s, an estimated dead time)"
+            )
+        if message:
+            raise spec.complain("not-supported", message, hint=hint, key=f"{_KEY}.region")
         bound = partial(accuracy.EllipsoidError, against="absolute" if error.relative is None else "relative")
     alpha = model_error_alpha(spec, model)
     made = bound(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
@@ -156,7 +161,7 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
     """Raise `SpecError` (`unbounded-error`) if no information is enough for the requirement.
 
-    Near a pole of G on the unit circle, the error of G by an error of the pole grows faster than G itself.
+    Near a pole of G on the unit circle, an error of the pole makes an error of G that grows faster than G.
     """
     lo, hi = requirement.band
     units = build_units(spec)
@@ -173,20 +178,6 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
             rest = f"{rounded_up(low / units.frequency, 4)}, {rounded_down(high / units.frequency, 4)}"
             hint = f"leave that frequency out: {key}.band: [{rest}]"
             raise spec.complain("unbounded-error", message, hint=hint, key=key)
-
-
-def _check_fraction(spec: Spec, model: Model, entry: accuracy.Entry | None) -> None:
-    """Raise `SpecError` (`not-supported`) unless the entry is a fraction affine in the parameters."""
-    key = f"{_KEY}.region"
-    if entry is None:
-        message = "region: ellipsoid is for the entries of G one by one, not for the norm of the error"
-        hint = "use region: first_order, or norm: entry with relative, absolute or table"
-        raise spec.complain("not-supported", message, hint=hint, key=key)
-    if np.any(model.bends(*entry)):
-        named = build_units(spec).entry(*entry) or "G"
-        message = f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not"
-        hint = "use region: first_order for this structure (A and F, sampled from s, an estimated dead time)"
-        raise spec.complain("not-supported", message, hint=hint, key=key)
 
 
 def _admissible(
@@ -209,7 +200,7 @@ def _admissible(
 def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> accuracy.Table:
     """Return one column of a file, positive over the whole `band` of the section that has `key`.
 
-    Raises `DataError`: the file cannot be read, or does not have the column on the whole band (`bad-table`).
+    Raises `DataError`: the file cannot be read, or lacks the column somewhere in the band (`bad-table`).
     """
     units = build_units(spec)
     columns = read_frequency_table(spec, name, [column], key)

@@ -13,26 +13,17 @@ from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.specification import Spec, load_estimate
-from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
-    """Return a list of one dead time for each entry that has one, else an empty list; () if none has.
-
-    See `Expression.present`.
-    """
-    terms = plant.stated_terms.delay
+    """Return rows of lists of one dead time, empty where none is present; () if no entry has one."""
+    terms = plant.terms.delay
     rows = tuple(
         tuple(np.array([value] if terms[i][j].present else []) for j, value in enumerate(row))
         for i, row in enumerate(plant.continuous.delays)
     )
     return rows if any(entry.size for row in rows for entry in row) else ()
-
-
-def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
-    """Return the degree of each numerator, -1 for an absent entry; see `Expression.present`."""
-    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_terms.numerator]
 
 
 def reparametrised(
@@ -116,7 +107,7 @@ def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
 
 
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
-    """Return a matrix over some named parameters as one (k, k) over all `known`; no names stand for all.
+    """Return a matrix over some named parameters, or all, as one (k, k) over all `known`.
 
     Raises `SpecError`: `unknown-parameter` or `wrong-shape`.
     """
@@ -137,10 +128,10 @@ PRIOR = "experiment.prior.information"
 
 
 def stated_prior(spec: Spec, names: Sequence[str]) -> tuple[Array, Mapping[str, float] | None] | None:
-    """Return the information (k, k) about all parameters that the spec states, and their values, if stated.
+    """Return the stated information (k, k) about all parameters, and their values if stated.
 
-    It may stand in a model file; None for a record, or no prior. Raises `SpecError`: `bad-model-file`, or the
-    prior does not fit the parameters.
+    It may stand in a model file. None for a record, or no prior. Raises `SpecError`: `bad-model-file`, or
+    it does not fit the parameters.
     """
     prior = spec.experiment.prior
     if prior is None:
@@ -165,10 +156,7 @@ def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
 
 
 def inverse(covariance: Array) -> Array:
-    """Return the inverse of a covariance or information matrix (k, k), by way of correlations.
-
-    Raises `LinAlgError`: it is singular.
-    """
+    """Return the inverse (k, k) of a covariance or information matrix; `LinAlgError` if it is singular."""
     scale = np.sqrt(np.diag(covariance))
     if not np.all(scale > 0.0):
         raise np.linalg.LinAlgError

@@ -18,13 +18,9 @@ _PRIOR = {*SOURCES, "parameters"}
 
 
 def restated(spec: Spec, model: Model, source: str) -> Spec:
-    """Return the spec with a model in place of its nominal plant and noise; no design need be asked for.
+    """Return the spec with a model in place of plant and noise; diagnostics name its `source`.
 
-    Args:
-        source: what diagnostics about the model name as its file.
-
-    Raises:
-        SpecError: the spec does not go with this model.
+    No design need be asked for. Raises `SpecError`: the spec does not go with this model.
     """
     return spec.revised(blocks_of(model), file=source, design=False)
 
@@ -33,15 +29,11 @@ def restated(spec: Spec, model: Model, source: str) -> Spec:
 class Change:
     """Describes how the design of a part differs from the design of the whole experiment.
 
-    Attributes:
-        samples: of the experiment that is planned; `seed`: of its record.
-        information: (k, k) of the data so far, raw parameters; None: as the spec states it.
-        uncertainty: the plants that the design must suffice for: the estimate alone, the plants of the spec,
-            or all plants that the data leave open.
-        white: whether the spectrum is flat.
-        goes_on: whether another part follows, in which effects of this one remain. Its record has the power
-            of the design then, and does not make up for its own end.
-        best: whether limits leave no experiment that suffices, so that the best one within them is sought.
+    The part has its own `samples` and `seed`. `information` (k, k) is of the data so far, in raw
+    parameters; None: as the spec states it. `uncertainty` says which plants the design must suffice for:
+    the estimate alone, as stated, or all that the data leave open. A `white` spectrum is flat. If another
+    part follows (`goes_on`), the record has the power of the design and does not make up for its own end.
+    `best` seeks the best experiment within limits that leave none that suffices.
     """
 
     samples: int
@@ -55,21 +47,13 @@ class Change:
 
 @dataclass(frozen=True)
 class Rebuild(Generic[Built]):
-    """Builds an object of a question again, at another model and with a change.
-
-    Attributes:
-        sections: of the spec; nothing else may read them after building.
-        build: makes the object.
-    """
+    """Builds an object of a question again from its `sections`, at another model and with a change."""
 
     sections: Spec
     build: Callable[[Spec], Built]
 
     def at(self, model: Model | None, change: Change | None = None) -> Built:
-        """Return the object at a model; None is the plant of the spec.
-
-        Raises `IdesignError`: it cannot be built of this model.
-        """
+        """Return the object at a model, or the plant of the spec; `IdesignError` if it cannot be built."""
         values: dict[str, object] = {} if model is None else {**blocks_of(model)}
         if change is not None:
             values |= self._changed(change, model)

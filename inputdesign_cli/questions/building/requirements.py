@@ -38,32 +38,36 @@ def build_requirements(
 ) -> list[RequirementFactory]:
     """Return a maker for each requirement of `accuracy`, in the order of the contract.
 
-    Requirements over frequency are made entry by entry of G.
-
-    Args:
-        nominal: the plant of the spec, if the experiment is on a scenario.
-
-    Raises:
-        SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
-            cannot be met or is not supported.
-        DataError: a table cannot be used.
+    Requirements over frequency are made entry by entry of G. On a scenario, `nominal` is the plant of the
+    spec. Raises `SpecError`: a name that the model does not have, a matrix of the wrong size, a
+    requirement that cannot be met or is not supported. Or `DataError`: a table cannot be used.
     """
-    found: list[RequirementFactory] = []
-    for key in spec.accuracy.requirements:
-        if key in ("model_error", "loop"):
-            found += [_maker(error) for error in model_error.build_model_errors(spec, experiment, nominal)]
-        elif key in added("requirements"):
-            found += cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
-        else:
-            found += _BUILDERS[key](spec, experiment)
+    accuracy, found = spec.accuracy, list[RequirementFactory]()
+    for key in accuracy.requirements:
+        match key:
+            case "model_error" | "loop":
+                found += [_maker(one) for one in model_error.build_model_errors(spec, experiment, nominal)]
+            case "information" if (stated := accuracy.information) is not None:
+                found.append(_target(spec, experiment, stated.matrix, stated.parameters, key))
+            case "application" if (asked := accuracy.application) is not None:
+                # M >= (chi2 gamma / 2) V'', chi2 the quantile for the parameters of the hessian
+                chi2 = model_error.confidence_factor(asked.confidence, len(asked.parameters)) ** 2
+                hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
+                found.append(_target(spec, experiment, hessian, asked.parameters, key))
+            case "standard_deviation":
+                for name, most in (accuracy.standard_deviation or {}).items():
+                    found.append(_target(spec, experiment, [[1.0 / most**2]], (name,), key, f" of {name}"))
+            case "weighted_variance":
+                found += _weighted_variances(spec, experiment)
+            case _ if key in added("requirements"):
+                found += cast(AddedRequirement, accuracy.at(key)).build(spec, experiment)
+            case _:
+                raise KeyError(key)
     return found
 
 
 def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
-    """Return the maker of `accuracy.criterion`, of the parameters or of their relative errors.
-
-    Raises `SpecError`: `zero-parameter` when a relative error of a parameter that is zero is asked for.
-    """
+    """Return the maker of `accuracy.criterion`; `SpecError` (`zero-parameter`) without a relative error."""
     letter = spec.accuracy.criterion
     if letter is None:
         return None
@@ -86,10 +90,7 @@ def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment]
 def build_asked(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
-    """Return the makers of the goal of a design, and of the requirements besides a criterion.
-
-    Raises `SpecError` or `DataError`: see `build_requirements` and `build_criterion`.
-    """
+    """Return the makers of the goal of a design, and of the requirements besides a criterion; or raise."""
     requirements = build_requirements(spec, experiment, nominal)
     criterion = build_criterion(spec, experiment)
     return (requirements, []) if criterion is None else ([criterion], requirements)
@@ -121,28 +122,6 @@ def stated_bounds(spec: Spec) -> list[StatedBound]:
     ]
 
 
-def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    stated = spec.accuracy.information
-    assert stated is not None
-    return [_target(spec, experiment, stated.matrix, stated.parameters, "accuracy.information")]
-
-
-def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    """Require M >= (chi2 gamma / 2) V'', chi2 the quantile for the parameters of the hessian."""
-    asked = spec.accuracy.application
-    assert asked is not None
-    chi2 = model_error.confidence_factor(asked.confidence, len(asked.parameters)) ** 2
-    hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
-    return [_target(spec, experiment, hessian, asked.parameters, "accuracy.application")]
-
-
-def _standard_deviations(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    return [
-        _target(spec, experiment, [[1.0 / most**2]], (name,), "accuracy.standard_deviation", f" of {name}")
-        for name, most in (spec.accuracy.standard_deviation or {}).items()
-    ]
-
-
 def _maker(requirement: OverFrequency) -> RequirementFactory:
     return lambda experiment: replace(requirement, experiment=experiment)
 
@@ -150,9 +129,8 @@ def _maker(requirement: OverFrequency) -> RequirementFactory:
 def _target(
     spec: Spec, raw: Experiment, matrix: ArrayLike, names: Sequence[str] | None, key: str, of: str = ""
 ) -> RequirementFactory:
-    full = embedded(spec, raw.model.names, np.array(matrix, dtype=float), names, key)
-    label = key.removeprefix("accuracy.") + of
-    return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
+    full = embedded(spec, raw.model.names, np.array(matrix, dtype=float), names, f"accuracy.{key}")
+    return lambda experiment: InformationTarget(experiment.whiten_matrix(full), key + of)
 
 
 def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
@@ -167,26 +145,14 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
     found = [bound(entry=entry, relative=stated.relative) for entry in entries]
     for variance in found:
         model_error.check_bounded(spec, variance, key)
-        if stated.relative:
-            _check_nowhere_zero(spec, variance)
+        if not stated.relative:
+            continue
+        units, size = build_units(spec), variance.nominal_size(variance.grid)
+        if size.min() <= _RELATIVE_ZERO * np.median(size):
+            at = units.named(variance.grid[int(np.argmin(size))])
+            entry = variance.entry
+            named = f"entry {units.entry(*entry)} of G" if entry and not units.single else "G"
+            message = f"{named} vanishes at {at}: its relative variance is infinite there"
+            hint = "restrict `band` to the frequencies that matter"
+            raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
     return [_maker(variance) for variance in found]
-
-
-def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
-    """Raise `SpecError` (`admissible-not-positive`) if G vanishes: its relative variance is infinite."""
-    units, size = build_units(spec), variance.nominal_size(variance.grid)
-    if size.min() <= _RELATIVE_ZERO * np.median(size):
-        at = units.named(variance.grid[int(np.argmin(size))])
-        named = f"entry {units.entry(*variance.entry)} of G" if variance.entry and not units.single else "G"
-        message = f"{named} vanishes at {at}: its relative variance is infinite there"
-        hint, key = "restrict `band` to the frequencies that matter", "accuracy.weighted_variance"
-        raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
-
-
-_BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
-    "information": _information,
-    "application": _application,
-    "weighted_variance": _weighted_variances,
-    "standard_deviation": _standard_deviations,
-    "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
-}

@@ -28,8 +28,7 @@ _SEARCHED = 2
 def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     """Return the requirements of the spec on its record, for a model with a number of parameters.
 
-    Raises:
-        SpecError: `needs-band`; `too-large`; `beyond-nyquist` when samples are too far apart for the band.
+    Raises `SpecError`: `needs-band`, `too-large`, `beyond-nyquist`.
     """
     check_record(spec, parameters)
     step, limits, signal = record_step(spec), spec.limits, spec.signal
@@ -59,11 +58,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
 
 
 def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettings:
-    """Return the settings of the signal; its type and phases, if not stated, follow from other keys.
-
-    Args:
-        method: in place of the type of the spec.
-    """
+    """Return the settings of the signal of a type; what is not stated follows from other keys."""
     signal, inputs = spec.signal, spec.plant.inputs
     method = method or _method(spec)
     limited = spec.limits.amplitude is not None or spec.limits.rate is not None
@@ -113,11 +108,7 @@ def stated_moves(spec: Spec) -> Array | None:
 
 
 def build_bounds(spec: Spec) -> Bounds:
-    """Return the bounds on single samples of the record, channel by channel.
-
-    Samples count from a value of the converter. If the offset lies between two values, the peak is reduced by
-    the difference.
-    """
+    """Return the bounds on single samples; an offset between two values of a converter lowers the peak."""
     amplitude, output = stated_peaks(spec)
     if amplitude is not None:
         amplitude = amplitude - np.abs(_offsets(spec) - operating_points(spec))
@@ -187,17 +178,13 @@ _STEPS_ROUNDING = 1e-12
 
 
 def check_signal(spec: Spec) -> None:
-    """Refuse settings that no record can have.
+    """Refuse settings that no record can have: of length, of the kind of signal, and of single samples.
 
-    Raises `SpecError`: `conflicting-keys` when the samples are no whole number of periods of held values, or
-    the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few levels, and
-    for ramps between levels without a limit on moves; `out-of-range`; `coarse-converter` when a limit is
-    below the converter's step; `no-sample-rate` for a WAV file of a sampling rate that is not a whole number
-    of hertz.
+    Raises `SpecError`: `conflicting-keys`, `unsuitable-key`, `out-of-range`, `coarse-converter`, `not-
+    supported`, `no-sample-rate`.
     """
     settings = build_signal_settings(spec)
-    fixed = spec.goal != "shortest_experiment" or spec.signal.samples is not None
-    if fixed:
+    if spec.goal != "shortest_experiment" or spec.signal.samples is not None:
         _check_length(spec, settings)
     _check_kind(spec, settings)
     for channel in range(spec.plant.inputs):

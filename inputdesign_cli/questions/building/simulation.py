@@ -14,13 +14,9 @@ from inputdesign_cli.specification.models.experiment import Noise
 
 
 def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
-    """Return the study of `simulate`, except for the design or the given excitation.
+    """Return the study of `simulate` without its excitation, for the nominal experiment with its prior.
 
-    Args:
-        nominal: the experiment on the design model, in raw parameters, prior information included.
-
-    Raises:
-        SpecError: a loop that is unstable with the true plant.
+    Raises `SpecError`: a loop that is unstable with the true plant.
     """
     study = spec.simulation or SimulationSection()
     return Simulation(
@@ -46,10 +42,7 @@ def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
 
 
 def _true_system(spec: Spec) -> TrueSystem | None:
-    """Return the system of `simulation.plant` and `simulation.noise`; None if neither is stated.
-
-    Raises `SpecError`: the loop is stable with the nominal plant, and unstable with the true one.
-    """
+    """Return the system that `simulation` states, or None; `SpecError` if its loop is unstable."""
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):
         return None

@@ -42,20 +42,20 @@ class AddedSpectrum(Protocol):
 
 
 def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
-    """Return the family of `spectrum`; by default FIR of order 20 for a sampled plant.
+    """Return the family of `spectrum` in a band of the excitation; by default FIR of order 20 if sampled.
 
-    Args:
-        band: of the excitation, see `excitation_band`.
-
-    Raises:
-        SpecError: `not-supported` for families of other kinds of design, `missing-key`; `bad-limit` for
-            limits that the family cannot keep.
+    Raises `SpecError`: `not-supported` for families of other kinds of design, `missing-key`, `bad-limit`.
     """
     match spec.spectrum:
         case WhiteSpectrum():
             basis: Basis = FlatBasis(inputs, band)
         case PolynomialSpectrum() as stated:
-            _check_inside(spec, stated)
+            limit, (lo, hi) = spec.limits.band, stated.band
+            if limit is not None and (lo < limit[0] * (1 - _SAME) or hi > limit[1] * (1 + _SAME)):
+                bounds = f"limits.band, [{limit[0]:g}, {limit[1]:g}]"
+                message = f"the band of the spectrum, [{lo:g}, {hi:g}], leaves {bounds}"
+                hint = "narrow spectrum.band; limits.band is not needed, a polynomial spectrum has its own"
+                raise spec.complain("bad-limit", message, hint=hint, key="spectrum.band")
             complex_valued = stated.coefficients == "complex"
             basis = PolynomialBasis(inputs, stated.order, band, complex_valued, stated.basis)
         case FreeSpectrum():
@@ -98,22 +98,10 @@ def _fir(spec: Spec, inputs: int, order: int) -> FirBasis:
     return FirBasis(inputs, order)
 
 
-def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
-    """Refuse a polynomial spectrum whose own band exceeds limits.band."""
-    limit, (lo, hi) = spec.limits.band, stated.band
-    if limit is not None and (lo < limit[0] * (1 - _SAME) or hi > limit[1] * (1 + _SAME)):
-        bounds = f"limits.band, [{limit[0]:g}, {limit[1]:g}]"
-        message = f"the band of the spectrum, [{lo:g}, {hi:g}], leaves {bounds}"
-        hint = "narrow spectrum.band; limits.band is not needed, a polynomial spectrum has its own"
-        raise spec.complain("bad-limit", message, hint=hint, key="spectrum.band")
-
-
 def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, float]) -> Array:
     """Return the stated frequencies in the experiment's unit, or evenly spaced ones in the band.
 
-    `lines: L` in discrete time are l pi / L, l = 1 .. L, the harmonics of a period of 2 L samples up to the
-    Nyquist frequency, where a spectrum is real. In continuous time they are evenly spaced inside
-    the band.
+    `lines: L` in discrete time are the harmonics l pi / L, l = 1 .. L, of a period of 2 L samples.
     """
     if stated.frequencies:
         given = np.array(stated.frequencies)
@@ -143,9 +131,8 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
     """Return the spectrum of `r` inputs in a table, and its coefficients.
 
     Columns phi, or phi_11, phi_12_re, phi_12_im, phi_22, .. are a density, linear in between. Columns power,
-    or power_11, .. are the powers of sinusoids at these frequencies, their mean squares. Raises `DataError`:
-    the file cannot be read, or holds no spectrum (`bad-table`). Or `SpecError`: `too-large` for more
-    sinusoids than `spectrum.given.frequencies` takes.
+    or power_11, .. are the mean squares of sinusoids. Raises `DataError` (`bad-table`, or it cannot be read),
+    or `SpecError` (`too-large`) for too many sinusoids.
     """
     path = spec.resolve_path(name)
     lines = has_column(path, _POWER, key=_KEY) and not has_column(path, _DENSITY, key=_KEY)

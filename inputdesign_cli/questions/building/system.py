@@ -34,6 +34,7 @@ from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.loop import Controller
+from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 # A pole this near to the unit circle is on it, but for rounding.
@@ -104,7 +105,7 @@ def build_model(spec: Spec) -> Model:
                 common=matrix.common,
                 delay=parameters.delays_of(plant),
                 common_delay=matrix.common_delay,
-                degrees=parameters.degrees_of(plant),
+                degrees=[[len(b) - leading(b) - 1 for b in row] for row in plant.terms.numerator],
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
         case StateSpacePlant() as plant:
@@ -121,12 +122,9 @@ def build_model(spec: Spec) -> Model:
 def polynomial_model(
     plant: PolynomialPlant, noise: NoiseShape, covariance: Array, D: Sequence[Array] | None = None
 ) -> PolynomialModel:
-    """Return the model of a plant in q^-1; A, C and D that are stated once are common to the outputs.
+    """Return the model of a plant in q^-1, with white noise of a covariance (p, p), and its own D if stated.
 
-    Args:
-        plant, noise: sections of the spec.
-        covariance: of the white noise, (p, p).
-        D: in place of the D of the noise.
+    A, C and D that are stated once are common to the outputs.
     """
     return PolynomialModel(
         B=_arrays(plant.B_matrix),
@@ -156,9 +154,8 @@ def bare_experiment(spec: Spec, model: Model, loop: Loop | None = None) -> Exper
 def build_experiment(spec: Spec) -> Experiment:
     """Return the experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
-    Raises `SpecError`: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
-    algebraic loop; a prior that does not fit the parameters. Or `DataError`: the record of a prior cannot be
-    used.
+    Raises `SpecError`: `needs-band`, `too-large`, `without-effect`, `infinite-information`; an unstable or
+    algebraic loop; a prior that does not fit. Or `DataError`: the record of a prior cannot be used.
     """
     model, controller = build_model(spec), spec.experiment.controller
     check_model(spec, model)
@@ -168,7 +165,11 @@ def build_experiment(spec: Spec) -> Experiment:
     experiment = bare_experiment(spec, model, loop)
     check_effects(spec, experiment)
     experiment = on_finite_information(spec, experiment)
-    return replace(experiment, prior=_prior(spec, experiment))
+    if (stated := parameters.stated_prior(spec, model.names)) is not None:
+        return replace(experiment, prior=stated[0])
+    record = prior_record(spec)
+    prior = None if record is None else information_in(spec, experiment, record)
+    return replace(experiment, prior=prior)
 
 
 def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
@@ -182,8 +183,7 @@ def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
 def excitation_band(spec: Spec) -> tuple[float, float]:
     """Return the band of the excitation in rad/sample, or rad per time unit in continuous time.
 
-    Raises `SpecError`: `needs-band` in continuous time without a band. Or `DataError`: the table of a given
-    spectrum cannot be read.
+    Raises `SpecError` (`needs-band`), or `DataError` for the table of a given spectrum.
     """
     band = _stated_band(spec)
     if spec.plant.sampled:
@@ -229,14 +229,6 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
     return {kind: w for kind, w in zip(POWER_KINDS, stated, strict=True) if np.any(np.asarray(w) > 0)}
 
 
-def _prior(spec: Spec, experiment: Experiment) -> Array | None:
-    """Return the information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
-    if (stated := parameters.stated_prior(spec, experiment.model.names)) is not None:
-        return stated[0]
-    record = prior_record(spec)
-    return None if record is None else information_in(spec, experiment, record)
-
-
 def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
     """Return the information (k, k) about the plant in the samples (n, r) of an earlier excitation."""
     earlier = replace(experiment, samples=len(record))
@@ -244,10 +236,7 @@ def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
 
 
 def prior_record(spec: Spec) -> Array | None:
-    """Return the earlier samples (n, r) that `experiment.prior` names; None if it names none.
-
-    Raises `DataError`: they cannot be used.
-    """
+    """Return the earlier samples (n, r) that `experiment.prior` names, or None; `DataError` for bad ones."""
     prior = spec.experiment.prior
     if prior is None or prior.names_a_model or not isinstance(prior.information, str):
         return None
@@ -255,7 +244,7 @@ def prior_record(spec: Spec) -> Array | None:
 
 
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
-    """Return the samples (n, r) of an excitation from columns u1, u2, .. (in closed loop r1, ..) of a file.
+    """Return the samples (n, r) of an excitation from columns u1, u2, .. (in a loop r1, ..) of a file.
 
     A single input may have the column u. Raises `DataError`: the file cannot be used.
     """
@@ -268,7 +257,7 @@ def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
 def record_step(spec: Spec) -> float:
     """Return the time between samples in the unit of the experiment's frequencies: 1, or sample_time.
 
-    Raises `SpecError`: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
+    Raises `SpecError` (`beyond-nyquist`): samples are too far apart for the band of a continuous design.
     """
     if spec.plant.sampled:
         return 1.0

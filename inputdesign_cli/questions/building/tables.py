@@ -19,14 +19,9 @@ _LARGEST = 1e40  # as of other numbers in a spec
 
 
 def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
-    """Return the wanted columns of a data file: role -> (n,), without gaps.
+    """Return columns (n,) of a data file without gaps, by role; `wanted` is their header, or how that begins.
 
-    Args:
-        wanted: role -> its header, or how that begins; `frequency` also finds `frequency_rad_per_s`.
-        key: the key of the spec that names the file, for diagnostics.
-
-    Raises:
-        DataError: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
+    Raises `DataError`: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
     """
     sheet = read_sheet(path, key=key)
     found = columns_of(sheet, wanted)
@@ -40,10 +35,9 @@ def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 
 
 def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
-    """Return the wanted columns of a signal, in which no sample may be missing, not even between its rows.
+    """Return the columns of a signal, of which no sample may be missing, nor a row between them.
 
-    Raises `DataError`: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in
-    between; `beyond-precision`.
+    Raises `DataError`: see `read_columns`; `beyond-precision`.
     """
     sheet = read_sheet(path, key=key)
     for line in sheet.passed:
@@ -57,20 +51,16 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 
 
 def has_column(path: Path, start: str, *, key: str) -> bool:
-    """Return whether some header of a data file begins like this.
-
-    Raises `DataError`: `data-unreadable`.
-    """
+    """Return whether some header of a data file begins like this; `DataError` (`data-unreadable`)."""
     return any(name.startswith(start) for name in read_sheet(path, key=key).header)
 
 
 def read_frequency_table(
     spec: Spec, name: str, columns: Sequence[str], key: str, *, least: int = 2
 ) -> dict[str, Array]:
-    """Return columns `frequency`, in the unit of the experiment, and `columns`, of `least` rows or more.
+    """Return `columns`, and `frequency` in the unit of the experiment, of `least` rows or more.
 
-    Raises:
-        DataError: the file cannot be read, or its frequencies do not rise from zero or more (`bad-table`).
+    Raises `DataError`: the file cannot be read, or its frequencies do not rise from zero (`bad-table`).
     """
     wanted = {"frequency": "frequency", **{column: column for column in columns}}
     found = read_columns(spec.resolve_path(name), wanted, key=key)

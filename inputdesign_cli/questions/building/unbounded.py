@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.questions.building.header import build_units
@@ -46,8 +45,8 @@ _OUTCOMES = {
 def check_every_direction_counts(spec: Spec, question: Question) -> None:
     """Refuse a design in which some combination of the inputs may have any power.
 
-    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero. Raises
-    `SpecError`: `no-cost` or `needs-limits`.
+    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero.
+    Raises `SpecError`: `no-cost` or `needs-limits`.
     """
     priced = priced_powers(question)
     if priced is None:
@@ -58,22 +57,19 @@ def check_every_direction_counts(spec: Spec, question: Question) -> None:
     unit = np.where(size > 0.0, size, 1.0)
     correlation = density / (unit[:, :, None] * unit[:, None, :])
     if np.linalg.eigvalsh(correlation)[:, 0].max() <= _SINGULAR:
-        raise _free_direction(spec, np.flatnonzero(np.all(size == 0.0, axis=0)))
-
-
-def _free_direction(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:
-    which = f"the power of input {silent[0] + 1}" if silent.size else "a combination of the inputs"
-    if spec.goal == "least_cost":
-        hint = "give input_power a weight for every input, however small"
-        return spec.complain("no-cost", f"{which} costs nothing", hint=hint, key="cost")
-    hint = "add limits.input_power, or limits.excitation_power in closed loop"
-    return spec.complain("needs-limits", f"nothing limits {which}", hint=hint, key="limits")
+        silent = np.flatnonzero(np.all(size == 0.0, axis=0))
+        which = f"the power of input {silent[0] + 1}" if silent.size else "a combination of the inputs"
+        if spec.goal == "least_cost":
+            hint = "give input_power a weight for every input, however small"
+            raise spec.complain("no-cost", f"{which} costs nothing", hint=hint, key="cost")
+        hint = "add limits.input_power, or limits.excitation_power in closed loop"
+        raise spec.complain("needs-limits", f"nothing limits {which}", hint=hint, key="limits")
 
 
 def check_reach(spec: Spec, question: Question) -> Reach:
-    """Return the validity of a bound over every spectrum; refuse a family without a best spectrum.
+    """Return the validity of a bound over every spectrum.
 
-    Raises `SpecError`: `no-cost` or `needs-limits`.
+    Raises `SpecError` (`no-cost`, `needs-limits`): the family has no best spectrum.
     """
     found = free_information(question)
     if found is None:
@@ -149,7 +145,7 @@ def free_information(question: Question) -> tuple[tuple[float, ...], bool, bool]
 
 
 def priced_powers(question: Question) -> list[PricedPower] | None:
-    """Return the powers that are paid for, or all with an upper limit, each with its weight.
+    """Return the powers that are paid for, or have an upper limit, each with its weight.
 
     None if the density of the excitation itself is limited.
     """

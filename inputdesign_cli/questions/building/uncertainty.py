@@ -46,22 +46,12 @@ _AWAY = 3.0
 
 
 class _NoPlantError(Exception):
-    """Says that parameters give no stable plant, with the code of the error and the reason."""
-
-    def __init__(self, code: str, what: str) -> None:
-        super().__init__(what)
-        self.code, self.what = code, what
+    """Says that parameters give no stable plant: the code of the error, and the reason."""
 
 
 @dataclass(frozen=True)
 class UncertainPlant:
-    """Holds the parameters of an uncertain plant, and the plants that they make.
-
-    Attributes:
-        spec: exists here only while a question is built.
-        stated: its section `uncertainty`.
-        experiment: on the nominal plant.
-    """
+    """Holds an uncertain plant: its section `stated`, and the `experiment` on the nominal plant."""
 
     spec: Spec
     stated: Uncertainty
@@ -74,11 +64,11 @@ class UncertainPlant:
 
     @cached_property
     def spread(self) -> Knowledge:
-        """Return the spread of the parameters around the nominal ones (k,), in columns (k, m).
+        """Return the spread of the parameters: even over the box of all intervals, or normal.
 
-        They are even over the box of all intervals, or normal with the covariance columns columns^T. Raises
-        `SpecError`: `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, or
-        `wrong-estimate`. Or `DataError`: a record cannot be used.
+        Its centre is (k,), and the covariance of normal draws is columns columns^T. Raises `SpecError`:
+        `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, `wrong-estimate`.
+        Or `DataError`: a record cannot be used.
         """
         if self.stated.intervals is not None:
             return self._box(self.stated.intervals)
@@ -88,12 +78,6 @@ class UncertainPlant:
         columns[varied] = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
         return Knowledge(self.nominal.theta, columns, box=False)
 
-    def draw(self, rng: np.random.Generator) -> Array:
-        """Draw parameters (k,)."""
-        known, size = self.spread, self.spread.columns.shape[1]
-        z = rng.uniform(-1.0, 1.0, size) if known.box else rng.standard_normal(size)
-        return np.asarray(known.centre + known.columns @ z)
-
     def region(self, confidence: float) -> Knowledge:
         """Return the region of the draws: the ellipsoid of a confidence, or the box of all intervals."""
         known = self.spread
@@ -101,21 +85,8 @@ class UncertainPlant:
             return replace(known, columns=known.columns[:, np.any(known.columns != 0.0, axis=0)])
         return replace(known, columns=confidence_factor(confidence, known.columns.shape[1]) * known.columns)
 
-    def second_moments(self) -> Array:
-        """Return the mean (k, k) of (theta - nominal)(theta - nominal)^T over the draws, or over the list."""
-        nominal, listed = self.nominal.theta, self.stated.scenarios
-        if isinstance(listed, tuple):
-            away = np.array([self.moved(values, f"{KEY}.scenarios") for values in listed]) - nominal
-            return np.asarray(away.T @ away / len(listed))
-        columns, off = self.spread.columns, self.spread.centre - nominal
-        # The variance of even draws is a third of the squared half width.
-        return np.asarray(columns @ columns.T / (3.0 if self.spread.box else 1.0) + np.outer(off, off))
-
     def moved(self, values: Mapping[str, float], key: str) -> Array:
-        """Return the nominal parameters (k,) with other values of some of them.
-
-        Raises `SpecError`: `unknown-parameter`.
-        """
+        """Return the nominal parameters (k,) with other values; `SpecError` (`unknown-parameter`)."""
         names, theta = list(self.nominal.names), self.nominal.theta.copy()
         for name, value in values.items():
             check_known(self.spec, names, name, key)
@@ -149,7 +120,18 @@ class UncertainPlant:
             found = load_estimate(self.spec, source, key)
             covariance, listed = np.array(found.covariance, dtype=float), tuple(found.parameters)
             full = embedded(self.spec, names, covariance, listed, key)
-            self._check_same_plant(source, found.parameters, full, key)
+            apart = np.sqrt(np.diag(full)) * _AWAY
+            both = ", ".join(
+                f"{name} is {found.parameters[name]:.4g} there and {nominal:.4g} here"
+                for name, nominal, most_apart in zip(names, self.nominal.theta, apart, strict=True)
+                if name in found.parameters and abs(found.parameters[name] - nominal) > most_apart
+            )
+            if both:
+                message = (
+                    f"{source} is an estimate of another plant: {both}, more than {_AWAY:g} deviations apart"
+                )
+                hint = f"take plant and noise from the same file: include: {source}"
+                raise self.spec.complain("wrong-estimate", message, hint=hint, key=key)
             return full
         matrix = np.array(source, dtype=float)
         if stated.covariance is None:
@@ -164,22 +146,8 @@ class UncertainPlant:
             hint = "name the parameters that it is about, or take an experiment that informs about all"
             raise self.spec.complain("not-positive-definite", message, hint=hint, key=key) from None
 
-    def _check_same_plant(self, name: str, values: Mapping[str, float], covariance: Array, key: str) -> None:
-        """Raise `SpecError` (`wrong-estimate`) if the file is about another plant than the spec."""
-        rows = zip(self.nominal.names, self.nominal.theta, np.sqrt(np.diag(covariance)), strict=True)
-        both = ", ".join(
-            f"{parameter} is {values[parameter]:.4g} there and {nominal:.4g} here"
-            for parameter, nominal, deviation in rows
-            if parameter in values and abs(values[parameter] - nominal) > _AWAY * deviation
-        )
-        if both:
-            message = f"{name} is an estimate of another plant: {both}, more than {_AWAY:g} deviations apart"
-            hint = f"take plant and noise from the same file: include: {name}"
-            raise self.spec.complain("wrong-estimate", message, hint=hint, key=key)
-
     @cached_property
     def _radius(self) -> float:
-        """Return the radius beyond which poles are outside the unit circle or too near to it."""
         return farthest_radius(self.spec, self.experiment)
 
     def at(self, theta: Array, radius: float) -> Alternative:
@@ -189,23 +157,27 @@ class UncertainPlant:
         beyond the radius. Or `SpecError`: a requirement cannot be asked of this plant.
         """
         model, loop = self._sound(theta, radius)
-        self._check_seen(theta, model)
+        spec, where = self.spec, f"at the scenario {self._named(theta)}"
+        longest = spec.experiment.samples * (1.0 if spec.plant.sampled else spec.sample_time)
+        limited = "samples" in spec.experiment.model_fields_set
+        if limited and longest <= model.memory > self.nominal.memory:
+            message = f"{where} a dead time outlasts the experiment"
+            hint = "take more samples, or state the uncertainty more tightly"
+            raise spec.complain("delay-beyond-record", message, hint=hint, key=KEY)
         try:
             experiment = replace(self.experiment, model=model, loop=loop)
-            check_effects(self.spec, experiment)
-            experiment = on_finite_information(self.spec, experiment)
-            return Alternative(experiment, *build_asked(self.spec, experiment, self.nominal))
+            check_effects(spec, experiment)
+            experiment = on_finite_information(spec, experiment)
+            return Alternative(experiment, *build_asked(spec, experiment, self.nominal))
         except SpecError as error:
             found = error.diagnostics[0]
-            message = f"at the scenario {self._named(theta)}: {found.message}"
-            raise self.spec.complain(found.code, message, hint=found.hint, key=KEY) from error
+            raise spec.complain(found.code, f"{where}: {found.message}", hint=found.hint, key=KEY) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
         model, controller = self.nominal.at(theta), self.spec.experiment.controller
-        flaw = model.flaw
-        if flaw is not None:
-            raise _NoPlantError("not-a-plant", flaw)
-        lost = self._act & ~self._acting(model)
+        if model.flaw is not None:
+            raise _NoPlantError("not-a-plant", model.flaw)
+        lost = self._acting(self.nominal) & ~self._acting(model)
         if np.any(lost):
             output, input = np.argwhere(lost)[0] + 1
             raise _NoPlantError("not-a-plant", f"output {output} does not depend on input {input}")
@@ -220,26 +192,10 @@ class UncertainPlant:
             raise _NoPlantError("no-stable-plant", f"{what}, on or beyond the unit circle")
         return model, loop
 
-    @cached_property
-    def _act(self) -> NDArray[np.bool_]:
-        """Return whether each entry (p, r) of the nominal G is other than zero."""
-        return self._acting(self.nominal)
-
     def _acting(self, model: Model) -> NDArray[np.bool_]:
         """Return whether each entry (p, r) of G is other than zero at some of a few frequencies."""
         lo, hi = self.experiment.band
         return np.any(model.plant_at(lo + (hi - lo) * _PROBES) != 0.0, axis=0)
-
-    def _check_seen(self, theta: Array, model: Model) -> None:
-        """Raise `delay-beyond-record` if a dead time outlasts the experiment."""
-        spec = self.spec
-        if "samples" not in spec.experiment.model_fields_set:
-            return
-        longest = spec.experiment.samples * (1.0 if spec.plant.sampled else spec.sample_time)
-        if longest <= model.memory > self.nominal.memory:
-            message = f"at the scenario {self._named(theta)} a dead time outlasts the experiment"
-            hint = "take more samples, or state the uncertainty more tightly"
-            raise spec.complain("delay-beyond-record", message, hint=hint, key=KEY)
 
     def _named(self, theta: Array) -> str:
         return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self.nominal.names, theta, strict=True))
@@ -255,17 +211,12 @@ class UncertainPlant:
             try:
                 plants.append(self.at(theta, farthest))
             except _NoPlantError as error:
-                message = f"at the scenario {self._named(theta)} {error.what}"
+                code, what = error.args
+                message = f"at the scenario {self._named(theta)} {what}"
                 hint = "leave the scenario out, or mend its parameters"
-                raise self.spec.complain(error.code, message, hint=hint, key=key) from error
+                raise self.spec.complain(code, message, hint=hint, key=key) from error
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
-
-    def worst_region(self, confidence: float) -> Region:
-        """Return the region of this confidence in which the worst plant is searched."""
-        found = self.region(confidence)
-        name = "the intervals" if found.box else f"the ellipsoid of confidence {confidence:g}"
-        return Region(found.centre, found.columns, found.box, name, self.possible)
 
     def possible(self, theta: Array) -> Alternative | None:
         """Return the plant with these parameters; None if there is none, or it is unstable."""
@@ -275,11 +226,9 @@ class UncertainPlant:
             return None
 
     def batch(self, number: int, rng: np.random.Generator) -> Batch:
-        """Draw a number of plants; draws that give no stable plant are repeated.
-
-        Raises `SpecError`: `no-stable-plant` if hardly any draw gives one.
-        """
-        radius, thetas, plants = self._radius, list[Array](), list[Alternative]()
+        """Draw sound plants; raises `SpecError` (`no-stable-plant`) if hardly any draw gives one."""
+        radius, known, size = self._radius, self.spread, self.spread.columns.shape[1]
+        thetas, plants = list[Array](), list[Alternative]()
         most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
         while len(plants) < number:
             if drawn >= most_draws:
@@ -287,11 +236,12 @@ class UncertainPlant:
                 message = f"{few}, in their loop if there is one, with poles within {radius:.6g}{last}"
                 hint = "the uncertainty reaches far beyond what is possible: state it more tightly"
                 raise self.spec.complain("no-stable-plant", message, hint=hint, key=KEY)
-            theta, drawn = self.draw(rng), drawn + 1
+            z = rng.uniform(-1.0, 1.0, size) if known.box else rng.standard_normal(size)
+            theta, drawn = np.asarray(known.centre + known.columns @ z), drawn + 1
             try:
                 plants.append(self.at(theta, radius))
             except _NoPlantError as error:
-                last = f"; at the last one, {self._named(theta)}, {error.what}"
+                last = f"; at the last one, {self._named(theta)}, {error.args[1]}"
                 continue
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), drawn)
@@ -300,14 +250,9 @@ class UncertainPlant:
 def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Plants | None:
     """Return the scenarios of `uncertainty`; None without this section.
 
-    Args:
-        experiment: on the nominal plant, of the length that the question is about.
-        basis: of the design; None of an excitation that is given.
-
-    Raises:
-        SpecError: `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`,
-            `wrong-estimate`; a requirement cannot be asked of one of the plants.
-        DataError: a record cannot be used.
+    The experiment is on the nominal plant; an excitation that is given has no basis. Raises `SpecError`:
+    `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`, `wrong-estimate`;
+    a requirement cannot be asked of one of the plants. Or `DataError`: a record cannot be used.
     """
     stated = spec.uncertainty
     if stated is None:
@@ -317,7 +262,13 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
     names = experiment.model.names
     if isinstance(stated.scenarios, tuple):
         return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
-    number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
+    # A given excitation has no unknowns, and a risk takes as many plants as with one: all of them meet the
+    # accuracy by chance with probability (1 - risk)^plants. Length, factor or cost count as unknowns.
+    unknowns: int | None = 1
+    if basis is not None:
+        others = spec.goal != "least_cost" or stated.cost == "worst"
+        unknowns = None if basis.free else basis.size + int(others)
+    number = stated.scenarios or _needed(spec, stated.risk, unknowns)
     batch = scenario.batch(number, np.random.default_rng([stated.seed, 0]))
 
     def afresh() -> Iterator[Batch]:
@@ -325,6 +276,11 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
         for begun in range(0, stated.fresh, _AT_A_TIME):
             yield scenario.batch(min(_AT_A_TIME, stated.fresh - begun), rng)
 
+    region = None
+    if stated.worst_case is not None:
+        found = scenario.region(stated.worst_case)
+        name = "the intervals" if found.box else f"the ellipsoid of confidence {stated.worst_case:g}"
+        region = Region(found.centre, found.columns, found.box, name, scenario.possible)
     return Plants(
         batch,
         stated.stated(*SOURCES)[0],
@@ -335,43 +291,30 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
         afresh=afresh if stated.fresh else None,
         fresh=stated.fresh,
         at=scenario.possible,
-        unknowns=None if basis is not None and basis.free else _unknowns(spec, basis),
-        region=None if stated.worst_case is None else scenario.worst_region(stated.worst_case),
+        unknowns=unknowns,
+        region=region,
     )
 
 
-def _needed(spec: Spec, basis: Basis | None) -> int | None:
-    """Return the number of scenarios for the stated risk; None if no risk is stated."""
-    stated = spec.uncertainty
-    if stated is None or stated.risk is None:
-        return None
-    if basis is not None and basis.free:
+def _needed(spec: Spec, risk: float | None, unknowns: int | None) -> int:
+    """Return the number of scenarios for a risk; `SpecError` (`not-supported`, `too-large`)."""
+    if risk is None:
+        return _DEFAULT_SCENARIOS
+    if unknowns is None:
         message = "how many plants a risk takes depends on the number of unknowns: a free spectrum has none"
         hint = "write scenarios: 200 in place of risk, or choose spectrum: {type: fir}"
         raise spec.complain("not-supported", message, hint=hint, key=f"{KEY}.risk")
-    needed = samples_for(stated.risk, 1.0 - CONFIDENCE, _unknowns(spec, basis))
+    needed = samples_for(risk, 1.0 - CONFIDENCE, unknowns)
     if needed > most("uncertainty.scenarios"):
-        takes = f"a risk of {stated.risk:g} with {_unknowns(spec, basis)} unknowns takes {needed} plants"
+        takes = f"a risk of {risk:g} with {unknowns} unknowns takes {needed} plants"
         message = f"{takes}, and at most {most('uncertainty.scenarios')} are taken"
         hint = "allow more risk, or lower the order of the spectrum"
         raise spec.complain("too-large", message, hint=hint, key=f"{KEY}.risk")
     return needed
 
 
-def _unknowns(spec: Spec, basis: Basis | None) -> int:
-    """Return the number of unknowns of the program: of the spectrum, and the factor, length or cost.
-
-    A given excitation has no unknowns. A risk is then proved by as many plants as with one unknown. All of
-    them meet the accuracy by chance with probability (1 - risk)^plants.
-    """
-    if basis is None:
-        return 1
-    stated = spec.uncertainty
-    return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
-
-
 def farthest_radius(spec: Spec, experiment: Experiment) -> float:
-    """Return the radius beyond which poles of the plant, or of its loop, count as unstable.
+    """Return the radius from which poles of plant or loop count as unstable.
 
     Raises `SpecError`: `unsuitable-key`, `no-stable-plant`.
     """
@@ -394,10 +337,7 @@ def farthest_radius(spec: Spec, experiment: Experiment) -> float:
 
 
 def build_knowledge(spec: Spec, confidence: float = POSSIBLE) -> Knowledge | None:
-    """Return the region of the plants that are possible; None if it is not stated, or plants are listed.
-
-    Raises `SpecError` or `DataError`: see `UncertainPlant.spread`.
-    """
+    """Return the region of the plants that are possible; None if it is not stated, or plants are listed."""
     stated = spec.uncertainty
     if stated is None or isinstance(stated.scenarios, tuple):
         return None
@@ -411,13 +351,18 @@ def build_foreseen(spec: Spec, nominal: Model) -> Foreseen | None:
 
 
 def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
-    """Return the covariance (k, k) of the parameters of the spec's own plant; zero if it states none.
-
-    It follows from `uncertainty`, or else from the `estimate` block that identify wrote.
-    """
+    """Return the covariance (k, k) by `uncertainty`, or the block `estimate`; zero if the spec has none."""
     covariance = np.zeros((nominal.theta.size, nominal.theta.size))
     if spec.uncertainty is not None:
-        moments = UncertainPlant(spec, spec.uncertainty, system.build_experiment(spec)).second_moments()
+        plant = UncertainPlant(spec, spec.uncertainty, system.build_experiment(spec))
+        theta, listed = plant.nominal.theta, plant.stated.scenarios
+        if isinstance(listed, tuple):
+            away = np.array([plant.moved(values, f"{KEY}.scenarios") for values in listed]) - theta
+            moments = away.T @ away / len(listed)
+        else:
+            columns, off = plant.spread.columns, plant.spread.centre - theta
+            # The variance of even draws is a third of the squared half width.
+            moments = columns @ columns.T / (3.0 if plant.spread.box else 1.0) + np.outer(off, off)
         covariance[: len(moments), : len(moments)] = moments
     elif spec.estimate is not None:
         names, values = list(nominal.names), spec.estimate.parameters
@@ -431,16 +376,12 @@ def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
 
 
 def build_foresight(spec: Spec, nominal: Experiment) -> Foresight | None:
-    """Return the search for rival dead times; None for plants without dead times to be estimated.
-
-    Args:
-        nominal: the experiment, in raw parameters.
-    """
+    """Return the search for rival dead times of an experiment in raw parameters; None without dead times."""
     model = nominal.model
     late = np.flatnonzero(model.dead_times)
     if late.size == 0:
         return None
-    names = ", ".join(_quoted(model.names[i]) for i in late)
+    names = ", ".join(f'"{name}"' if "[" in name else name for name in (model.names[i] for i in late))
     stated = spec.spectrum
     # Filtered noise has power between the lines of a multisine, where other dead times differ.
     denser = "" if stated is None or stated.type == "fir" else " (spectrum: {type: fir, order: 12})"
@@ -453,8 +394,3 @@ def build_foresight(spec: Spec, nominal: Experiment) -> Foresight | None:
         knowledge=build_knowledge(spec),
         looks=spec.solver.any_spectrum,
     )
-
-
-def _quoted(name: str) -> str:
-    """Write a name as in a list of YAML."""
-    return f'"{name}"' if "[" in name else name

@@ -17,12 +17,9 @@ def refuse_unhandled(
     remedies: Mapping[str, str],
     handled: Mapping[str, tuple[str, ...]] | None = None,
 ) -> None:
-    """Raise `SpecError` (`not-supported`) at the first key that a kind of question does not handle.
+    """Raise `SpecError` (`not-supported`) at the first key of `remedies` that the `question` does not handle.
 
-    Args:
-        question: its name in the message.
-        remedies: the keys that are not handled, and what to do about each.
-        handled: the values of some of these keys that are handled.
+    `handled` are values of some of these keys that it handles.
     """
     for key, remedy in remedies.items():
         value = spec.at(*key.split("."))

@@ -28,11 +28,7 @@ def held(transfer: ContinuousTransfer, sample_time: float) -> Rational:
 def build_weight(
     spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer | None, key: str
 ) -> ScalarTransfer:
-    """Return a weight of the spec; 1 if none is stated.
-
-    Raises:
-        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled.
-    """
+    """Return a weight of the spec, or 1; `SpecError` (`not-sampled`) for one in s of a sampled plant."""
     match transfer:
         case None:
             return Rational.build([1.0])
@@ -50,11 +46,7 @@ def build_weight(
 
 
 def check_finite(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], code: str, key: str) -> None:
-    """Raise `SpecError` (with this code) if a weight has a pole on the stability limit in the band.
-
-    Args:
-        band: in rad/sample, or in rad per time unit where the plant is in continuous time.
-    """
+    """Raise `SpecError` (with this code) if a weight has a pole on the stability limit in the band."""
     at = on_the_limit(weight.pole_points, band)
     if at is None:
         return

@@ -198,7 +198,7 @@ def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
     )
     ratios = [run.ratio for run in ended if run.ratio is not None]
     energies = np.array([run.energy for run in ended])
-    known = oracle is not None and oracle.cost > 0.0
+    known = oracle if oracle is not None and oracle.cost > 0.0 else None
     counts = Counter(run.status for run in ended)
     return TriedInput(
         within_r_adm_true=true,
@@ -209,10 +209,10 @@ def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
         within_r_adm_limits=design_limits,
         true_ratio=_spread(ratios, float(np.mean(np.array(ratios) <= 1.0))) if ratios else None,
         energy=_spread(energies),
-        cost_over_oracle=_spread(energies / oracle.cost) if oracle is not None and known else None,
-        cost_over_oracle_record=_spread(energies / oracle.record)
-        if oracle is not None and known and oracle.record is not None
-        else None,
+        cost_over_oracle=None if known is None else _spread(energies / known.cost),
+        cost_over_oracle_record=None
+        if known is None or known.record is None
+        else _spread(energies / known.record),
         samples=_spread([run.samples for run in ended]),
         stopped=counts["stopped"],
         missed=counts["missed"],
@@ -258,14 +258,16 @@ def campaigns_curves(
         name: np.array([run.ratio for run in ended if run.ratio is not None]) for name, ended in ways.items()
     }
     curves: dict[str, Curves] = {"true_ratio": RatioCurves(ratios)} if rows["true_ratio"].size else {}
-    if oracle is None or any(run.within["true"] is None for _, run in every):
+    if oracle is None:
         return tables, curves
     points = {}
     for name, ended in ways.items():
-        kept, energies = sum(bool(run.within["true"]) for run in ended), [run.energy for run in ended]
-        limits = binomial_limits(kept, len(ended))
-        costs = np.quantile(np.array(energies) / oracle.cost, [0.05, 0.95])
-        points[name] = (float(np.mean(energies)) / oracle.cost, *costs.tolist(), kept / len(ended), *limits)
+        share, limits = _within(ended, "true")
+        if share is None or limits is None:
+            return tables, curves
+        energies = np.array([run.energy for run in ended])
+        costs = np.quantile(energies / oracle.cost, [0.05, 0.95])
+        points[name] = (float(np.mean(energies)) / oracle.cost, *costs.tolist(), share, *limits)
     record = None if oracle.record is None else oracle.record / oracle.cost
     curves["cost_coverage"] = TradeCurves(points, record)
     return tables, curves

@@ -45,7 +45,7 @@ class LevelSearch:
     Args:
         plants: returns the plants, one for each scenario, for records of a length.
         cost: returns the cost of samples (n, r).
-        amplitude: of two-level records (r,); None where the first record has the levels that there are.
+        amplitude: of two-level records (r,); None if the first record has the levels.
         allowed: says whether samples (n, r) keep to the limits beside the amplitude; None if there is none.
     """
 

@@ -149,8 +149,9 @@ class Sought:
 
     def _bounded(self, done: Designed, request: RecordRequest) -> Designed:
         """Return the design with its bound over all records within the amplitude, where one is known."""
-        free, samples = done.design.any_spectrum, request.length(done.experiment.samples)
-        if free is None or samples > _LONGEST or (request.samples or samples) != samples:
+        free, samples = done.design.any_spectrum, done.experiment.samples
+        whole = self.question.goal == "samples" or request.length(samples) == samples
+        if free is None or samples > _LONGEST or not whole:
             return done
         bound = bound_over_records(
             done.design.problem, free, samples, windows=self.windows, hold=request.settings.hold

@@ -225,10 +225,7 @@ def related(path: Path, broken: Iterable[Path]) -> bool:
 
 
 def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagnostic]:
-    """Return the diagnostics of all checks whose keys are not `broken`.
-
-    With `design` the question of a design must be complete.
-    """
+    """Return the diagnostics of all checks whose keys are not `broken`; of designs only with `design`."""
     return [
         found
         for check, reads in CHECKS

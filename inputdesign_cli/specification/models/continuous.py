@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -55,10 +55,6 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 hint = "write one number, or rows (outputs) of columns (inputs), for all of them alike"
                 yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
 
-    def check_present(self, terms: named.CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Check that some gain is present."""
-        yield from transfer.check_gain(terms.numerator, "continuous", "gain")
-
     def grid(self, name: str) -> Grid:
         """Return a quantity as rows of columns; a dead time that is not stated is zero."""
         value = self.at(name)
@@ -69,12 +65,12 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     @property
     def numerator_matrix(self) -> fields.PolynomialMatrix:
         """Return the numerators as rows of columns, descending in s."""
-        return self._numbers("numerator")
+        return _values(self.terms({name: self.grid(name) for name in QUANTITIES}).numerator)
 
     @property
     def denominator_matrix(self) -> fields.PolynomialMatrix:
         """Return the denominators as rows of columns, descending in s."""
-        return self._numbers("denominator")
+        return _values(self.terms({name: self.grid(name) for name in QUANTITIES}).denominator)
 
     @property
     def delays(self) -> Grid:
@@ -94,26 +90,23 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 found.append(named.NamedParameter(label, f"{name}_{i + 1}_{j + 1}", float(value), place))
         return tuple(found)
 
-    def terms(self, written: Mapping[str, Plain] | None = None) -> named.CoefficientTerms:
-        """Return the coefficients as expressions in its quantities.
+    def own_words(self) -> dict[str, Plain]:
+        """Return the quantities as written with a symbol in place of each number that is not zero."""
+        return {
+            name: [
+                [f"{name}_{i + 1}_{j + 1}" if value else value for j, value in enumerate(row)]
+                for i, row in enumerate(self.grid(name))
+            ]
+            for name in self.stated(*QUANTITIES)
+        }
 
-        Args:
-            written: the section as written, if its values are expressions in named parameters.
-        """
+    def terms(self, written: Mapping[str, Plain]) -> named.CoefficientTerms:
+        """Return the coefficients, descending in s, as expressions in the quantities as written."""
+        one, two, none = (Expression(number) for number in ("1.0", "2.0", "0.0"))
 
         def of(name: str, i: int, j: int) -> Expression:
-            if not self.stated(name) or (written is None and self.grid(name)[i][j] == 0.0):
-                return Expression("0.0")
-            if written is None:
-                return Expression(f"{name}_{i + 1}_{j + 1}")
-            value = written[name]
+            value = written[name] if self.stated(name) else 0.0
             return named.expressed(value[i][j] if isinstance(value, list | tuple) else value)
-
-        return self._composed(of)
-
-    def _composed(self, of: Callable[[str, int, int], Expression]) -> named.CoefficientTerms:
-        """Return the coefficients, descending in s, from an expression for each entry of each quantity."""
-        one, two, none = (Expression(number) for number in ("1.0", "2.0", "0.0"))
 
         def entry(i: int, j: int) -> tuple[named.Terms, named.Terms, Expression]:
             gain, delay = of("gain", i, j), of("dead_time", i, j)
@@ -129,13 +122,9 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
             tuple(tuple(delay for _, _, delay in row) for row in rows),
         )
 
-    def _numbers(self, part: Literal["numerator", "denominator"]) -> fields.PolynomialMatrix:
-        """Return the numerators or the denominators at the values of the quantities."""
-        terms = self._composed(lambda name, i, j: Expression(repr(self.grid(name)[i][j])))
-        rows = getattr(terms, part)
-        return tuple(
-            tuple(tuple(one.at((), np.zeros(0))[0] for one in entry) for entry in row) for row in rows
-        )
+
+def _values(rows: named.TermMatrix) -> fields.PolynomialMatrix:
+    return tuple(tuple(tuple(one.at((), np.zeros(0))[0] for one in entry) for entry in row) for row in rows)
 
 
 class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a transfer matrix in s"):
@@ -161,14 +150,6 @@ class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a tran
         if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
-
-    def check_present(self, terms: named.CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Check that some coefficient of the numerators is present, and that every entry is proper."""
-        path = ("continuous", "numerator")
-        yield from transfer.check_gain(terms.numerator, *path)
-        yield from transfer.check_each_proper(
-            terms.numerator, self.denominator_matrix, fields.depth(self.numerator), *path
-        )
 
     @property
     def common(self) -> bool:

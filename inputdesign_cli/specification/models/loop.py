@@ -142,10 +142,8 @@ class Control(Section):
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that there is one law, and that its transfer functions are stable."""
         yield from self.exactly_one(*type(self).model_fields)
-        if self.model_reference is not None:
-            yield from transfer.check_stable(self.model_reference, "model_reference")
-        if self.internal_model is not None:
-            yield from transfer.check_stable(self.internal_model, "internal_model")
+        for key in self.stated("model_reference", "internal_model"):
+            yield from transfer.check_stable(getattr(self, key), key)
 
 
 class Reference(Section):

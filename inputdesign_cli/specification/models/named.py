@@ -58,11 +58,9 @@ class CoefficientTerms:
 
 @dataclass(frozen=True)
 class NamedParameter:
-    """A parameter with a name of its own.
+    """A parameter with a name of its own: `label` for the user, and `symbol` in expressions.
 
-    Attributes:
-        label: its name for the user; `symbol`: its name in expressions.
-        place: the path of its value, from the section of the plant.
+    The `place` is the path of its value, from the section of the plant.
     """
 
     label: str
@@ -73,12 +71,12 @@ class NamedParameter:
 
 def values_of(parameters: dict[str, Plain]) -> dict[str, float]:
     """Return the values by name; one that cannot be read counts as 1, and pydantic reports it."""
-    return {str(name): _number(value) for name, value in parameters.items()}
 
+    def number(value: Plain) -> float:
+        usable = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+        return float(value) if usable else 1.0
 
-def _number(value: Plain) -> float:
-    usable = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
-    return float(value) if usable else 1.0
+    return {str(name): number(value) for name, value in parameters.items()}
 
 
 def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
@@ -93,10 +91,7 @@ def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
 def worth(
     value: Plain, parameters: Mapping[str, float], path: Path, found: list[PathDiagnostic], used: set[str]
 ) -> Plain:
-    """Return a nested value with numbers in place of texts.
-
-    Errors in texts are added to `found`, and the parameters that they name to `used`.
-    """
+    """Return a nested value with numbers in place of texts; adds to `found` errors and `used` parameters."""
     if isinstance(value, list | tuple):
         return [worth(part, parameters, (*path, i), found, used) for i, part in enumerate(value)]
     if isinstance(value, dict):

@@ -230,18 +230,17 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that some coefficient of a numerator is present, and that every entry is proper."""
-        yield from self.continuous.check_present(self.stated_terms)
+        path = ("continuous", "gain" if self.continuous.kind == "process" else "numerator")
+        yield from transfer.check_gain(self.terms.numerator, *path)
+        if self.continuous.kind == "rational":
+            below, levels = self.continuous.denominator_matrix, fields.depth(self.continuous.numerator)
+            yield from transfer.check_each_proper(self.terms.numerator, below, levels, *path)
 
     @cached_property
     def terms(self) -> named.CoefficientTerms:
-        """Return the coefficients as expressions in the named parameters."""
+        """Return the coefficients as expressions in named parameters, or in quantities of a process."""
         if self.parameters is None and self.continuous.kind == "process":
-            return self.continuous.terms()
-        return self.stated_terms
-
-    @cached_property
-    def stated_terms(self) -> named.CoefficientTerms:
-        """Return the stated coefficients, as expressions in named parameters if there are any."""
+            return self.continuous.terms(self.continuous.own_words())
         return self.continuous.terms(self.written["continuous"])
 
 

@@ -116,15 +116,9 @@ _TYPE = f"{TAG}type: "
 
 
 def translate(error: ValidationError, data: Plain, root: type[Section]) -> list[PathDiagnostic]:
-    """Return the diagnostics of a pydantic error.
+    """Return the diagnostics of the error that `root.model_validate(data)` raised, for plain data.
 
-    Args:
-        error: The error that `root.model_validate(data)` raised.
-        data: Plain data, as a file holds them.
-        root: The model that the data were read by.
-
-    Returns:
-        Diagnostics with absolute paths, which exist in `data` up to their last step.
+    Their paths are absolute, and exist in `data` up to their last step.
     """
     details = error.errors(include_url=False)
     unit = data.get("time_unit", "s") if isinstance(data, dict) and "time_unit" in root.model_fields else None
@@ -166,7 +160,11 @@ def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> li
     declared = declared_at(root, location)
     types = [tag.removeprefix(_TYPE) for tag in declared.alternatives if tag.startswith(_TYPE)]
     if types and isinstance(error["input"], dict):
-        return [_unknown_type(path, types, error["input"])]
+        if "type" in error["input"]:
+            word = unknown_word(error["input"]["type"], types)
+            return [PathDiagnostic("unknown-word", *word, (*path, "type"))]
+        hint = f"write type: {types[0]}; the types are {', '.join(types)}"
+        return [PathDiagnostic("missing-key", "{key} needs a type", hint, path)]
     code, message, hint = _wrong_value(kind, error["input"], context, declared)
     if kind in ("float_type", "int_type") and isinstance(error["input"], str):
         unit = "s" if path[0] == "solver" else time_unit
@@ -220,14 +218,6 @@ def _no_number(value: Plain, what: str, hint: str) -> tuple[str, str, str]:
     below = math.floor(value)
     message = f"{{key}} must be {what}, not {show(value)}"
     return "not-a-whole-number", message, f"write {below} or {below + 1}"
-
-
-def _unknown_type(path: Path, types: list[str], value: dict[str, Plain]) -> PathDiagnostic:
-    """Return the diagnostic of a mapping whose `type` is missing or names none of the alternatives."""
-    if "type" in value:
-        return PathDiagnostic("unknown-word", *unknown_word(value["type"], types), (*path, "type"))
-    hint = f"write type: {types[0]}; the types are {', '.join(types)}"
-    return PathDiagnostic("missing-key", "{key} needs a type", hint, path)
 
 
 def _missing(path: Path, model: type[Section] | None) -> PathDiagnostic:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BeforeValidator, Field, JsonValue
 
 from inputdesign_cli.plugins import names, own
 from inputdesign_cli.specification.models import fields
@@ -20,24 +19,21 @@ Samples = Annotated[fields.Count, SIZES["signal.samples"]]
 _GROUP = "idesign.signals"
 
 
-class _Registered:
-    """Admits the names of a group of `plugins`, as text and in the schema."""
-
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        def known(value: str) -> str:
-            if value not in (words := [*own(_GROUP), *sorted(names(_GROUP))]):
-                raise fail("unknown-word", *unknown_word(value, words))
-            return value
-
-        return core_schema.no_info_before_validator_function(known, handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, core: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, object]:
-        return {**handler(core), "enum": [*own(_GROUP), *sorted(names(_GROUP))]}
+def _names() -> list[str]:
+    return [*own(_GROUP), *sorted(names(_GROUP))]
 
 
-SignalType = Annotated[str, _Registered()]
+def _registered(value: object) -> object:
+    if value not in (words := _names()):
+        raise fail("unknown-word", *unknown_word(value, words))
+    return value
+
+
+SignalType = Annotated[
+    str,
+    BeforeValidator(_registered),
+    Field(json_schema_extra=lambda schema: schema.update(enum=cast(list[JsonValue], _names()))),
+]
 
 # Settings that mean something for some types of signal only.
 _ONLY_FOR = {
@@ -75,7 +71,7 @@ class Signal(Section):
         "(default 0.02).",
     )
     seconds: fields.Positive = Field(
-        default=10.0, description="Seconds that such a search may take (default 10)."
+        default=10.0, description="Seconds that the search may take (default 10)."
     )
     lines: Annotated[fields.Harmonics, SIZES["signal.lines"]] | None = optional(
         "Harmonics of a period that are used: their number, odd, or a list."

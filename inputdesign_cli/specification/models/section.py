@@ -31,14 +31,9 @@ CARRIER = "diagnostics"
 class PathDiagnostic:
     """One thing that is wrong. `{key}` in message and hint stands for the full dotted name of `path`.
 
-    Args:
-        code: A code that `idesign explain` knows.
-        message: What is wrong.
-        hint: How to mend it.
-        path: Where it is wrong, seen from the model that says so; from the root of the file in the end.
-        at_key: Whether to point at the key and not at its value.
-        keys: The parts of `path` that it is about, if not all of it.
-        meant: The key that an unknown one probably stands for.
+    The path is seen from the model that says so, from the root of the file in the end. `at_key` points at
+    the key and not at its value. `keys` are the parts of `path` that it is about, if not all. `meant` is
+    the key that an unknown one probably stands for.
     """
 
     code: str
@@ -69,12 +64,7 @@ def fail(code: str, message: str, hint: str = "") -> PydanticCustomError:
 
 @dataclass(frozen=True)
 class Wording:
-    """The words of a diagnostic for a type, and its hint, in the `Annotated[..]` of the type.
-
-    Args:
-        what: What the value must be: "a list of coefficients".
-        hint: How to mend a value that is not of this type.
-    """
+    """What a value of a type must be, "a list of coefficients", and how to mend one that is not."""
 
     what: str
     hint: str = ""
@@ -182,12 +172,7 @@ def by_tag(choose: Callable[[Plain], str]) -> Discriminator:
 
 
 def pick(choose: Callable[[dict[str, Plain]], str], plain: str = "") -> Discriminator:
-    """Return the discriminator of a union of sections.
-
-    Args:
-        choose: Returns the phrase of the alternative for a mapping of the file.
-        plain: The tag of the alternative that is no mapping, if there is one.
-    """
+    """Return the discriminator of a union of sections: by the phrase for a mapping, or the tag `plain`."""
 
     def chosen(value: Plain) -> str:
         if isinstance(value, Section):

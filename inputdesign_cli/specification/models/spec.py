@@ -104,15 +104,11 @@ class Spec(Section):
     def from_dict(
         cls, data: Mapping[str, object], *, folder: Path | None = None, design: bool = True
     ) -> Spec:
-        """Return the spec of plain data: mappings, lists, numbers and texts, as a file holds them.
+        """Return the spec of plain data: mappings, lists, arrays, numbers and texts, as a file holds them.
 
-        Args:
-            data: arrays of numpy will do for lists.
-            folder: the folder that paths in the spec are relative to (default: the current folder).
-            design: whether it must ask for a design, or for an analysis, that can be answered.
-
-        Raises:
-            SpecError: everything that is wrong with it.
+        Paths in it are relative to `folder`, by default the current one. With `design` it must ask for a
+        design, or for an analysis, that can be answered. Raises `SpecError`: everything that is wrong with
+        it.
         """
         if folder is not None and not isinstance(folder, Path):
             raise bad_spec("bad-argument", "folder must be a pathlib.Path", hint="Path(..)", key="folder")
@@ -121,20 +117,16 @@ class Spec(Section):
     def with_(self, **changes: object) -> Spec:
         """Return the spec with other values: `spec.with_(**{"experiment.samples": 600})`; None removes a key.
 
-        Raises:
-            SpecError: everything that is wrong with the new one.
+        Raises `SpecError`: everything that is wrong with the new one.
         """
         return self.revised(changes)
 
     def revised(
         self, changes: Mapping[str, object], *, file: str = "<spec>", design: bool | None = None
     ) -> Spec:
-        """Return the spec with other values at dotted keys, as `with_`.
+        """Return the spec with other values at dotted keys, as `with_`; diagnostics about them name a `file`.
 
-        Args:
-            changes: values by key; None removes a key.
-            file: the name of their file in diagnostics about the new values.
-            design: as for `from_dict` (default: as this spec).
+        `design` is as for `from_dict`, by default as of this spec.
         """
         for key in changes:
             if "=" in key:
@@ -182,10 +174,7 @@ class Spec(Section):
         return math.pi / self.sample_time if self.plant.sampled else math.inf
 
     def clip_band(self, band: tuple[float, float] | None) -> tuple[float, float]:
-        """Return the band within [0, nyquist] in rad per time unit; None stands for all frequencies.
-
-        The end needs a clip: the checks accept 3.1416 for pi.
-        """
+        """Return the band, or all frequencies, within [0, nyquist] per time unit: 3.1416 stands for pi."""
         low, high = band or (0.0, math.inf)
         return low, min(high, self.nyquist)
 

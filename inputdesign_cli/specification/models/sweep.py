@@ -22,7 +22,7 @@ _RANGE = re.compile(rf"\s*{_NUMBER}\s*:\s*{_NUMBER}\s*(?::\s*{_NUMBER}\s*)?", re
 def range_values(text: str) -> tuple[str, ...] | None:
     """Return the numbers of `low:high:step` as text, both ends included; None for a text that is no range.
 
-    Decimal arithmetic makes 0:1:0.1 hold 0.3 and not 0.30000000000000004. Raises `SpecError`: `bad-range`.
+    Decimals make 0:1:0.1 hold 0.3, not 0.30000000000000004. Raises `SpecError` (`bad-range`).
     """
     match = _RANGE.fullmatch(text)
     if match is None:

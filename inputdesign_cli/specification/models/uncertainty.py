@@ -89,16 +89,16 @@ class Uncertainty(Section, not_both=(SOURCES,)):
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that the uncertainty is stated once, with names for the rows of a matrix."""
         listed = isinstance(self.scenarios, tuple)
-        drawn = [key for key in (*SOURCES, *_OF_DRAWS) if key in self.model_fields_set]
-        for extra in drawn if listed else ():
-            message = "{key} is for plants that are drawn, and these are listed one by one"
-            yield PathDiagnostic("conflicting-keys", message, f"remove {extra}", (extra,), at_key=True)
+        if listed:
+            for extra in (key for key in (*SOURCES, *_OF_DRAWS) if key in self.model_fields_set):
+                message = "{key} is for plants that are drawn, and these are listed one by one"
+                yield PathDiagnostic("conflicting-keys", message, f"remove {extra}", (extra,), at_key=True)
+        else:
+            yield from self.at_most_one("scenarios", "risk")
         if not listed and not self.stated(*SOURCES):
             hint = "add one of them, or list the plants: scenarios: [{b1: 3.2}, {b1: 4.0}]"
             keys = (*SOURCES, "scenarios")
             yield PathDiagnostic("missing-key", "{key} does not say how the plant may vary", hint, keys=keys)
-        if not listed:
-            yield from self.at_most_one("scenarios", "risk")
         for other in self.stated("worst_case", "risk") if self.discard else ():
             message = f"{{key}} leaves plants out, which does not go with {other}"
             hint = "remove one of the two, or state scenarios: 200: fresh plants show how many are missed"

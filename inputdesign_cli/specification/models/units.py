@@ -17,12 +17,7 @@ _WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*([%A-Za-z\u00b0\u00b5\u03bc/]+)"
 
 
 def without_unit(text: str, time_unit: str | None) -> str:
-    """Return a hint for a number with a unit, which shows the quantity; empty for another text.
-
-    Args:
-        text: in place of a number.
-        time_unit: of the spec, or of the key; None if it is not known.
-    """
+    """Return a hint for a number with a unit in the `time_unit`, if it is known; empty for another text."""
     match = _WITH_UNIT.fullmatch(text.strip())
     if match is None:
         return ""
@@ -31,7 +26,8 @@ def without_unit(text: str, time_unit: str | None) -> str:
         share = f"{float(number) / 100:g}"
         return f"write {share} where a fraction is meant, and {number} where the unit is percent"
     per = unit.startswith("rad/")
-    seconds = _seconds(unit.removeprefix("rad/"))
+    name = unit.removeprefix("rad/")
+    seconds = SECONDS.get(name) or SECONDS.get(synonym(name.lower(), SECONDS) or "")
     rate = _RADIANS.get(unit) or (1.0 / seconds if per and seconds else None)
     named = f"{'rad/' if rate else ''}{time_unit or 'time_unit'}"
     if not rate and not seconds:
@@ -42,8 +38,3 @@ def without_unit(text: str, time_unit: str | None) -> str:
     long = SECONDS[time_unit]
     worth = float(number) * (rate * long if rate else (seconds or 0.0) / long)
     return f"write {worth:.10g}: {'frequencies' if rate else 'times'} are in {named} here"
-
-
-def _seconds(unit: str) -> float | None:
-    """Return the length of a unit of time in seconds; None if it is not known."""
-    return SECONDS.get(unit) or SECONDS.get(synonym(unit.lower(), SECONDS) or "")

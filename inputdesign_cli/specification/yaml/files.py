@@ -15,10 +15,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
-    """Return the text of a spec file, UTF-8 with or without a byte order mark.
-
-    Raises `SpecError`: There is no such file, or it is a folder, not readable, too large, or not UTF-8.
-    """
+    """Return the text of a spec file in UTF-8; `SpecError` if it is missing, a folder or unreadable."""
     name = os.fspath(path)
     try:
         # The path may hold what the operating system cannot even name (a NUL): that is a ValueError.
@@ -57,10 +54,7 @@ def outside(name: str, confine: Path, key: str, location: Location | None) -> Di
 
 
 def decode(raw: bytes, file: str) -> str:
-    """Return the text of UTF-8 bytes; a byte order mark is dropped.
-
-    Raises `SpecError`: `file-encoding`, with the place of the first wrong byte.
-    """
+    """Return the text of UTF-8 bytes without a mark; `SpecError` (`file-encoding`) at a wrong byte."""
     if raw.startswith(_UTF16_MARKS):
         raise _error("file-encoding", f"{file} is encoded as UTF-16", file, "save it as UTF-8")
     try:

@@ -95,8 +95,7 @@ def _refused(tree: Tree, path: Path, message: str, hint: str) -> SpecError:
 def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
     """Apply each `key.path=value` to the tree, in order; `null` as the value removes the key.
 
-    A wrong override becomes a diagnostic of the tree. Missing mappings are created, so a misspelt key is
-    found later, by the check that finds it in a file.
+    A wrong override becomes a diagnostic of the tree. Missing mappings are created.
     """
     for override in overrides:
         try:
@@ -112,15 +111,9 @@ def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError
 
 
 def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
-    """Put plain values at dotted keys of the tree; None removes a key.
+    """Put plain values at dotted keys of the tree, in place, as of a `file`; None removes a key.
 
-    Args:
-        tree: changed in place.
-        changes: values by key, as in `{"experiment.samples": 600}`.
-        file: the name of their file in diagnostics about the new values.
-
-    Raises:
-        SpecError: `bad-override`, a key leads nowhere.
+    Raises `SpecError` (`bad-override`): a key leads nowhere.
     """
     mark = Mark(len(tree.places.sources), 1, 1)
     tree.places.sources.append((file, []))
@@ -144,10 +137,7 @@ def _apply(tree: Tree, override: str) -> None:
 
 
 def _resolve(data: Plain, key: str, override: str) -> Path:
-    """Return the path of a dotted key, with digits turned into indices where the tree has a list.
-
-    Raises `SpecError`: `bad-override`.
-    """
+    """Return the path of a dotted key, with indices in lists; `SpecError` (`bad-override`)."""
     path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(key.strip()))
     if not path or "" in path or not key.isprintable():
         message = f"{override!r} is not of the form key.path=value"

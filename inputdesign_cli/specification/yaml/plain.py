@@ -29,13 +29,8 @@ _DEEPEST = 50
 def plain(value: object, where: str = "", depth: int = 0) -> Plain:
     """Return mappings, lists, tuples, numbers, arrays of numpy and paths of files as plain data.
 
-    Args:
-        value: of any type.
-        where: its key.
-        depth: the number of mappings and lists around it.
-
-    Raises:
-        SpecError: `bad-argument` for values that no file could hold.
+    `where` is its key, inside `depth` mappings and lists. Raises `SpecError` (`bad-argument`) for other
+    values.
     """
     if depth > _DEEPEST:
         raise _no_data("holds itself, or is too deep", where)

@@ -70,15 +70,9 @@ class Tree:
 def read(text: str, file: str, *, source: int = 0, before: str = "", at: Path = ()) -> Tree:
     """Read one YAML document; the tree has the diagnostics of single keys.
 
-    Args:
-        text: YAML.
-        file: The name of the text in diagnostics.
-        source: The number that its marks carry (see `Places`).
-        before: The text before it on its first line (an override's value stands behind `key=`).
-        at: The path of the text's root, if it is a part of a larger tree.
-
-    Raises:
-        SpecError: The text is not YAML, or is too deep or too large.
+    Its marks carry the number `source` (see `Places`). `before` stands before the text on its first line,
+    as `key=` of an override. `at` is the path of its root in a larger tree. Raises `SpecError`: it is not
+    YAML, too deep or too large.
     """
     lines = (before + text).splitlines()
     tree = Tree(None, Places(sources=[(file, lines)]))
@@ -120,10 +114,7 @@ class _Document:
         return SpecError.because(code, message, hint, location=self._location(mark))
 
     def check_size(self, text: str) -> None:
-        """Read the events of a text before its nodes, whose composition recurses and takes memory.
-
-        Raises `SpecError`: `yaml-limit`; `several-documents`.
-        """
+        """Refuse a large text by its events, before its nodes (`yaml-limit`, `several-documents`)."""
         depth = documents = 0
         for event in yaml.parse(text, Loader=_Loader):
             documents += isinstance(event, yaml.DocumentStartEvent)

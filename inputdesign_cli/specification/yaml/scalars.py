@@ -43,10 +43,7 @@ def resolve(word: str) -> Scalar:
 
 
 def plain_number(text: str) -> float:
-    """Return the number of a text in digits 0 to 9; `float` would accept `1_0` and digits of other scripts.
-
-    Raises `ValueError`: the text is no number.
-    """
+    """Return the number of a text in digits 0 to 9, or raise `ValueError`; `float` would take `1_0`."""
     if not NUMBER.fullmatch(text.strip()):
         raise ValueError(f"{clip(text)} is no number")
     return float(text)

@@ -1,11 +1,13 @@
-"""The three goals against each other, families of spectra, and published examples recomputed."""
+"""Goals against each other and plain programs, published examples, and proofs that nothing is feasible."""
 
 import dataclasses
 import itertools
 
+import cvxpy as cp
 import numpy as np
 import pytest
 
+from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import (
     Criterion,
     EllipsoidError,
@@ -13,13 +15,18 @@ from inputdesign_cli.accuracy import (
     ModelError,
     WeightedVariance,
 )
+from inputdesign_cli.design.convex.coordinates import least_white_power
 from inputdesign_cli.design.convex.exchange import exchange
-from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.feasible import UnreachableError
+from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
+from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, zero_order_hold
+from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.spectrum import LinesBasis
 from tests.support.convex_designs import (
     GRID,
+    ORDER,
     anywhere,
     check,
     criterion,
@@ -66,6 +73,12 @@ def test_prior_information_shortens_the_experiment(first_order):
     known = 0.5 * whole.problem.experiment.to_raw(whole.result.information)
     rest = solve(dataclasses.replace(one, prior=known), "samples", relative(), limits=limits)
     assert rest.result.objective == pytest.approx(0.5 * whole.result.objective, rel=1e-5)
+
+
+def test_enough_prior_information_needs_no_excitation(first_order):
+    known = dataclasses.replace(first_order, prior=1e9 * np.eye(3))
+    solution = solve(known, requirements=relative())
+    assert (solution.white_power, solution.result.objective) == (0.0, 0.0)
 
 
 def test_best_criterion_that_still_meets_a_requirement(first_order):
@@ -180,22 +193,13 @@ def test_criteria_of_the_peer(letter, value):
         assert ours.value(1 / design.any_spectrum.objective) == pytest.approx(4.7488407, rel=1e-5)
 
 
-def weighted_example():
-    model = PolynomialModel.single(
-        [0, 0, 0, 0.10276, 0.18123], A=[1, -1.99185, 2.20265, -1.84083, 0.89413], variance=0.05
-    )
-    T = zero_order_hold([0.16], [1, 0.56, 0.16], 1.0)
-    return Experiment(model, 500), [
-        lambda e: WeightedVariance(
-            experiment=e, band=(0.0, np.pi), entry=(0, 0), weight=T, limit=0.01, relative=True
-        )
-    ]
-
-
 def test_weighted_variance_example_of_the_peer():
     """At every frequency 0.8726511; on the peer's grid of 100 points 0.5692322."""
-    experiment, factories = weighted_example()
-    design = solve(experiment, requirements=factories, order=19)
+    A = [1, -1.99185, 2.20265, -1.84083, 0.89413]
+    experiment = Experiment(PolynomialModel.single([0, 0, 0, 0.10276, 0.18123], A=A, variance=0.05), 500)
+    asked = {"band": (0.0, np.pi), "entry": (0, 0), "limit": 0.01, "relative": True}
+    asked["weight"] = zero_order_hold([0.16], [1, 0.56, 0.16], 1.0)
+    design = solve(experiment, requirements=[lambda e: WeightedVariance(experiment=e, **asked)], order=19)
     check(design)
     assert design.result.objective == pytest.approx(0.8726511, rel=1e-5)
     requirement = design.problem.requirements[0]
@@ -204,3 +208,156 @@ def test_weighted_variance_example_of_the_peer():
     coarse = dataclasses.replace(design.problem, requirements=(OnGrid(requirement, grid),))
     answer = exchange(coarse, design.white_power * coarse.basis.even, tolerance=1e-7)
     assert answer.objective == pytest.approx(0.5692322, rel=1e-5)
+
+
+def test_unreachable_accuracy_is_proved(first_order):
+    """Half the least power: the limits must be doubled, and the proof says so."""
+    least = solve(first_order, requirements=relative()).result.objective
+    with pytest.raises(UnreachableError) as caught:
+        solve(first_order, requirements=relative(), limits=[PowerLimit("input", 0.5 * least)])
+    assert caught.value.nearest.certificate.bound == pytest.approx(2.0, rel=1e-4)
+    assert not caught.value.limits_alone
+
+
+def test_contradictory_limits_are_proved(first_order):
+    """Input power times the peak of |G|^2 is the most output power there is."""
+    floors = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
+    with pytest.raises(UnreachableError) as caught:
+        solve(first_order, requirements=relative(), basis=anywhere(), limits=floors)
+    assert caught.value.limits_alone
+    assert caught.value.nearest.certificate.bound == pytest.approx(288.0 / 144.0, rel=1e-4)
+
+
+def test_too_few_lines_are_refused():
+    B, A = [0, 1.0, 0.5], [1, -0.5, 0.3]
+    experiment = Experiment(PolynomialModel.single(B, A=A), 100000)
+    oe = Experiment(PolynomialModel.single(B, F=A), 100)
+    with pytest.raises(SpecError) as caught:
+        solve(oe, requirements=relative(0.1), basis=LinesBasis.at(np.array([0.4]), 1))
+    assert caught.value.diagnostics[0].code == "too-few-lines"
+    # ARX learns from the noise as well, so that a modest accuracy is within reach of a single line.
+    line = LinesBasis.at(np.array([0.4]), 1)
+    assert solve(experiment, requirements=relative(0.3), basis=line).result.gap <= 1e-6
+    with pytest.raises(InfeasibleError):
+        solve(experiment, requirements=relative(0.001), basis=line)
+
+
+def gram_program(problem, order, unit=1.0):
+    """A FIR spectrum as a Gram matrix: (c, M as an expression, constraints), unknowns over `unit`."""
+    scaled = cp.Variable(order + 1)
+    c = unit * scaled
+    gram = cp.Variable((order + 1, order + 1), PSD=True)
+    constraints = [cp.trace(gram) == scaled[0]]
+    constraints += [cp.sum(cp.diag(gram, k)) == scaled[k] for k in range(1, order + 1)]
+    maps = problem.information_map
+    M = problem.baseline_information + sum(c[i] * maps[i] for i in range(order + 1))
+    return c, M, constraints
+
+
+@pytest.mark.parametrize("letter", ["D", "A", "E", "T"])
+def test_criteria_agree_with_a_plain_program(letter):
+    """log_det, tr_inv, lambda_min and trace of cvxpy under two power limits."""
+    model = PolynomialModel.single([0, 1.0, 0.4], A=[1, -0.8], variance=0.5)
+    experiment = Experiment(model, 100)
+    limits = [PowerLimit("input", 1.0), PowerLimit("output", 2.5)]
+    design = solve(experiment, "factor", criterion(letter), limits=limits)
+    check(design)
+    raw = dataclasses.replace(design.problem, experiment=experiment, finer=None)
+    c, M, constraints = gram_program(raw, ORDER)
+    constraints += [raw.power(limit.kind).vector @ c <= limit.bound for limit in limits]
+    value = {
+        "D": lambda: cp.log_det(M),
+        "A": lambda: -cp.tr_inv(M),
+        "E": lambda: cp.lambda_min(M),
+        "T": lambda: cp.trace(M),
+    }[letter]()
+    plain = cp.Problem(cp.Maximize(value), constraints).solve(solver=cp.CLARABEL)
+    ours = Criterion(letter, np.eye(3))
+    assert ours.value(1 / design.result.objective) == pytest.approx(plain, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_capped_least_cost_agrees_with_a_plain_program():
+    """A cost that pulls one way and a limit that pulls the other: input cost under a cap on the output."""
+    experiment, kind, order = resonant(), "output", 10
+    free = solve(experiment, requirements=relative(0.1), order=order)
+    quiet = solve(experiment, requirements=relative(0.1), order=order, cost={"output": 1.0})
+    loud = free.problem.power(kind).at(free.result.x)
+    assert quiet.result.objective < 0.9 * loud
+    bound = 0.5 * (quiet.result.objective + loud)
+    limits = [PowerLimit(kind, bound)]
+    design = solve(experiment, requirements=relative(0.1), order=order, limits=limits)
+    check(design)
+    assert design.result.objective > free.result.objective
+    problem = design.problem
+    c, M, constraints = gram_program(problem, order, unit=design.result.objective)
+    scale, requirement = design.result.objective, problem.requirements[0]
+    w = np.union1d(np.linspace(0.0, np.pi, 200), design.result.active_frequencies)
+    K = np.linalg.inv(np.linalg.cholesky(design.result.information))
+    for at in w:
+        slack = K @ (M - requirement.cut(float(at)).matrix) @ K.T
+        constraints.append(0.5 * (slack + slack.T) >> 0)
+    constraints.append(problem.power(kind).vector @ c / bound <= 1.0)
+    plain = cp.Problem(cp.Minimize(problem.price.vector @ c / scale), constraints).solve(solver=cp.CLARABEL)
+    assert plain == pytest.approx(1.0, rel=1e-5)
+
+
+def test_density_limits_agree_with_a_plain_program(first_order):
+    """Upper and lower bounds on Phi at every frequency against 400 rows of them."""
+    upper = DensityLimit(lambda w: 1.5 + 0.5 * np.cos(w), np.linspace(0.0, np.pi, 300))
+    lower = DensityLimit(lambda w: np.full(np.shape(w), 0.02), np.linspace(0.0, np.pi, 300), upper=False)
+    design = solve(first_order, requirements=relative(0.02), densities=[upper, lower])
+    check(design)
+    problem = design.problem
+    c, M, constraints = gram_program(problem, ORDER)
+    requirement = problem.requirements[0]
+    w = np.linspace(0.0, np.pi, 400)
+    constraints += [M - requirement.cut(float(at)).matrix >> 0 for at in np.linspace(0, np.pi, 60)]
+    functions = np.array([problem.basis.density(x, w) for x in np.eye(problem.basis.size)]).T
+    constraints += [functions @ c <= upper.level(w), functions @ c >= lower.level(w)]
+    plain = cp.Problem(cp.Minimize(problem.price.vector @ c), constraints).solve(solver=cp.CLARABEL)
+    assert design.result.objective == pytest.approx(plain, rel=1e-4)
+    assert design.result.objective >= plain * (1 - 1e-6)
+
+
+def test_implied_power_bounds_the_power_of_every_spectrum_below(first_order):
+    density = DensityLimit(lambda w: 2.0 + np.cos(3 * w), np.linspace(0.0, np.pi, 500))
+    assert implied_power(density).bound == pytest.approx(2.0, rel=1e-2)
+    assert implied_power(density).bound >= 2.0
+
+
+COLOURED = """
+plant: {B: [0, %g], F: [1, 0.0]}
+noise: {C: [1, 0.0], variance: 1.0}
+experiment:
+  samples: 400
+  prior: {parameters: [b1, c1, f1], information: [[%g, 0, 0], [0, 100, 40], [0, 40, %g]]}
+accuracy: {model_error: {relative: 0.1}, standard_deviation: {c1: %g}}
+spectrum: {type: fir, order: 2}
+"""
+
+
+def asked(gain, deviation):
+    """The input in a unit of its own; what is known of c1 and f1 hangs together."""
+    text = COLOURED % (gain, 50.0 / gain**2, 50.0, deviation)
+    return build_convex(parse_spec(text)).asked.question
+
+
+@pytest.mark.parametrize("gain", [1e-6, 1.0, 1e6])
+def test_what_only_the_noise_tells_is_out_of_reach_in_any_units(gain):
+    """Where b1 and f1 are known, var c1 = 1 / (100 + N): the ratio that stays is 1 / (sqrt(500) 0.03)."""
+    question = asked(gain, 0.03)
+    with pytest.raises(InfeasibleError) as refused:
+        least_white_power(question.experiment, question.requirements)
+    assert f"{1.0 / np.sqrt(500.0) / 0.03:.6g} times" in refused.value.diagnostics[0].message
+
+
+@pytest.mark.parametrize("gain", [1e-6, 1e6])
+def test_the_least_power_is_that_of_the_other_units(gain):
+    powers = [
+        least_white_power(question.experiment, question.requirements) * g**2
+        for g in (1.0, gain)
+        for question in [asked(g, 0.06)]
+    ]
+    assert powers[0] > 0.0
+    assert powers[1] == pytest.approx(powers[0], rel=1e-9)

@@ -1,13 +1,22 @@
-"""The dense interior-point method against Clarabel on random finite programs of every kind."""
+"""Finite programs: the interior-point method against Clarabel, and linear ones of lines against cvxpy."""
 
 import dataclasses
 
+import cvxpy as cp
 import numpy as np
 import pytest
 
 from inputdesign_cli.accuracy.cuts import DeterminantCut, EllipsoidCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, by_cones, by_interior
-from inputdesign_cli.spectrum import Face, svec, svec_length
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.response_lines import (
+    ResponseLines,
+    ResponseProblem,
+    UnreachableError,
+    cheapest,
+    most_accurate,
+)
+from inputdesign_cli.spectrum import Face, smat, svec, svec_length
 
 K = 5
 
@@ -56,11 +65,7 @@ def random_program(rng, kind, cuts, goal):
         gains = np.array([svec(psd(rng, 1)) for _ in range(n)]).T
     else:
         maps = rng.normal(size=(3, K, face.order)) / 2
-        units = np.zeros((n, face.order, face.order))
-        for column, unit in enumerate(units):
-            vector = np.eye(n)[column]
-            unit[:] = matrix_of(vector, face.order)
-        gains = np.array([svec(sum(B @ unit @ B.T for B in maps)) for unit in units]).T
+        gains = np.array([svec(sum(B @ smat(unit) @ B.T for B in maps)) for unit in np.eye(n)]).T
     offset = svec(0.01 * np.eye(K))
     if goal == "cost":
         caps = -np.eye(n)[:1]
@@ -91,13 +96,6 @@ def random_program(rng, kind, cuts, goal):
         unit=1.3,
         size=K,
     )
-
-
-def matrix_of(vector, order):
-    found = np.zeros((order, order))
-    columns, rows = np.tril_indices(order)
-    found[rows, columns] = found[columns, rows] = vector / np.where(rows == columns, 1.0, np.sqrt(2.0))
-    return found
 
 
 @pytest.mark.first(16)
@@ -148,3 +146,74 @@ def test_information_in_blocks_is_the_same_program():
     assert error <= 1e-6
     reference = by_cones(split, tolerance=1e-9)
     assert split.cost @ found.v == pytest.approx(split.cost @ reference.v, rel=1e-7)
+
+
+def random_problem(seed, *, floors):
+    rng = np.random.default_rng(seed)
+    n, caps = int(rng.integers(2, 12)), int(rng.integers(1, 4))
+    needed, price = rng.uniform(0.1, 3.0, n), rng.uniform(0.0, 2.0, n)
+    rows = rng.uniform(0.0, 2.0, (caps + floors, n))
+    rows[:, rng.integers(n)] += 0.1
+    used = rows @ needed
+    # Floors that proportional powers within the caps just miss or just meet.
+    bounds = [*(used[:caps] * rng.uniform(1.5, 4.0, caps)), *(used[caps:] * rng.uniform(0.5, 1.6, floors))]
+    limits = [PowerLimit("output", float(b), i < caps, i) for i, b in enumerate(bounds)]
+    return ResponseProblem(needed, price, tuple(limits), rows)
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("floors", [0, 2])
+@pytest.mark.parametrize("design", [cheapest, most_accurate])
+def test_the_best_lines_are_those_of_a_plain_program(seed, floors, design):
+    cheap = design is cheapest
+    problem = random_problem(seed if cheap else 100 + seed, floors=floors)
+    found = design(problem)
+    p, s = cp.Variable(problem.needed.size), 1.0 if cheap else cp.Variable()
+    held = [p >= s * problem.needed]
+    for limit, row in zip(problem.limits, problem.rows, strict=True):
+        held.append(row @ p <= limit.bound if limit.upper else row @ p >= limit.bound)
+    plain = cp.Problem(cp.Minimize(problem.price @ p) if cheap else cp.Maximize(s), held)
+    plain.solve(solver=cp.CLARABEL)
+    assert found.value == pytest.approx(plain.value, rel=1e-6)
+    by_hand = problem.price @ found.powers if cheap else np.min(found.powers / problem.needed)
+    assert found.value == pytest.approx(by_hand, rel=1e-12 if cheap else 1e-9)
+    assert (found.bound <= found.value * (1 + 1e-12)) if cheap else (found.bound >= found.value * (1 - 1e-12))
+    assert found.gap < 1e-8
+
+
+def test_without_limits_every_line_just_meets_its_bound():
+    lines = ResponseLines(
+        np.ones((3, 1, 1)) + 0j, np.array([[0.5], [1.0], [2.0]]), np.array([0.1, 0.2, 0.1]).reshape(3, 1, 1)
+    )
+    needed = lines.needed(100)
+    assert needed[:, 0] == pytest.approx([1.0, 0.5, 4.0])  # 2 Phi_v / (N r_adm^2)
+    assert lines.ratios(lines.deviations(needed, 100)) == pytest.approx(1.0)
+    problem = ResponseProblem(needed.ravel(), np.ones(3), (), np.zeros((0, 3)))
+    assert cheapest(problem).powers == pytest.approx(needed.ravel())
+
+
+def test_the_worst_output_of_an_input_sets_the_power_of_its_lines():
+    admitted = np.array([[[0.1, 1.0], [0.2, 0.1]]])
+    lines = ResponseLines(np.ones((1, 2, 2)) + 0j, np.array([[1.0, 4.0]]), admitted)
+    needed = lines.needed(200)
+    assert needed[0] == pytest.approx([2.0 / 200 / 0.01, 8.0 / 200 / 0.01])
+    assert lines.ratios(lines.deviations(needed, 200)) == pytest.approx(1.0)
+
+
+def test_limits_that_are_too_tight_say_by_how_much():
+    limit = PowerLimit("input", 1.0)
+    problem = ResponseProblem(np.array([1.0, 3.0]), np.ones(2), (limit,), np.ones((1, 2)))
+    with pytest.raises(UnreachableError) as caught:
+        cheapest(problem)
+    assert caught.value.factor == pytest.approx(2.0)  # a quarter of the power: twice the deviation
+    assert caught.value.limits == (limit,)
+
+
+def test_limits_that_contradict_each_other_are_told():
+    rows = np.array([[1.0, 1.0], [1.0, 1.0]])
+    limits = (PowerLimit("input", 5.0), PowerLimit("output", 6.0, upper=False))
+    problem = ResponseProblem(np.ones(2), np.ones(2), limits, rows)
+    for solve in (cheapest, most_accurate):
+        with pytest.raises(UnreachableError) as caught:
+            solve(problem)
+        assert np.isinf(caught.value.factor)

@@ -1,4 +1,4 @@
-"""The bound over all records within an amplitude, against all records of a few samples."""
+"""Bounds over all records within an amplitude, against enumeration and closed forms."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.amplitude.polytope import LagPolytope
+from inputdesign_cli.design.amplitude.windows import Windows, weighted
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.record_bound import bound_over_records
 from inputdesign_cli.information import FiniteRecord
@@ -62,9 +65,7 @@ PLANTS = [
 def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
     samples = 10
     design = designed(plant, samples, accuracy)
-    assert design.any_spectrum is not None
     bound = bound_over_records(design.problem, design.any_spectrum, samples, windows=8)
-    assert bound is not None
     goal = worst_of(design, samples)
     best = best_of_all(goal, samples)
     assert np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
@@ -81,9 +82,7 @@ def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
 def test_held_values_have_a_bound_of_their_own():
     hold, values = 3, 8
     design = designed({"B": [0, 0.4], "F": [1, -0.9]}, hold * values, ERROR)
-    assert design.any_spectrum is not None
     bound = bound_over_records(design.problem, design.any_spectrum, hold * values, windows=8, hold=hold)
-    assert bound is not None
     best = best_of_all(worst_of(design, hold * values), values, hold)
     assert 0.6 * best <= np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
 
@@ -91,9 +90,7 @@ def test_held_values_have_a_bound_of_their_own():
 def test_fewer_samples_than_the_bound_do_not_suffice():
     relative = {"model_error": {"relative": 1.0, "band": [0.02, 2.5], "alpha": 3}}
     design = designed({"B": [0, 1.0], "F": [1, -0.5]}, 9, relative, "shortest_experiment")
-    assert design.any_spectrum is not None
     bound = bound_over_records(design.problem, design.any_spectrum, 9, windows=6)
-    assert bound is not None
     fewer = int(bound.bound) - 1
     assert 4 <= fewer <= 12
     factor = designed({"B": [0, 1.0], "F": [1, -0.5]}, fewer, relative)
@@ -103,9 +100,7 @@ def test_fewer_samples_than_the_bound_do_not_suffice():
 def test_two_inputs():
     plant = {"B": [[[0, 1.0], [0, 0.5]]], "F": [[[1, -0.5], [1, 0.3]]]}
     design = designed(plant, 6, {"criterion": "D"})
-    assert design.any_spectrum is not None
     bound = bound_over_records(design.problem, design.any_spectrum, 6, windows=4)
-    assert bound is not None
     goal = worst_of(design, 6)
     letters = np.array(list(product((-1.0, 1.0), repeat=2)))
     best = min(goal.worst(goal.plant.information(np.array(u))) for u in product(letters, repeat=6))
@@ -116,15 +111,98 @@ def test_a_reference_figure_of_the_window_bound():
     """Plant 6 of the eight output-error plants: 0.2834 by the power, 0.2977 by windows of twelve values."""
     plant = {"B": [0, -2.853291838457013], "F": [1, -0.5059625218880031]}
     design = designed(plant, 300, ERROR)
-    assert design.any_spectrum is not None
     bound = bound_over_records(design.problem, design.any_spectrum, 300, windows=8)
-    assert bound is not None
     assert np.sqrt(design.any_spectrum.certificate.bound) == pytest.approx(0.2834, abs=5e-5)
     assert np.sqrt(bound.bound) == pytest.approx(0.2977, abs=4e-4)
 
 
-@pytest.mark.parametrize("more", [{"experiment": {"samples": 50, "controller": {"numerator": [0.2]}}}])
-def test_there_is_none_in_a_loop(more):
+def test_a_record_shorter_than_the_longest_run_is_searched():
+    design = designed({"B": [0, 1.3], "F": [1, 0.4]}, 5, {"criterion": "D"})
+    goal = worst_of(design, 5)
+    start = np.ones((5, 1))
+    search = FlipSearch([goal], np.array([[-1.0], [1.0]]), 5)
+    _, found = search.best([start], np.random.default_rng(0), enough=0.0, over=lambda: False, changes=20)
+    assert found == pytest.approx(best_of_all(goal, 5), rel=1e-9)
+
+
+def test_there_is_none_in_a_loop():
+    more = {"experiment": {"samples": 50, "controller": {"numerator": [0.2]}}}
     design = designed({"B": [0, 0.63], "F": [1, -0.5]}, 50, ERROR, **more)
-    assert design.any_spectrum is not None
     assert bound_over_records(design.problem, design.any_spectrum, 50, windows=8) is None
+
+
+def _form_of(record: Array, form: Array) -> float:
+    """Return sum u_t^T Q_0 u_t + 2 sum u_t^T Q_k u_(t-k), term by term."""
+    total = 0.0
+    for t in range(len(record)):
+        for lag in range(min(len(form), t + 1)):
+            total += (1.0 if lag == 0 else 2.0) * record[t] @ form[lag] @ record[t - lag]
+    return float(total)
+
+
+def _random_form(length: int, inputs: int, seed: int) -> Array:
+    form = np.random.default_rng(seed).standard_normal((length, inputs, inputs))
+    form[0] = form[0] @ form[0].T
+    return form
+
+
+@pytest.mark.parametrize(
+    ("inputs", "length", "samples"), [(1, 2, 5), (1, 4, 11), (1, 9, 6), (1, 5, 1), (2, 3, 5)]
+)
+def test_largest_sum_is_that_of_all_records(inputs: int, length: int, samples: int) -> None:
+    windows = Windows.within(np.array([1.5, 0.5])[:inputs], length)
+    form = _random_form(length, inputs, length)
+    largest, record = windows.largest_sum(form, samples)
+    every = [_form_of(np.array(letters), form) for letters in product(windows.letters, repeat=samples)]
+    assert largest == pytest.approx(max(every), rel=1e-12)
+    assert _form_of(record, form) == pytest.approx(largest, rel=1e-12)
+
+
+def test_values_between_the_ends_of_the_range_gain_nothing() -> None:
+    windows, form = Windows.within(np.ones(1), 4), _random_form(4, 1, 0)
+    three = Windows(np.array([[-1.0], [0.2], [1.0]]), 4)
+    assert three.largest_sum(form, 9)[0] == pytest.approx(windows.largest_sum(form, 9)[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_cycle_has_a_larger_mean(seed: int) -> None:
+    windows, form = Windows.within(np.ones(1), 3), _random_form(3, 1, seed)
+    bound, cycle, _ = windows.largest_mean(form)
+    means = [
+        float(np.sum(weighted(form) * windows.lags(np.array(letters))))
+        for period in range(1, 9)  # four states: the best cycle is no longer than four
+        for letters in product(windows.letters, repeat=period)
+    ]
+    assert max(means) <= bound * (1.0 + 1e-12) + 1e-12
+    assert float(np.sum(weighted(form) * windows.lags(cycle))) == pytest.approx(max(means), rel=1e-6)
+
+
+@pytest.mark.parametrize(("c1", "c2"), [(0.3, -0.2), (-0.8, 0.1), (0.5, -0.9), (0.9, 0.9)])
+def test_gauge_of_three_lags_is_the_known_polytope(c1: float, c2: float) -> None:
+    """Three signs have s_1 s_2 + s_2 s_3 + s_1 s_3 >= -1, so that 1 + c_2 >= 2 |c_1|; and |c_2| <= 1."""
+    polytope = LagPolytope(Windows.within(np.array([2.0]), 3))
+    multiple, face = polytope.gauge(4.0 * np.array([1.0, c1, c2]).reshape(3, 1, 1))
+    # The least c_0 / a^2 with c_0 + c_2 >= 2 |c_1| and c_0 >= |c_2|, c_0 >= 1.
+    assert multiple == pytest.approx(max(1.0, 2.0 * abs(c1) - c2, abs(c2)), rel=1e-9)
+    assert face.share == pytest.approx(multiple, rel=1e-4)
+
+
+def test_no_signal_exceeds_a_face() -> None:
+    rng = np.random.default_rng(3)
+    polytope = LagPolytope(Windows.within(np.array([1.0, 2.0]), 4))
+    w = 0.7
+    lags = np.array([np.cos(k * w) * np.array([[1.0, 1.0], [1.0, 4.0]]) for k in range(4)])
+    multiple, face = polytope.gauge(lags)
+    assert multiple > 1.1
+    for _ in range(200):
+        signal = polytope.windows.letters[rng.integers(4, size=int(rng.integers(1, 30)))]
+        assert np.sum(weighted(face.form) * polytope.windows.lags(signal)) <= 1.0 + 1e-9
+
+
+def test_longer_windows_know_more() -> None:
+    lags = np.cos(0.4 * np.arange(8)).reshape(8, 1, 1)
+    short = LagPolytope(Windows.within(np.ones(1), 3))
+    multiple, _ = short.gauge(lags[:3])
+    longer, face = short.longer(8).gauge(lags)
+    assert longer >= multiple
+    assert face.share == pytest.approx(longer, rel=1e-4)

@@ -2,10 +2,12 @@
 
 import dataclasses
 import itertools
+from math import comb
 
 import cvxpy as cp
 import numpy as np
 import pytest
+import scipy.optimize
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import Criterion
@@ -13,6 +15,7 @@ from inputdesign_cli.design.convex.demands import Demands
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Alternative, Question
+from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before, samples_for, unlikely
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
@@ -221,15 +224,46 @@ def test_what_was_seen_before_hides_no_violation(first_order, above):
             assert max(worst) == max(v.ratio for _, v in alone)
 
 
-def test_after_a_small_step_no_scenario_is_searched_again(first_order, monkeypatch):
-    """Each meets what is asked by 2 % where it was searched, and the next one tells 1 % less."""
-    others = alternatives(first_order, around(first_order, 12, 1e-4, seed=1), 0.1)
-    problem = solve_design(question(first_order, others), tolerance=1e-4).problem
-    told = problem.informations(problem.basis.even)
-    worst = Demands(problem.scenarios).largest(told, default=0.0)
-    informations = (worst / 0.98) ** 2 * told  # ratios fall as the root
-    demands = Demands(problem.scenarios)
-    assert demands.violations(informations, above=1.0) == []
-    kind = type(problem.scenarios[0].requirements[0])
-    monkeypatch.setattr(kind, "violations", lambda *_, **__: pytest.fail("searched again"))
-    assert demands.violations(0.99 * informations, above=1.0) == []
+@pytest.mark.parametrize(("unknowns", "needed"), [(11, 476), (21, 752)])
+def test_the_number_of_scenarios_before_the_design(unknowns, needed):
+    """By the binomial sum itself: eps = 0.05 with confidence 0.999."""
+    assert samples_for(0.05, 1e-3, unknowns) == needed
+
+    def tail(number):
+        return sum(comb(number, i) * 0.05**i * 0.95 ** (number - i) for i in range(unknowns))
+
+    assert tail(needed) <= 1e-3 < tail(needed - 1)
+    assert unlikely(0.05, needed, unknowns) == pytest.approx(tail(needed), rel=1e-9)
+    assert risk_before(needed, 1e-3, unknowns) == pytest.approx(0.05, abs=2e-4)
+
+
+@pytest.mark.parametrize(("support", "risk"), [(1, 0.0576), (3, 0.0786), (5, 0.0968)])
+def test_the_risk_once_the_support_is_known(support, risk):
+    """200 scenarios; and the root of the polynomial as the paper has it."""
+    found = risk_after(200, 1e-3, support)
+    assert found == pytest.approx(risk, abs=5e-5)
+    t = 1.0 - found
+    left = 1e-3 / 201 * sum(comb(m, support) * t ** (m - support) for m in range(support, 201))
+    assert left == pytest.approx(comb(200, support) * t ** (200 - support), rel=1e-6)
+
+
+def test_nothing_is_said_by_too_few():
+    assert risk_before(5, 1e-3, 7) == risk_after(3, 1e-3, 3) == 1.0
+    risks = [risk_after(100, 1e-3, k) for k in range(8)]
+    assert risks == sorted(risks)
+
+
+@pytest.mark.slow
+def test_random_programs_keep_the_risk():
+    """min c x subject to a x >= 1 for a on the unit circle's upper right: the violation is known exactly."""
+    rng = np.random.default_rng(1)
+    beta, number, broken = 0.05, 60, 0
+    for _ in range(300):
+        angles = rng.uniform(0.0, 0.5 * np.pi, number)
+        rows = np.column_stack([np.cos(angles), np.sin(angles)])
+        x = scipy.optimize.linprog([1.0, 1.0], A_ub=-rows, b_ub=-np.ones(number)).x
+        support = int(np.sum(np.abs(rows @ x - 1.0) < 1e-9))
+        phi = np.linspace(0.0, 0.5 * np.pi, 4001)
+        violated = np.mean(np.cos(phi) * x[0] + np.sin(phi) * x[1] < 1.0)
+        broken += violated > risk_after(number, beta, support)
+    assert broken <= 300 * beta

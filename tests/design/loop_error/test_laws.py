@@ -1,12 +1,25 @@
-"""Each control law gives the loop it promises, and its derivative is that of finite differences."""
+"""Control laws, power limits and the weight Z: definitions, certificates, plain programs."""
 
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import InternalModel, MinimumVariance, ModelReference
-from inputdesign_cli.design.loop_error.laws import propagation
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.loop_error import InternalModel, MinimumVariance, ModelReference, design_within
+from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of, weight
+from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
+from inputdesign_cli.design.loop_error.problem import metric
 from inputdesign_cli.plant import Rational, TransferMatrix, zero_order_hold
-from tests.support.loop_error import matrix_plant, random_complex, random_plant
+from tests.support.loop_error import (
+    GAINS,
+    adjoint,
+    column,
+    jacobian,
+    kronecker,
+    matrix_plant,
+    random_complex,
+    random_hermitian,
+    random_plant,
+)
 
 W = np.array([0.1, 0.7, 1.9, 3.0])
 
@@ -110,3 +123,197 @@ def test_a_zero_order_hold_of_a_lag():
     np.testing.assert_allclose(above, [0, 1 - a], atol=1e-15)
     np.testing.assert_allclose(below, [1, -a], atol=1e-15)
     assert above[0] == 0.0
+
+
+def case(n, K, seed):
+    rng = np.random.default_rng(seed)
+    A = random_hermitian(rng, K, n)
+    G = random_complex(rng, K, n, n)
+    units = [np.diag(row) for row in np.eye(n)]
+    metrics = [np.broadcast_to(u.astype(complex), (K, n, n)) for u in units]
+    metrics += [adjoint(G) @ u @ G for u in units]
+    return A, np.array(metrics), rng.uniform(0.5, 5.0, 2 * n), np.full(K, 1 / K)
+
+
+def grid_program(A, metrics, limits, weights):
+    """The textbook program: a complex matrix inequality for each frequency, in cvxpy."""
+    import cvxpy as cp
+
+    K, n, _ = A.shape
+    Phi = [cp.Variable((n, n), hermitian=True) for _ in range(K)]
+    Q = [cp.Variable((n, n), hermitian=True) for _ in range(K)]
+    root = power_of(A, 0.5)
+    constraints = [cp.bmat([[Q[k], root[k]], [root[k], Phi[k]]]) >> 0 for k in range(K)]
+    for M, limit in zip(metrics, limits, strict=True):
+        constraints.append(cp.real(sum(weights[k] * cp.trace(M[k] @ Phi[k]) for k in range(K))) <= limit)
+    value = cp.real(sum(weights[k] * cp.trace(Q[k]) for k in range(K)))
+    return cp.Problem(cp.Minimize(value), constraints).solve(solver=cp.CLARABEL)
+
+
+@pytest.mark.first(6)
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_gap_closes_and_the_certificate_holds(n, seed):
+    A, metrics, limits, weights = case(n, 96, seed)
+    design = design_within(A, metrics, limits, weights)
+    assert abs(design.gap) < 1e-10
+    powers = np.einsum("pkab,kba,k->p", metrics, design.spectrum, weights).real
+    assert np.all(powers <= limits * (1 + 1e-12))
+    np.testing.assert_allclose(powers, design.powers, rtol=1e-10)
+    np.testing.assert_allclose(error_of(A, design.spectrum) @ weights, design.value, rtol=1e-12)
+    # The bound is the dual function written out, and it belongs to nonnegative multipliers.
+    assert np.all(design.multipliers >= 0)
+    M = np.einsum("p,pkab->kab", design.multipliers, metrics)
+    root = power_of(A, 0.5)
+    values = np.linalg.eigvalsh(root @ M @ root)
+    dual = 2 * np.sqrt(np.maximum(values, 0)).sum(axis=1) @ weights - design.multipliers @ limits
+    np.testing.assert_allclose(design.lower_bound, dual, rtol=1e-10)
+    # Complementarity: only limits that bind have a price.
+    slack = 1 - powers / limits
+    assert np.max(design.multipliers * limits * slack) < 1e-9 * design.value
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_optimum_is_that_of_the_grid_program(seed):
+    A, metrics, limits, weights = case(2, 12, seed)
+    design = design_within(A, metrics, limits, weights)
+    assert design.value == pytest.approx(grid_program(A, metrics, limits, weights), rel=2e-6)
+
+
+def test_one_total_limit_is_the_closed_form():
+    A, _, _, weights = case(3, 64, 3)
+    design = design_within(
+        A, np.broadcast_to(np.eye(3, dtype=complex), (1, 64, 3, 3)), np.array([2.5]), weights
+    )
+    root = power_of(A, 0.5)
+    total = np.trace(root, axis1=1, axis2=2).real @ weights
+    np.testing.assert_allclose(design.spectrum, root * 2.5 / total, rtol=1e-10, atol=1e-12)
+    assert design.value == pytest.approx(total**2 / 2.5, rel=1e-12)
+
+
+def test_the_value_falls_as_one_over_the_limits():
+    A, metrics, limits, weights = case(2, 64, 5)
+    once, twice = (design_within(A, metrics, f * limits, weights) for f in (1.0, 2.0))
+    assert twice.value == pytest.approx(once.value / 2, rel=1e-10)
+
+
+def test_a_limit_that_does_not_bind_has_no_price():
+    A, metrics, limits, weights = case(2, 64, 6)
+    limits[3] = 1e6
+    design = design_within(A, metrics, limits, weights)
+    without = design_within(A, metrics[:3], limits[:3], weights)
+    assert design.value == pytest.approx(without.value, rel=1e-9)
+    assert design.multipliers[3] * limits[3] < 1e-9 * design.value
+
+
+def test_the_column_with_a_limit_for_each_input_and_output():
+    limits = (
+        PowerLimit("input", 1.2, channel=0),
+        PowerLimit("input", 0.6, channel=1),
+        PowerLimit("output", 1e-3, channel=0),
+        PowerLimit("output", 1e-3, channel=1),
+    )
+    problem = column(limits=limits)
+    design, rule, change = problem.asymptotic()
+    assert abs(design.gap) < 1e-10
+    assert change < 1e-10
+    again = problem.spectrum_at(rule.nodes, design.multipliers)
+    ratio = np.trace(design.spectrum, axis1=1, axis2=2).real / np.trace(again, axis1=1, axis2=2).real
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+
+
+GRID = np.linspace(0.05, 3.0, 40)
+
+
+def random_case(n, seed=0):
+    rng = np.random.default_rng(seed)
+    G = random_complex(rng, GRID.size, n, n)
+    law = ModelReference(
+        TransferMatrix.build(
+            [[[0.0, *(0.3 * rng.standard_normal(2))] for _ in range(n)] for _ in range(n)],
+            [[[1.0, -0.6]] * n] * n,
+        )
+    )
+    return law, G, random_hermitian(rng, GRID.size, n), random_hermitian(rng, GRID.size, n)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_weight_agrees_with_formula_19_and_with_the_general_formula(n, seed):
+    law, G, entering, noise = random_case(n, seed)
+    S = sensitivity(law.complementary(GRID))
+    CS = law.controller(G, GRID) @ S
+    power = np.trace(S @ noise @ adjoint(S), axis1=1, axis2=2).real
+    by_19 = power[:, None, None] * np.conj(CS @ entering @ adjoint(CS))
+    scale = np.abs(by_19).max(axis=(1, 2), keepdims=True)
+    by_13 = weight(kronecker(np.swapaxes(S, 1, 2), S @ G) @ jacobian(law, G, GRID), entering, noise)
+    np.testing.assert_allclose(by_13 / scale, by_19 / scale, atol=1e-12)
+    finite = weight(propagation(law, G, GRID), entering, noise)
+    np.testing.assert_allclose(finite / scale, by_19 / scale, atol=1e-12)
+    assert np.abs(by_19.imag / scale).max() > 0.05  # so that a lost transpose would show
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_z_is_what_the_covariance_of_the_estimate_costs(n):
+    """tr(Z Phi^-T) against E|vec(S G dC S R)|^2 with cov(vec dG) = Phi^-T (x) Phi_v, written out."""
+    law, G, entering, noise = random_case(n, 11)
+    Phi = random_hermitian(np.random.default_rng(5), GRID.size, n)
+    Z = weight(propagation(law, G, GRID), entering, noise)
+    S = sensitivity(law.complementary(GRID))
+    J = jacobian(law, G, GRID)
+    for k in range(0, GRID.size, 7):
+        R = np.linalg.cholesky(entering[k])
+        sent = np.kron((S[k] @ R).T, S[k] @ G[k]) @ J[k]
+        covariance = np.kron(np.linalg.inv(Phi[k]).T, noise[k])
+        expected = np.trace(sent @ covariance @ adjoint(sent)).real
+        np.testing.assert_allclose(np.trace(Z[k] @ np.linalg.inv(Phi[k]).T).real, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_the_best_spectrum_is_z_to_the_half_transposed_and_no_other_is_better(n):
+    rng = np.random.default_rng(n)
+    Z = random_hermitian(rng, GRID.size, n)
+    A = np.swapaxes(Z, 1, 2)
+    Phi = best_spectrum(A, np.broadcast_to(np.eye(n, dtype=complex), A.shape))
+    np.testing.assert_allclose(Phi, np.swapaxes(power_of(Z, 0.5), 1, 2), atol=1e-10)
+    least = error_of(A, Phi) + np.trace(Phi, axis1=1, axis2=2).real
+    for _ in range(20):
+        other = Phi + 0.1 * random_hermitian(rng, GRID.size, n)
+        assert np.all(error_of(A, other) + np.trace(other, axis1=1, axis2=2).real > least)
+
+
+def test_the_best_spectrum_solves_its_stationarity_condition():
+    rng = np.random.default_rng(2)
+    A, M = random_hermitian(rng, 30, 3), random_hermitian(rng, 30, 3)
+    Phi = best_spectrum(A, M)
+    np.testing.assert_allclose(Phi @ M @ Phi, A, atol=1e-10)
+
+
+def test_the_spectrum_of_the_column_is_the_matrix_root_times_s2():
+    problem = column()
+    w = np.array([0.01, 0.02667, 1.0, np.pi])
+    z = np.exp(1j * w)
+    a = np.exp(-2 / 75)
+    S2 = np.abs(z - 1) / np.abs(z - a) ** 2
+    design, *_ = problem.asymptotic()
+    Phi = problem.spectrum_at(w, design.multipliers)
+    matrix = np.array([[0.30574176, 0.30099144], [0.30099144, 0.30479690]])
+    np.testing.assert_allclose(Phi.real / 2, S2[:, None, None] * matrix, rtol=1e-6)
+    np.testing.assert_allclose(S2[[1, 3]], [19.2562, 0.513421], rtol=1e-5)
+
+
+def test_the_printed_matrix_is_the_elementwise_root():
+    K = np.linalg.inv(GAINS)
+    gram = K @ K.T
+    printed = np.array([[50.86022, 50.81780], [50.81780, 50.78046]])
+    np.testing.assert_allclose(np.sqrt(gram), printed, atol=6e-6)
+    root = power_of(gram[None].astype(complex), 0.5)[0].real
+    np.testing.assert_allclose(root, [[36.24406924, 35.68094398], [35.68094398, 36.13206075]], rtol=1e-8)
+    np.testing.assert_allclose(np.linalg.eigvalsh(root), [0.50707707, 71.86905293], rtol=1e-7)
+
+
+@pytest.mark.parametrize("w", [0.0, 0.3, 2.0])
+def test_the_power_of_moves_is_that_of_differences(w):
+    """A sinusoid of power one moves from sample to sample with power |1 - exp(-jw)|^2 = 2 - 2 cos w."""
+    found = metric(PowerLimit("moves", 1.0, channel=1), w, np.ones((1, 2, 2), dtype=complex))
+    np.testing.assert_allclose(found[0], np.diag([0.0, 2.0 - 2.0 * np.cos(w)]), atol=1e-12)

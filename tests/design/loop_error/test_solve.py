@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, simulate, solve
-from inputdesign_cli.cli import main
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
 
@@ -19,23 +19,6 @@ SHORT = ("experiment.samples=1000", "signal.candidates=2")
 def spec(request):
     path = request.config.rootpath / "specs" / "distillation_column.yaml"
     return lambda *overrides: load_spec(path, overrides)
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path, request):
-    """`idesign COMMAND specs/distillation_column.yaml`: exit code, stdout, stderr."""
-    path = request.config.rootpath / "specs" / "distillation_column.yaml"
-
-    def call(command, *overrides):
-        sets = [part for text in overrides for part in ("--set", text)]
-        arguments = ["idesign", command, str(path), "-o", str(tmp_path / "run"), "--no-figures", *sets]
-        monkeypatch.setattr("sys.argv", arguments)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return call
 
 
 def test_the_design_of_the_column(spec, tmp_path):
@@ -217,11 +200,12 @@ def test_simulate_on_a_true_system_of_its_own(spec):
         ("relative_std", ["simulation.noise={relative_std: 0.1}"]),
     ],
 )
-def test_what_is_not_simulated_is_said(run, words, overrides):
-    exit_code, _, err = run("simulate", *overrides)
-    assert exit_code == 2
-    assert "error[not-supported]" in err
-    assert words in err
+def test_what_is_not_simulated_is_said(spec, words, overrides):
+    with pytest.raises(SpecError) as caught:
+        simulate(spec(*overrides))
+    (told,) = caught.value.diagnostics
+    assert told.code == "not-supported"
+    assert words in f"{told.message} {told.hint} {told.key}"
 
 
 @pytest.mark.slow

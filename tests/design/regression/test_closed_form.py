@@ -71,12 +71,8 @@ def test_brute_force_finds_nothing_better(m, n):
     rng = np.random.default_rng([m, n])
     regression = random_regression(rng, m, n)
     target = rng.uniform(0.3, 3.0)
-    L1, L2, alpha, variance = (
-        regression.estimated,
-        regression.neglected,
-        regression.neglected_norm,
-        regression.variance,
-    )
+    L1, L2 = regression.estimated, regression.neglected
+    alpha, variance = regression.neglected_norm, regression.variance
     exact = np.trace(least_energy(regression, target))
 
     def energy(entries):
@@ -92,9 +88,7 @@ def test_brute_force_finds_nothing_better(m, n):
         start = 0.05 * rng.standard_normal((n, n))
         start[:, 0] += np.concatenate([L1, L2])
         point = start.ravel()
-        for _ in range(
-            4
-        ):  # anew from where it stops: the optimum is singular, and BFGS gets stuck on the way
+        for _ in range(4):  # anew from where it stops: the optimum is singular, and BFGS gets stuck
             point = scipy.optimize.minimize(energy, point, method="BFGS", jac="3-point").x
         values.append(energy(point))
     assert min(values) >= exact * (1.0 - 1e-9)
@@ -144,40 +138,33 @@ def test_bounds_hold_for_any_moments(seed):
     assert error_bound(regression, float(np.trace(R))) <= target
 
 
-def test_sensitivities_are_derivatives():
+@pytest.mark.parametrize("goal", ["target", "energy"])
+def test_sensitivities_are_derivatives(goal):
     rng = np.random.default_rng(3)
-    regression, target, step = random_regression(rng, 2, 4), 0.7, 1e-5
+    regression, value, step = random_regression(rng, 2, 4), 0.7 if goal == "target" else 5.0, 1e-5
 
-    def energy(d_alpha=0.0, d_target=0.0, d_sigma=0.0):
+    def least(alpha=0.0, goes=0.0, sigma=0.0):
         moved = replace(
             regression,
-            neglected_norm=regression.neglected_norm + d_alpha,
-            variance=(np.sqrt(regression.variance) + d_sigma) ** 2,
+            neglected_norm=regression.neglected_norm + alpha,
+            variance=(np.sqrt(regression.variance) + sigma) ** 2,
         )
-        return np.trace(least_energy(moved, target + d_target))
+        if goal == "target":
+            return np.trace(least_energy(moved, value + goes))
+        return moved.error(least_error(moved, value + goes)).total
 
-    def error(d_alpha=0.0, d_energy=0.0, d_sigma=0.0):
-        moved = replace(
-            regression,
-            neglected_norm=regression.neglected_norm + d_alpha,
-            variance=(np.sqrt(regression.variance) + d_sigma) ** 2,
+    def slope(name):
+        return pytest.approx((least(**{name: step}) - least(**{name: -step})) / (2 * step), rel=1e-7)
+
+    if goal == "target":
+        found = energy_sensitivity(
+            regression, least(), value, regression.error(least_energy(regression, value))
         )
-        return moved.error(least_error(moved, 5.0 + d_energy)).total
-
-    def slope(f, **kind):
-        (name,) = kind
-        return (f(**{name: step}) - f(**{name: -step})) / (2 * step)
-
-    found = energy_sensitivity(
-        regression, energy(), target, regression.error(least_energy(regression, target))
-    )
-    assert found.neglected_norm == pytest.approx(slope(energy, d_alpha=1), rel=1e-7)
-    assert found.goal == pytest.approx(slope(energy, d_target=1), rel=1e-7)
-    assert found.noise_deviation == pytest.approx(slope(energy, d_sigma=1), rel=1e-7)
-    found = error_sensitivity(regression, 5.0, regression.error(least_error(regression, 5.0)))
-    assert found.neglected_norm == pytest.approx(slope(error, d_alpha=1), rel=1e-7)
-    assert found.goal == pytest.approx(slope(error, d_energy=1), rel=1e-7)
-    assert found.noise_deviation == pytest.approx(slope(error, d_sigma=1), rel=1e-7)
+    else:
+        found = error_sensitivity(regression, value, regression.error(least_error(regression, value)))
+    assert found.neglected_norm == slope("alpha")
+    assert found.goal == slope("goes")
+    assert found.noise_deviation == slope("sigma")
 
 
 def test_a_quantity_that_is_not_excited_has_no_finite_error():

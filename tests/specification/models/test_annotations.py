@@ -38,7 +38,6 @@ class Tree(Section):
 @pytest.mark.parametrize(
     ("location", "what"),
     [
-        (("part",), "a part"),
         (("part", TAG + "a leaf", "size"), "a size"),
         (("part", TAG + "a twig", "leaves"), "a list of leaves"),
         (("part", TAG + "a twig", "leaves", 3, "size"), "a size"),
@@ -59,8 +58,6 @@ def refused(data):
 
 def test_what_is_refused_is_named():
     """The words of a type, its hint, and the path of the value; other kinds are in `test_bad_input`."""
-    expected = "wrong-shape", ("part",), "{key} must be a part, not the number 3", "write a leaf"
-    assert refused({"part": 3}) == [expected]
     expected = "not-a-number", ("part", "size"), "{key} must be a size, not true", "measure it"
     assert refused({"part": {"size": True}}) == [expected]
     found = refused({"part": {"leaves": [{"size": 1, "weights": 2}]}})

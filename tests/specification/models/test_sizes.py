@@ -22,9 +22,8 @@ UNLIMITED = {"Experiment.samples", "Limits.samples", "Signal.seed", "Simulation.
 
 
 def test_the_page_lists_every_limit():
-    rows = dict(
-        re.findall(r"^\| `?([^|`]+)`? \| ([0-9]+) \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    )
+    page = PAGE.read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `?([^|`]+)`? \| ([0-9]+) \|", page, re.MULTILINE))
     assert rows == {key: str(size.most) for key, size in SIZES.items()}
 
 
@@ -46,9 +45,8 @@ def test_every_whole_number_of_the_schema_has_a_limit():
         for key, entry in section["properties"].items()
         for one in counts(entry, f"{name}.{key}")
     ]
-    assert {where for where, most in found if most is None or most > 1_000_000} - {
-        "Signal.lines"
-    } == UNLIMITED
+    unlimited = {where for where, most in found if most is None or most > 1_000_000}
+    assert unlimited - {"Signal.lines"} == UNLIMITED
 
 
 # Lists that need no limit of their own. All values of a spec together are at most 100 000.
@@ -138,17 +136,10 @@ def test_many_named_parameters_are_refused_at_once():
     ("key", "extra"),
     [
         ("spectrum.order", "spectrum: {type: fir, order: 1.0e+9}"),
-        ("spectrum.order", "spectrum: {type: fir, order: 1.0e+300}"),
         ("spectrum.order", "spectrum: {type: polynomial, order: 81, band: [0, 1]}"),
-        ("spectrum.lines", "spectrum: {type: multisine, lines: 100000}"),
-        (
-            "spectrum.frequencies",
-            f"spectrum: {{type: multisine, frequencies: {[i / 2000 for i in range(5001)]}}}",
-        ),
+        ("spectrum.frequencies", f"spectrum: {{type: multisine, frequencies: {[*range(5001)]}}}"),
         ("signal.samples", "signal: {samples: 2.0e+9}"),
-        ("signal.hold", "signal: {hold: 1.0e+15}"),
         ("signal.lines", "signal: {type: multisine, lines: 1.0e+9}"),
-        ("solver.grid", "solver: {method: lmi, grid: 1.0e+6}"),
         ("simulation.runs", "simulation: {runs: 1.0e+9}"),
     ],
 )

@@ -1,11 +1,16 @@
-"""`--set`: what it changes, and its own diagnostics."""
+"""`--set`, `Spec.with_` and `include`: what they change, and their own diagnostics."""
 
 from __future__ import annotations
 
+import json
+
+import numpy as np
 import pytest
+import yaml
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.specification import Spec, load_spec, parse_spec, read_template
+from inputdesign_cli.specification.yaml import reader
 
 GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
 
@@ -96,3 +101,122 @@ def test_complaints_of_file_and_overrides_come_together():
         ("--set noise.variance=-1", "out-of-range"),
         ("--set nonsense", "bad-override"),
     ]
+
+
+TEXT = """\
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {variance: 0.4}
+experiment: {samples: 200}
+accuracy: {model_error: {relative: 0.05}}
+"""
+CHANGES = [
+    {"experiment.samples": 600},
+    {"plant": {"B": [0, 1.5], "F": [1, -0.5]}, "noise": {"variance": 2, "C": [1, 0.3]}},
+    {"plant.F.1": -0.8, "accuracy.model_error": None, "accuracy.criterion": "D", "limits.input_power": 1},
+    {"spectrum": {"type": "fir", "order": 12}, "signal.seed": 4},
+    {"experiment.prior": {"information": [[20.0, 1.0], [1.0, 30.0]], "parameters": ["b1", "f1"]}},
+]
+
+
+@pytest.mark.parametrize("changes", CHANGES)
+def test_a_revised_spec_is_the_one_with_overrides(changes):
+    overrides = [f"{key}={json.dumps(value)}" for key, value in changes.items()]
+    written = parse_spec(TEXT, overrides=overrides)
+    revised = parse_spec(TEXT).revised(changes)
+    assert revised.model_dump() == written.model_dump()
+    assert revised.sha256 == written.sha256
+
+
+def test_places_of_other_keys_stay_and_new_values_name_their_source():
+    spec = parse_spec(TEXT, "s.yaml")
+    revised = spec.revised({"noise.variance": np.float64(2.0)}, file="the estimate")
+    place = revised.locate("experiment.samples")
+    assert (place.file, place.line) == ("s.yaml", 3)
+    assert revised.locate("noise.variance").file == "the estimate"
+    assert (spec.noise.variance, spec.locate("noise.variance").file) == (0.4, "s.yaml")
+    with pytest.raises(SpecError) as caught:
+        spec.revised({"noise.variance": -1.0}, file="the estimate")
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key, found.location.file) == ("out-of-range", "noise.variance", "the estimate")
+
+
+def test_no_text_is_parsed(monkeypatch):
+    spec = parse_spec(TEXT)
+    monkeypatch.setattr(reader, "_Loader", None)
+    assert spec.with_(**{"experiment.samples": 600}).experiment.samples == 600
+    assert Spec.from_dict(spec.content).model_dump() == spec.model_dump()
+
+
+@pytest.mark.parametrize("text", ["a\x00b", "\x1b[31m"])
+def test_unprintable_texts_are_refused(text):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(TEXT).with_(title=text)
+    assert [(d.code, d.key) for d in caught.value.diagnostics] == [("bad-argument", "title")]
+
+
+MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\n"
+ASKED = "accuracy: {standard_deviation: {b1: 0.1}}\nexperiment: {samples: 200}\n"
+
+
+def written(folder, text, **files):
+    for name, content in files.items():
+        (folder / f"{name}.yaml").write_text(content)
+    (folder / "spec.yaml").write_text(text)
+    return folder / "spec.yaml"
+
+
+def complaints(path, *overrides):
+    with pytest.raises(SpecError) as caught:
+        load_spec(path, overrides)
+    return caught.value.diagnostics
+
+
+def test_blocks_stand_as_if_they_were_pasted(tmp_path):
+    path = written(tmp_path, "include: model.yaml\n" + ASKED, model=MODEL)
+    pasted = written(tmp_path, MODEL + ASKED)
+    spec = load_spec(pasted)
+    written(tmp_path, "include: model.yaml\n" + ASKED)
+    included = load_spec(path)
+    assert included.sha256 == spec.sha256
+    assert yaml.safe_load(included.to_yaml()) == yaml.safe_load(spec.to_yaml())
+    assert read_template(path).data == yaml.safe_load(spec.to_yaml())
+
+
+def test_several_files_are_joined_key_by_key(tmp_path):
+    prior = "experiment: {prior: {information: [[4, 0], [0, 9]]}}\n"
+    spec = load_spec(
+        written(tmp_path, "include: [model.yaml, prior.yaml]\n" + ASKED, model=MODEL, prior=prior)
+    )
+    assert (spec.experiment.samples, spec.experiment.prior.information) == (200, ((4, 0), (0, 9)))
+
+
+def test_overrides_reach_what_is_included_and_name_the_file(tmp_path):
+    path = written(tmp_path, ASKED, model=MODEL)
+    spec = load_spec(path, ["plant.F=[1, -0.9]", "include=model.yaml"])
+    assert spec.plant.F == (1, -0.9)
+
+
+def test_complaints_point_into_the_included_file(tmp_path):
+    path = written(tmp_path, "include: model.yaml\n" + ASKED, model=MODEL.replace("2}", "-2}"))
+    (diagnostic,) = complaints(path)
+    assert diagnostic.location.file == str(tmp_path / "model.yaml")
+    assert (diagnostic.location.line, diagnostic.key) == (2, "noise.variance")
+
+
+@pytest.mark.parametrize(
+    ("text", "other", "line", "said"),
+    [
+        ("title: x\ninclude: modell.yaml\n", "", 2, "there is no file"),
+        ("include: 3\n", "", 1, "not the name of a file"),
+        ("include: [model.yaml, other.yaml]\n", "include: model.yaml\n", 1, "includes others itself"),
+        ("include: other.yaml\n", "- 1\n", 1, "holds no blocks"),
+        ("include: model.yaml\nplant: {B: [0, 1]}\n", "", 2, "plant stands here and in"),
+        ("include: other.yaml\n" + MODEL, "experiment: {samples: 3}\n", 5, "experiment.samples stands"),
+    ],
+)
+def test_what_cannot_be_put_together(text, other, line, said, tmp_path):
+    (diagnostic,) = complaints(written(tmp_path, text + ASKED, model=MODEL, other=other))
+    assert diagnostic.code == "bad-include"
+    assert diagnostic.location.line == line
+    assert said in diagnostic.message
+    assert diagnostic.hint

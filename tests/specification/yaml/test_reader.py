@@ -16,26 +16,13 @@ from inputdesign_cli.specification.yaml.scalars import resolve
 GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
 
 
-@pytest.mark.parametrize(
-    ("word", "value"),
-    [
-        ("1", 1),
-        ("+1", 1),
-        ("-0", 0),
-        ("1.", 1.0),
-        (".5", 0.5),
-        ("-.5", -0.5),
-        ("1e-3", 1e-3),
-        ("1E5", 1e5),
-        ("1.0e+3", 1000.0),
-        ("00.5", 0.5),
-        ("true", True),
-        ("False", False),
-        ("null", None),
-        ("~", None),
-        ("", None),
-    ],
-)
+VALUES = {
+    "1": 1, "+1": 1, "-0": 0, "1.": 1.0, ".5": 0.5, "-.5": -0.5, "1e-3": 1e-3, "1E5": 1e5, "1.0e+3": 1000.0,
+    "00.5": 0.5, "true": True, "False": False, "null": None, "~": None, "": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("word", "value"), VALUES.items())
 def test_words_that_are_values(word, value):
     assert resolve(word) == value
     assert type(resolve(word)) is type(value)
@@ -91,14 +78,12 @@ def test_syntax_errors_have_a_place_and_plain_words(text, line, column, words):
         ("", "empty-file"),
         ("# only a comment\n", "empty-file"),
         ("---\n", "empty-file"),
-        ("null", "empty-file"),
         ("- 1\n- 2\n", "not-a-mapping"),
-        ("words", "not-a-mapping"),
         (GOOD + "---\n" + GOOD, "several-documents"),
         ("a: \x00", "file-encoding"),
-        ("a: \x1b[31m", "file-encoding"),
         ("a: \ud800", "file-encoding"),
         ("a: " + "[" * 70 + "]" * 70, "yaml-limit"),
+        ("\n".join(["a0: &a0 [1]"] + [f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 200)]), "yaml-limit"),
         ("a: " + "[" * 100_000, "yaml-limit"),
         ("a: " + "{x: " * 100_000, "yaml-limit"),
         ("- " * 100_000, "yaml-limit"),
@@ -106,7 +91,7 @@ def test_syntax_errors_have_a_place_and_plain_words(text, line, column, words):
         ("a: &a [*a]", "yaml-limit"),
         ("? " + "".join(f"&a{i} [" for i in range(20_000)) + "1" + "]" * 20_000 + "\n: 1", "yaml-limit"),
     ],
-    ids=range(17),
+    ids=range(15),
 )
 def test_what_is_no_spec_at_all(text, code):
     with pytest.raises(SpecError) as caught:
@@ -125,13 +110,6 @@ def test_alias_bombs_are_defused_before_they_go_off(monkeypatch):
         parse_spec("\n".join(lines))
     assert [c.code for c in caught.value.diagnostics] == ["yaml-limit"]
     assert 150 < len(made) <= MAX_NODES + 1
-
-
-def test_nesting_through_aliases_is_bounded():
-    lines = ["a0: &a0 [1]"] + [f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 200)]
-    with pytest.raises(SpecError) as caught:
-        parse_spec("\n".join(lines))
-    assert [c.code for c in caught.value.diagnostics] == ["yaml-limit"]
 
 
 def test_an_alias_stands_for_a_whole_value():

@@ -1,0 +1,346 @@
+"""The loop around polynomial plants and plants in s behind a hold: simulated impulses and plain algebra."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import ContinuousModel, Loop, PolynomialModel, SampledModel, TransferMatrix
+from inputdesign_cli.spectrum import FirBasis
+from tests.support.loop_checks import check_information, check_signals
+from tests.support.plants import arrays, descending
+
+T = 0.4
+LONG = 500
+STEP = 1e-6
+COVARIANCE = np.array([[1.0, 0.3], [0.3, 0.5]])
+
+
+def box_jenkins():
+    """Every polynomial, the first A unstable, three inputs and two outputs, one entry zero."""
+    return PolynomialModel(
+        arrays([[[0, 1.0, 0.4], [0, -0.3], [0]], [[0, 0.2], [0, 0.8, -0.1], [0, 0, 0.5]]]),
+        (np.array([1.0, -1.1]), np.array([1.0, 0.3])),
+        arrays([[[1, -0.2], [1], [1]], [[1], [1, 0.4], [1, -0.5]]]),
+        (np.array([1.0, 0.3]), np.array([1.0, -0.4])),
+        (np.array([1.0, -0.5]),),
+        COVARIANCE,
+    )
+
+
+def single():
+    """Every polynomial but F, one input and one output."""
+    return PolynomialModel.single([0, 0.3, 0.2], A=[1, -1.2, 0.5], C=[1, -0.4], D=[1, 0.3], variance=0.7)
+
+
+def held():
+    """Second order, resonances, an entry that acts at once and one that is zero; inputs and outputs."""
+    numerator = [[[3.0], [0.5, 1.0], [0.0]], [[0.4], [0.2, 0.6, 1.0], [1.0]]]
+    denominator = [[[1, 0.8, 4], [1, 1.2], [1, 1]], [[1, 0.9], [1, 1.5, 2], [1, 1.1, 0.3]]]
+    plant = ContinuousModel.monic(descending(numerator), descending(denominator), COVARIANCE)
+    return SampledModel(plant, T)
+
+
+# The controllers: entries (input, output); that of `held` has a delay where the plant has none.
+BELOW = [[[1, -1], [1, -1]], [[1], [1, -0.3]], [[1, 0.2], [1]]]
+CONTROLLERS = {
+    box_jenkins: ([[[0.4, -0.32], [0.05]], [[0.0], [0.1, 0.05]], [[0.1], [0.0]]], BELOW),
+    single: ([[[1.1, -0.7]]], [[[1, -1]]]),
+    held: ([[[0.4, -0.32], [0.05]], [[0.0], [0, 0.1, 0.05]], [[0.1], [0.0]]], BELOW),
+}
+
+
+def textbook(model):
+    """A, the fractions (b, a) of the entries, C and D in A y = (b / a) u + (C / D) e."""
+    if isinstance(model, PolynomialModel):
+        A, C, D = (model.per_output(rows) for rows in (model.A, model.C, model.D))
+        entries = [list(zip(*rows, strict=True)) for rows in zip(model.B, model.F, strict=True)]
+        return A, entries, C, D
+    plant, one = model.continuous_plant, [[1.0]] * model.outputs
+    entries = [[([0.0], [1.0])] * model.inputs for _ in range(model.outputs)]
+    for i, j in plant.active:
+        entry = plant.numerator[i][j][::-1], plant.denominator[i][j][::-1]
+        top, bottom, _ = scipy.signal.cont2discrete(entry, T, "zoh")
+        entries[i][j] = top[0], bottom
+    return one, entries, one, one
+
+
+def latest(b, a, u, x, t):
+    """x(t) of a x = b u, from what was before."""
+    driven = sum(c * u[t - lag] for lag, c in enumerate(b) if t >= lag)
+    return driven - sum(c * x[t - lag] for lag, c in enumerate(a) if 0 < lag <= t)
+
+
+def simulation(controller):
+    """The loop, equation by equation, sample by sample: y (t, p) and u (t, r) of a model, r and e."""
+    above, below = controller
+
+    def simulated(model, r, e):
+        A, entries, C, D = textbook(model)
+        y, u, shape = np.zeros_like(e), np.zeros_like(r), (model.outputs, model.inputs)
+        v = np.stack([scipy.signal.lfilter(C[i], D[i], e[:, i]) for i in range(model.outputs)], axis=1)
+        x, k = np.zeros((len(r), *shape)), np.zeros((len(r), *shape))
+        for t in range(len(r)):
+            for _ in range(2):  # once more for what acts at once
+                for i, j in np.ndindex(shape):
+                    x[t, i, j] = latest(*entries[i][j], u[:, j], x[:, i, j], t)
+                for i in range(model.outputs):
+                    y[t, i] = v[t, i] + latest([1.0], A[i], x[:, i].sum(axis=1), y[:, i], t)
+                for i, j in np.ndindex(shape):
+                    k[t, i, j] = latest(above[j][i], below[j][i], y[:, i], k[:, i, j], t)
+                u[t] = r[t] - k[t].sum(axis=0)
+        return y, u
+
+    return simulated
+
+
+def errors(model, y, u):
+    """epsilon (t, p) of the one-step predictor, polynomial by polynomial."""
+    A, entries, C, D = textbook(model)
+    out = np.zeros_like(y)
+    for i in range(model.outputs):
+        rest = scipy.signal.lfilter(A[i], [1.0], y[:, i])
+        for j in range(model.inputs):
+            rest = rest - scipy.signal.lfilter(*entries[i][j], u[:, j])
+        out[:, i] = scipy.signal.lfilter(D[i], C[i], rest)
+    return out
+
+
+def impulse_gradients(model, simulated, source):
+    """psi (t, k, p, m): minus the derivative of epsilon, for a unit impulse in each r (or e)."""
+    theta, parts = model.theta, []
+    for m in range(model.inputs if source == "r" else model.outputs):
+        r, e = np.zeros((LONG, model.inputs)), np.zeros((LONG, model.outputs))
+        (r if source == "r" else e)[0, m] = 1.0
+        y, u = simulated(model, r, e)
+        assert np.abs(y[-5:]).max() < 1e-9
+        columns = [
+            (errors(model.at(theta - step), y, u) - errors(model.at(theta + step), y, u)) / (2 * STEP)
+            for step in STEP * np.eye(theta.size)
+        ]
+        parts.append(np.stack(columns, axis=1))
+    return np.stack(parts, axis=-1)
+
+
+@pytest.fixture(scope="module", params=CONTROLLERS)
+def case(request):
+    """An experiment in the loop, and the simulation of it."""
+    model, controller = request.param(), CONTROLLERS[request.param]
+    loop = Loop(model, TransferMatrix.build(*controller))
+    loop.check_stability()
+    return Experiment(model, 7, loop=loop), simulation(controller)
+
+
+def test_information_is_that_of_simulated_impulses(case):
+    experiment, simulated = case
+    check_information(experiment, *(impulse_gradients(experiment.model, simulated, s) for s in "re"))
+
+
+def test_powers_are_those_of_simulated_impulses(case):
+    experiment, simulated = case
+    inputs, outputs = experiment.model.inputs, experiment.model.outputs
+    c = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 0.5]])[:inputs, :inputs]
+    basis = FirBasis(inputs, 0)
+    x = np.array([2.0, 0.3, 1.0, 0.0, -0.2, 0.5])[: basis.size]
+    np.testing.assert_array_equal(basis.autocovariances(x)[0], c)
+    first, silent = (np.arange(LONG) == 0)[:, None], np.zeros((LONG, outputs))
+    runs = [simulated(experiment.model, unit * first, silent) for unit in np.eye(inputs)]
+    y, u = (np.stack([run[part] for run in runs], axis=-1) for part in (0, 1))
+    for kind, response in (("output", y), ("input", u)):
+        for channel in (None, min(inputs, outputs) - 1):
+            rows = response if channel is None else response[:, channel : channel + 1]
+            expected = np.einsum("tpm,mn,tpn->", rows, c, rows)
+            unit = basis.integrals(
+                lambda w, kind=kind, channel=channel: experiment.power_density(kind, w, channel),
+                experiment.singularities,
+            )
+            assert unit @ x == pytest.approx(expected, rel=1e-8)
+
+
+def test_signals_are_those_of_the_equations_sample_by_sample(case):
+    check_signals(case[0].loop, case[1])
+
+
+def test_responses_are_those_of_matrix_algebra(case):
+    w, (experiment, _) = np.array([0.3, 1.0, 2.5]), case
+    y_r, u_r = experiment.loop.excited(w)
+    y_e, u_e = experiment.loop.disturbed(w)
+    A, entries, C, D = textbook(experiment.model)
+    G = [[scipy.signal.freqz(b, np.convolve(a, A[i]), w)[1] for b, a in row] for i, row in enumerate(entries)]
+    G, K = np.moveaxis(np.array(G), 2, 0), experiment.loop.controller.at(w)
+    H = [scipy.signal.freqz(c, np.convolve(a, d), w)[1] for a, c, d in zip(A, C, D, strict=True)]
+    H = np.array(H).T[:, :, None] * np.eye(len(H))
+    inputs, outputs = np.eye(G.shape[2]), np.eye(G.shape[1])
+    inner, outer = np.linalg.inv(inputs + K @ G), np.linalg.inv(outputs + G @ K)
+    for found, expected in ((y_r, G @ inner), (u_r, inner), (y_e, outer @ H), (u_e, -K @ outer @ H)):
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+
+
+def looped(model, numerator, below=(1.0,)):
+    return Loop(model, TransferMatrix.build([[numerator]], [[list(below)]]))
+
+
+def one(numerator, denominator, C, below=(1.0,), *, step=T):
+    plant = ContinuousModel.monic(descending([[numerator]]), descending([[denominator]]), np.eye(1))
+    return looped(SampledModel(plant, step), C, below)
+
+
+def test_closed_poles_are_the_roots_of_the_characteristic_polynomial():
+    numerator, denominator = [0.5, 3.0], [1, 1.4, 4.0, 1.0]
+    top, bottom, _ = scipy.signal.cont2discrete((numerator, denominator), T, "zoh")
+    for loop, above, below, C in (
+        (looped(single(), [1.1, -0.7], [1, -1]), [0.3, 0.2], [1, -1.2, 0.5], [1.1, -0.7]),
+        (one(numerator, denominator, [0.2, -0.15], [1, -1]), top[0], bottom, [0.2, -0.15]),
+    ):
+        expected = np.roots(np.polyadd(np.polymul(below, [1, -1]), np.polymul(above, C)))
+        poles = np.sort_complex(loop.closed_poles[np.abs(loop.closed_poles) > 1e-6])
+        np.testing.assert_allclose(poles, np.sort_complex(expected), atol=1e-9)
+
+
+def test_unstable_plant_in_a_stable_loop_has_finite_gradients():
+    """An ARX plant with an integrator: S G and the gradients stay finite at DC."""
+    loop = looped(PolynomialModel.single([0.0, 1.0], A=[1.0, -1.0]), [0.5])
+    loop.check_stability()
+    y, u = loop.excited(np.array([0.0]))
+    assert y.item() == pytest.approx(2.0)  # 1 / C at DC
+    assert abs(u.item()) == pytest.approx(0.0)
+    assert np.all(np.isfinite(loop.excitation_gradient(np.array([0.0]))))
+
+
+ALONE = Loop(box_jenkins(), TransferMatrix.build([[[0.0]] * 2] * 3, [[[1.0]] * 2] * 3))
+DIRECT = PolynomialModel.single([1.0, 0.5])
+BORNE = 1.9 / (1 - np.exp(-T)) - 1.0  # by 1 / (s + 1) without a delay in the controller
+
+
+@pytest.mark.parametrize(
+    ("check", "loop", "code"),
+    [
+        ("stability", ALONE, "unstable"),
+        ("stability", looped(PolynomialModel.single([0.0, 1.0], A=[1.0, -0.9]), [-0.5]), "unstable"),
+        ("stability", looped(DIRECT, [-1.0]), "algebraic"),
+        ("stability", one([1.0], [1, 1.0], [BORNE]), None),
+        ("stability", one([1.0], [1, 1.0], [0, BORNE]), "unstable"),
+        # (s + 3) / (s + 1) acts at once with gain 1, the controller with -1.
+        ("stability", one([1.0, 3.0], [1.0, 1.0], [-1.0, 0.5]), "algebraic"),
+        ("delay", looped(DIRECT, [0.3]), "algebraic"),
+        ("delay", looped(DIRECT, [0.0, 0.3]), None),
+        ("delay", looped(PolynomialModel.single([0.0, 1.0]), [0.3]), None),
+        ("delay", one([1.0, 3.0], [1.0, 1.0], [0.5]), "algebraic"),
+        ("delay", one([1.0, 3.0], [1.0, 1.0], [0, 0.5]), None),
+        ("delay", one([3.0], [1.0, 1.0], [0.5]), None),
+        # The one entry that acts at once is driven through a delay.
+        ("delay", Loop(held(), TransferMatrix.build(*CONTROLLERS[held])), None),
+    ],
+)
+def test_loops_that_are_unstable_or_answer_the_noise_at_once_are_refused(check, loop, code):
+    checked = {"stability": loop.check_stability, "delay": loop.check_delay}[check]
+    if code is None:
+        checked()
+        return
+    with pytest.raises(SpecError) as caught:
+        checked()
+    assert caught.value.diagnostics[0].code == f"{code}-loop"
+
+
+@pytest.mark.parametrize("gain", [0.98, 1.02])
+def test_stability_ends_at_the_largest_gain(gain):
+    """1 / (s + 1) under u = -K y: z = E - K (1 - E) leaves the circle at K = (1 + E) / (1 - E)."""
+    E = np.exp(-T)
+    loop = one([1.0], [1, 1.0], [gain * (1 + E) / (1 - E)])
+    assert np.abs(loop.closed_poles).max() == pytest.approx(gain * (1 + E) - E)
+    if gain < 1:
+        loop.check_stability()
+        return
+    with pytest.raises(SpecError) as caught:
+        loop.check_stability()
+    assert caught.value.diagnostics[0].code == "unstable-loop"
+
+
+def test_fast_sampling_keeps_the_slow_poles():
+    """Static feedback so fast that the loop is that of continuous time, to first order in the step."""
+    denominator, gain, step = np.poly([-1.0, -1.2, -1.4, -0.8]), 0.5, 1e-4
+    loop = one([1.0], denominator, [gain], step=step)
+    slow = np.roots(np.polyadd(denominator, [gain]))
+    found = np.log(loop.closed_poles[np.abs(loop.closed_poles) > 0.5]) / step
+    for pole in slow:
+        assert np.abs(found - pole).min() < 1e-3
+
+
+# First-order entries b / (s + a): each is a polynomial in q^-1 of one b and one f.
+GAIN = np.array([[2.0, -0.5], [0.4, 1.2]])
+DECAY = np.array([[1.0, 1.5], [0.8, 0.3]])
+PI = [[[0.5, -0.4], [0.1]], [[0.0], [0.6, -0.5]]]
+UNDER = [[[1, -1], [1, -1]], [[1], [1, -1]]]
+
+
+def held_first_order():
+    rows = [[[b] for b in row] for row in GAIN], [[[1.0, a] for a in row] for row in DECAY]
+    plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), COVARIANCE)
+    return SampledModel(plant, T)
+
+
+def polynomial_first_order():
+    forgotten = np.exp(-DECAY * T)
+    B = [[[0, b] for b in row] for row in GAIN / DECAY * (1 - forgotten)]
+    F = [[[1, -f] for f in row] for row in forgotten]
+    one = (np.ones(1),)
+    return PolynomialModel(arrays(B), one, arrays(F), one, one, COVARIANCE)
+
+
+def derivative():
+    """d (b1, f1) / d (b, a) of all four entries, by hand: b1 = b (1 - E) / a, f1 = -E, E = exp(-a T)."""
+    b, a = GAIN.ravel(), DECAY.ravel()
+    E = np.exp(-a * T)
+    J = np.zeros((8, 8))
+    J[:4, :4] = np.diag((1 - E) / a)
+    J[:4, 4:] = np.diag(b * (T * E * a - (1 - E)) / a**2)
+    J[4:, 4:] = np.diag(T * E)
+    return J
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """The same loop, by states and by polynomials."""
+    C = TransferMatrix.build(PI, UNDER)
+    loops = Loop(held_first_order(), C), Loop(polynomial_first_order(), C)
+    for loop in loops:
+        loop.check_stability()
+    return [Experiment(loop.model, 9, loop=loop) for loop in loops]
+
+
+def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
+    held, polynomial = pair
+    J, basis = derivative(), FirBasis(2, 3)
+    assert held.model.names[:2] == ("b0[1,1]", "b0[1,2]")
+    assert polynomial.model.names[:2] == ("b1[1,1]", "b1[1,2]")
+    maps = [basis.integrals(e.information_density, e.singularities) for e in pair]
+    expected = J.T @ maps[1] @ J
+    np.testing.assert_allclose(maps[0], expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    noise = J.T @ polynomial.noise_information @ J
+    assert np.abs(noise).max() > 0.1  # the noise tells something around the loop
+    np.testing.assert_allclose(held.noise_information, noise, rtol=1e-9, atol=1e-9 * np.abs(noise).max())
+
+
+def test_loop_is_that_of_polynomials(pair):
+    held, polynomial = pair
+    basis, w = FirBasis(2, 2), np.array([0.0, 0.02, 1.0, np.pi])
+    for kind in ("input", "output", "excitation"):
+        for channel in (None, 1):
+            powers = [
+                basis.integrals(
+                    lambda w, e=e, kind=kind, channel=channel: e.power_density(kind, w, channel),
+                    e.singularities,
+                )
+                for e in pair
+            ]
+            np.testing.assert_allclose(powers[0], powers[1], rtol=1e-9, atol=1e-9)
+    for one, other in zip(held.loop.sensitivity(w), polynomial.loop.sensitivity(w), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+    rng = np.random.default_rng(0)
+    r, e = rng.standard_normal((2, 3, 120, 2))
+    for one, other in zip(held.loop.signals(r, e), polynomial.loop.signals(r, e), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-10)
+    moduli = [np.sort(np.abs(experiment.loop.closed_poles)) for experiment in pair]
+    np.testing.assert_allclose(moduli[0], moduli[1][-moduli[0].size :], atol=1e-8)
+    np.testing.assert_allclose(moduli[1][: -moduli[0].size], 0.0, atol=1e-8)
