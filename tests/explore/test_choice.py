@@ -218,6 +218,19 @@ def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
     assert corner == pytest.approx(abs(0.1 / (1 - 0.9 * np.exp(-0.1j))), rel=0.1)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed", [0, 2, pytest.param(1, marks=pytest.mark.xfail(strict=True, reason="76 samples for 78"))]
+)
+def test_a_dead_time_of_a_quarter_of_the_record_is_found(seed):
+    rng = np.random.default_rng(seed)
+    late = int(rng.integers(60, 100))
+    u = held(rng, 400, 15)
+    x = scipy.signal.lfilter([0.0] * late + [0.2], [1.0, -0.8], u)
+    found = explore_records([column(u, with_noise(rng, x))])
+    assert abs(found.taken[0].orders.delays[0] - late) <= 1
+
+
 def test_an_interrupted_search_gives_the_best_so_far(monkeypatch):
     from inputdesign_cli.explore import search
 

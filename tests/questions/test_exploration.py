@@ -162,6 +162,7 @@ def test_a_loop_whose_input_is_a_share_of_the_output_is_told_as_one(tmp_path):
         ("a,b\n1,2\n3,4\n", "which column of log.csv is the input"),
         ("u,y\n" + "1,2\n" * 100, "same value"),
         ("u,y\n" + "1,2\n2,1\n" * 5, "too few"),
+        ("time,u,y\n" + "".join(f"{9 - i},{i % 2},{i}\n" for i in range(9)), "do not increase"),
         ("u,y\n" + "nan,2\n" * 40, "holds no number"),
     ],
 )
@@ -205,6 +206,21 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
     for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
         with pytest.raises(DataError, match="states the sample time -1"):
             read(path)
+
+
+@pytest.mark.slow
+def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
+    path = lag_log(tmp_path / "log.csv", samples=400)
+    good = explore(path).results.result["notes"]
+    lines = path.read_text().splitlines()
+    for row in range(200, 250):
+        lines[row] = ",".join([*lines[row].split(",")[:2], lines[200].split(",")[2]])
+    path.write_text("\n".join(lines))
+    found = explore(path).results.result["notes"]
+    assert not any("stands still" in note for note in good)
+    notes = [note for note in found if "stands still" in note]
+    assert any("rows 201 to 250" in note for note in notes)
+    assert any(note.startswith("no trust: An output stands still") for note in notes)
 
 
 @pytest.mark.slow

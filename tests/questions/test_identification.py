@@ -97,6 +97,19 @@ def test_a_top_up_makes_up_for_what_is_missing(write):
 
 
 @pytest.mark.slow
+def test_offsets_and_outliers_are_told(write):
+    columns = record(np.random.default_rng(3).standard_normal(500))
+    columns["y1"] = columns["y1"] + 100.0
+    columns["u1"][40] = 60.0
+    outcome = identify(load_spec(SPEC), write(columns))
+    assert "row 42" in " ".join(outcome.result["notes"])
+    (start,) = [one for one in outcome.outcome.findings if one.code == "start-estimated"]
+    assert start.figures["first_residual"] == pytest.approx(columns["y1"][0], rel=1e-2)
+    known = identify(load_spec(SPEC), write(columns), operating_point={"y1": 100.0})
+    assert not known.result["identification"]["free_start"]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 2])
 def test_a_short_pilot_from_rest_is_not_said_to_begin_otherwise(write, seed):
     """Nor does its estimate of C run to the unit circle, which would remember for ever what was before it."""
@@ -144,6 +157,22 @@ def test_an_operating_point_does_not_move_the_estimate(write, others):
     assert ways[0].result["identification"]["theta"] == pytest.approx(plain["theta"], rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        (lambda c: {k: v[:5] for k, v in c.items()}, "too-few-samples"),
+        (lambda c: {**c, "u1": np.ones(500)}, "constant-input"),
+        (lambda c: {**c, "y1": scipy.signal.lfilter([0, 3.6], [1, -0.7], c["u1"])}, "noise-free-data"),
+    ],
+)
+def test_bad_records_are_refused(change, code, write):
+    columns = change(record(np.random.default_rng(4).standard_normal(500)))
+    path = write(columns)
+    with pytest.raises((SpecError, DataError)) as caught:
+        identify(load_spec(SPEC, ["noise={variance: 1}"]), path)
+    assert caught.value.diagnostics[0].code == code
+
+
 def test_an_unknown_channel_is_refused(data):
     with pytest.raises(SpecError) as caught:
         identify(load_spec(SPEC), data, operating_point={"u2": 1.0})
@@ -161,6 +190,11 @@ def test_an_output_that_the_start_alone_explains_has_no_noise(samples, first, pl
     with pytest.raises(DataError) as caught:
         identify(spec, write({"u1": pulse, "y1": y}))
     assert caught.value.diagnostics[0].code == "noise-free-data"
+
+
+def test_data_of_another_structure_are_told(data):
+    outcome = identify(load_spec(SPEC, ["plant={B: [0, 1]}", "noise={variance: 1}"]), data)
+    assert "plant-structure" in {one.code for one in outcome.outcome.findings}
 
 
 def test_there_must_be_a_target(data):

@@ -163,16 +163,12 @@ def _assessed(judged: Results, **more: Any) -> Results:
 
 def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     """Return the results with the response of the data alone beside the model, where it can be had."""
-    response = response_without_model(units, found.model, found.data)
-    if response is None:
+    tables, curves, lines = response_without_model(units, found.model, found.data)
+    if lines is None:
         return judged
-    table, curves, lines = response
-    shown = _assessed(judged, frequency_response=lines)
+    outcome = _assessed(judged, frequency_response=lines).outcome.saying(response_note(lines))
     return replace(
-        shown,
-        outcome=shown.outcome.saying(response_note(lines)),
-        tables={**judged.tables, "frequency_response": table},
-        curves={**judged.curves, "frequency_response": curves},
+        judged, outcome=outcome, tables={**judged.tables, **tables}, curves={**judged.curves, **curves}
     )
 
 

@@ -25,9 +25,7 @@ from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
 from inputdesign_cli.identification import cross_correlations, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
-from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Header
@@ -78,11 +76,11 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     measured, log = log, replace(log, y=np.concatenate([y for _, y in levelled(log.parts, found.slopes)]))
     task, data = build_explored(spec_text(log, found, paths)), _data(log, found)
     units, of_log = task.header.units, replace(log, r=log.r if looped else None)
-    response = response_without_model(units, found.model, of_log, inputs=found.moving, loop=looped)
-    lines, tables, curves, silent = None, dict[str, Table](), dict[str, Curves](), dict[str, SilentLines]()
-    if response is not None:
-        tables["frequency_response"], curves["frequency_response"], lines = response
-        silent = silent_in(log.u[:, found.moving], log.y) if len(log.lengths) == 1 else {}
+    tables, curves, lines = response_without_model(
+        units, found.model, of_log, inputs=found.moving, loop=looped
+    )
+    whole = lines is not None and len(log.lengths) == 1
+    silent = silent_in(log.u[:, found.moving], log.y) if whole else {}
     doubts = [
         *doubtful_model(found, measured.parts, log.step, log.time_unit, integrates=only == "integrator"),
         *doubtful_inputs(found, measured.parts, loop=looped),
@@ -91,9 +89,8 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
         *(() if lines is None else contradicted(lines)),
     ]
     reasons = tuple(one.message for one in doubts)
-    noted = replace(
-        data, findings=log.findings, remarks=(*log.remarks, *exploration_notes(log, found, loops))
-    )
+    remarks = (*log.remarks, *exploration_notes(log, found, loops))
+    noted = replace(data, findings=log.findings, remarks=remarks)
     identified = Identified(found.estimate, found.model, noted, preparation, loop_told=looped)
     results = identification_results(task, identified.asked_by(task, "the estimate"), started)
     names = " and ".join(path.name for path in paths)
@@ -103,20 +100,17 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
         exploration=exploration_of(log, found, loops, reasons, lines, silent),
         validation=validation_of(found.validation),
     ).saying(replace(one, message=f"no trust: {one.message}") for one in doubts)
-    if lines is not None:
-        outcome = outcome.saying((*response_note(lines), *silent_lines_answer(silent)))
+    outcome = outcome.saying(() if lines is None else response_note(lines))
     results = replace(
         results,
-        outcome=outcome,
+        outcome=outcome.saying(silent_lines_answer(silent)),
         resolved_spec=spec_text(log, found, paths, reasons, loop=looped),
         tables={**results.tables, **tables},
         curves={**results.curves, **structure_curves(found), **curves},
     )
-    speaking = (
-        *shifted_levels(found.estimate, data, log.time_unit),
-        *refutations(found.model, found.estimate),
-    )
-    return Exploration(results, reasons, tuple(one.message for one in speaking))
+    against = [*shifted_levels(found.estimate, data, log.time_unit)]
+    against += refutations(found.model, found.estimate)
+    return Exploration(results, reasons, tuple(one.message for one in against))
 
 
 def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = None) -> tuple[Record, Found]:

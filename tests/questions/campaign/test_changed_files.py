@@ -9,10 +9,15 @@ from tests.support.campaigns import applied
 EDITS = {
     "record elsewhere": lambda c, r: c["records"][0].update(file="../../etc/passwd"),
     "record of no plan": lambda c, r: c["records"][0].update(plan="plan_99.csv"),
+    "too many samples": lambda c, r: c["records"][0].update(samples=5000),
+    "negative samples": lambda c, r: c["records"][0].update(samples=-7),
     "half a sample": lambda c, r: c["records"][0].update(samples=20.5),
     "energy in words": lambda c, r: c["records"][0].update(energy="nan"),
+    "plan in words": lambda c, r: c["rounds"][-1]["plan"].update(samples="many"),
     "another state": lambda c, r: c.update(state="banana"),
     "no rounds": lambda c, r: c.update(rounds=[]),
+    "a round that is none": lambda c, r: c["rounds"].append("x"),
+    "other parameters": lambda c, r: c.update(last={"b1": 1.0}),
     "a parameter in words": lambda c, r: c["rounds"][-1]["estimate"].update(b1="x"),
     "no cost": lambda c, r: c.update(first_cost=0.0),
     "files that are left out": lambda c, r: r.update(files=["spec.yaml"]),
@@ -35,23 +40,60 @@ def test_what_was_edited_by_hand_is_told(name, run, once, tmp_path):
         assert "run-unreadable" in err or "campaign-changed" in err
 
 
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"time,u1\n0,x\n", b"time,u1\n0,nan\n"])
+def test_plans_that_are_no_plans_any_more_are_told(content, run, begun):
+    (begun / "plan_01.csv").write_bytes(content)
+    code, _, err = run("status", "c")
+    assert (code, "campaign-changed" in err) == (2, True)
+
+
+def halved(text):
+    lines = text.splitlines()
+    return "\n".join(lines[: len(lines) // 2]) + "\n"
+
+
+def tenfold(text):
+    head, *rows = [row.split(",") for row in text.splitlines()]
+    return "\n".join(",".join(row) for row in [head, *([*r[:2], f"{10 * float(r[2])}"] for r in rows)]) + "\n"
+
+
 @pytest.mark.first(1)
-def test_a_record_that_was_changed_decides_nothing(run, once, tmp_path):
+@pytest.mark.parametrize("damage", [halved, lambda text: text[:40], tenfold, lambda text: text + "\n"])
+def test_a_record_that_was_changed_decides_nothing(damage, run, once, tmp_path):
     kept, before = (once / "record_01.csv").read_text(), (once / "result.json").read_bytes()
-    (once / "record_01.csv").write_text(kept[: len(kept) // 2])
-    record = applied(once, tmp_path / "r2.csv")
-    for command in (("next", "c"), ("next", "c", record), ("next", "c", "--withdraw", 2), ("status", "c")):
+    (once / "record_01.csv").write_text(damage(kept))
+    for command in (
+        ("next", "c"),
+        ("next", "c", applied(once, tmp_path / "r2.csv")),
+        ("next", "c", "--withdraw", 2),
+        ("status", "c"),
+    ):
         code, _, err = run(*command)
-        assert (code, "campaign-changed" in err, "c/record_01.csv" in err) == (2, True, True)
+        assert code == 2
+        assert "campaign-changed" in err
+        assert "c/record_01.csv" in err
         assert "--withdraw 1" in err
     assert (once / "result.json").read_bytes() == before
     # Both ways that are told of mend it.
-    (once / "record_01.csv").write_text(kept)
-    assert run("status", "c")[0] == 0
-    (once / "record_01.csv").write_text(kept + "\n")
     code, out, _ = run("next", "c", "--withdraw", 1, "--json", "--no-figures")
     assert (code, json.loads(out)["campaign"]["rounds"][-1]["records"]) == (0, [])
     assert run("next", "c", applied(once, tmp_path / "r3.csv"), "--no-figures")[0] == 0
+    kept = (once / "record_02.csv").read_text()
+    (once / "record_02.csv").write_text(damage(kept))
+    assert run("next", "c", "--no-figures")[0] == 2
+    (once / "record_02.csv").write_text(kept)
+    assert run("next", "c", "--no-figures")[0] == 0
+
+
+def test_a_plan_that_was_changed_decides_nothing(run, once, tmp_path):
+    record = applied(once, tmp_path / "r2.csv")
+    for name in ("plan_01.csv", "plan_02.csv"):
+        kept = (once / name).read_text()
+        (once / name).write_text(kept[:-3] + "9\n")
+        code, _, err = run("next", "c", record)
+        assert (code, "campaign-changed" in err, f"c/{name}" in err) == (2, True, True)
+        (once / name).write_text(kept)
+    assert (once / "signal.csv").read_text() == kept  # which the message says of the plan that is due
 
 
 def test_a_record_that_is_gone_is_to_be_put_back(run, once, tmp_path):

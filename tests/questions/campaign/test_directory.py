@@ -171,6 +171,14 @@ def test_moves_between_parts_keep_the_limit(run, begun, tmp_path):
     assert np.abs(u).max() <= 2.5 * (1 + 1e-9)
 
 
+def test_the_same_record_does_not_count_twice(run, begun, tmp_path):
+    record = applied(begun, tmp_path / "r.csv")
+    assert run("next", "c", record, "--no-figures")[0] == 0
+    code, _, err = run("next", "c", record)
+    assert code == 2
+    assert "data-repeated" in err
+
+
 def test_records_are_not_lost_to_another_run(run, once, tmp_path):
     for verb in ("solve", "campaign"):
         code, _, err = run(verb, "s.yaml", "-o", "c")
