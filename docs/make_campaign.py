@@ -21,7 +21,7 @@ from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.run_files import load_result
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.build import build_campaign
-from inputdesign_cli.questions.campaign.trials import energy_of
+from inputdesign_cli.questions.campaign.study import energy_of
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

@@ -24,11 +24,9 @@ _WALKS = 40.0
 
 
 def slopes_of(parts: Parts, *, known: bool = False) -> Array:
-    """Return the slopes (p,), a sample, of the lines along which outputs drift; zero for no line.
+    """Return the slopes (p,), a sample, of the lines along which outputs y (n, p) drift; zero for no line.
 
-    Args:
-        parts: records u (n, r), y (n, p).
-        known: whether they are known to drift, so that any slope counts.
+    If they are `known` to drift, any slope counts.
     """
     stretch = -(-sum(len(y) for _, y in parts) // _MOST_SAMPLES)
     long = [part for part in parts if len(part[1]) >= 10 * stretch]

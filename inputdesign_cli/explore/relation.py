@@ -43,13 +43,10 @@ _DEPENDENT = 1e-9
 
 
 def answers_output(parts: Parts) -> list[tuple[int, float]]:
-    """Return the inputs that answer the outputs, with the probability of that by chance.
+    """Return the inputs u (n, r) that answer outputs y (n, p), with the probability of that by chance.
 
     Each input is regressed on its own past and the other inputs', then on past innovations of the outputs as
     well. An input that follows from outputs and its own past without an error is a controller, too.
-
-    Args:
-        parts: records u (n, r), y (n, p).
     """
     lags = _lags(parts)
     kept = _centred(parts, 3 * lags)
@@ -111,11 +108,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def early_answers(parts: Parts) -> list[ScoreTest]:
-    """Return the outputs that innovations of future inputs help to predict, up to eight samples ahead.
-
-    Args:
-        parts: records u (n, r), y (n, p) of an open loop.
-    """
+    """Return the outputs of an open loop that innovations of inputs help to predict, up to eight ahead."""
     lags, parts = _lags(parts), cut(parts, busiest(parts, _MOST_SAMPLES))
     long = _centred(parts, 4 * (lags + _AHEAD))
     if not long:
@@ -205,9 +198,6 @@ def unhelpful(model: Model, parts: Parts) -> list[int]:
 
     An output is predicted from its own past, a level and a line, and besides from the simulation of the model
     (F-test). With no parameter more, the error of the simulation is predicted from its own past as well.
-
-    Args:
-        parts: records u (n, r), y (n, p).
     """
     lags = min(_LAGS, sum(len(y) for _, y in parts) // _PER_LAG)
     long = [part for part in parts if len(part[1]) > 3 * lags]

@@ -119,10 +119,10 @@ class Chosen:
 
     def ranges(self, candidate: Candidate) -> Ranges:
         """Return the 95 % interval of each delay of a candidate."""
-        orders, model = candidate.orders, candidate.model
-        found = orders.ranges(model.theta[model.in_plant], candidate.deviations)
-        if not found:
-            swept = self.swept
+        orders, model, swept = candidate.orders, candidate.model, self.swept
+        if orders.physical is True:
+            found = orders.ranges(model.theta[model.in_plant], candidate.deviations)
+        else:
             found = delay_ranges(
                 self.estimated, swept.near(orders.order), least=self.least, most=swept.most, own=orders.delays
             )
@@ -196,11 +196,7 @@ class _Records:
         return sum(len(y) for _, y in self.first)
 
     def candidate(self, shape: Shape) -> Candidate:
-        """Return a structure, estimated and judged.
-
-        Raises:
-            Exception: one of `NOT_COMPUTED`.
-        """
+        """Return a structure, estimated and judged; it may raise one of `NOT_COMPUTED`."""
         parts, near = self.first if shape.shared else self.white, self.swept.near(shape.order)
         if not shape.physical and near.delays != shape.delays:
             near = Regressed(parts, near.order).output_error(shape.delays, near.F)
@@ -213,7 +209,7 @@ class _Records:
         half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
         tests = score_tests(records, theta, White.of(records, point), feedback=self.feedback, robust=None)
         deviations = np.linalg.norm(half, axis=0)[shape.model().in_plant]
-        shape = shape.at(theta)
+        shape = shape.at(theta) if shape.physical is True else shape
         if max(shape.delays) > _RUN_OFF * self.swept.most:
             raise ArithmeticError("a dead time has run off to where nothing answers")
         model = shape.noisy(theta, self.C, self.D)
@@ -256,7 +252,7 @@ def explore_structure(
     """
     first, second = (cut(parts, busiest(parts, _MOST_SAMPLES)) for parts in (first, second))
     records = _prepared(first, second, feedback, step, only)
-    every = dict.fromkeys(_shapes(records, physical) if only is None else _fixed(records, only))
+    every = dict.fromkeys(_shapes(records, physical, only))
     shapes = [shape for shape in every if _PER_PARAMETER * shape.size <= records.samples]
     found = list[Candidate]()
     for count, shape in enumerate(shapes):
@@ -295,9 +291,20 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
     return _Records(first, judging, white, swept, late if late < longest // 2 else 0, C, D, feedback, step)
 
 
-def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
-    """Yield the structures to try, the simplest first."""
+def _shapes(records: _Records, physical: bool, only: Family | None) -> Iterator[Shape]:
+    """Yield the structures to try, the simplest first, or the orders of the one family that is asked for."""
     swept, step, near = records.swept, records.step, records.swept.best
+    if only == "arx":
+        yield from (Orders("ARX", near.delays, n, a=n) for n in range(1, _HIGHEST_ARX + 1))
+    elif only == "armax":
+        yield from (Orders("ARMAX", one.delays, n, a=n, c=n) for n, one in swept.by_order.items())
+    elif only in ("oe", "bj"):
+        yield from (Orders("OE", one.delays, n, f=n) for n, one in swept.by_order.items())
+    elif only is not None:
+        order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
+        yield Process(swept.near(order).delays, order, step)
+    if only is not None:
+        return
     yield Orders("FIR", swept.near(1).delays, 1)
     if physical:
         yield from (Process(swept.near(n).delays, n, step) for n in range(1, min(max(near.order, 2), 3) + 1))
@@ -310,17 +317,3 @@ def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
     if max(swept.by_order) > 1 and not records.feedback:
         yield Orders("ARMAX", swept.near(2).delays, 2, a=2, c=2)
     yield from (Orders("ARX", near.delays, n, a=n) for n in (near.order, near.order + 1))
-
-
-def _fixed(records: _Records, only: Family) -> Iterator[Shape]:
-    """Yield the orders of the one family that is asked for."""
-    swept = records.swept
-    if only == "arx":
-        yield from (Orders("ARX", swept.best.delays, n, a=n) for n in range(1, _HIGHEST_ARX + 1))
-    elif only == "armax":
-        yield from (Orders("ARMAX", one.delays, n, a=n, c=n) for n, one in swept.by_order.items())
-    elif only in ("oe", "bj"):
-        yield from (Orders("OE", one.delays, n, f=n) for n, one in swept.by_order.items())
-    else:
-        order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
-        yield Process(swept.near(order).delays, order, records.step)

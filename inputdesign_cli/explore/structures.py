@@ -74,10 +74,6 @@ class Orders:
         C = np.resize(np.append(F if self.a and self.c else _monic(0), np.zeros(self.c)), self.c + 1)
         return self._with(rows, A, below, C, _monic(self.d)).theta
 
-    def at(self, theta: Array) -> Orders:
-        """Return the same structure: its delays are stated."""
-        return self
-
     def model(self) -> PolynomialModel:
         """Return the structure as a model; its numbers have no meaning."""
         ones = [np.ones(self.b)] * len(self.delays)
@@ -92,10 +88,6 @@ class Orders:
         """Return the model with these parameters (k,) of the plant, and C and D where it has none."""
         own = self.model().at(theta)
         return own if self.shared else replace(own, C=(C,), D=(D,))
-
-    def ranges(self, theta: Array, deviations: Array) -> tuple[tuple[int, int], ...]:
-        """Return nothing: delays are no parameters."""
-        return ()
 
     def _with(self, rows: list[Array], A: Array, F: Array, C: Array, D: Array) -> PolynomialModel:
         B = tuple(np.concatenate([np.zeros(d), row]) for d, row in zip(self.delays, rows, strict=True))
@@ -115,7 +107,6 @@ _BELOW = {
     2: ("{T}**2", "2*{zeta}*{T}", "1"),
     3: ("{T}**2*{T3}", "{T}**2 + 2*{zeta}*{T}*{T3}", "2*{zeta}*{T} + {T3}", "1"),
 }
-_OF_ORDER = {0: ("K",), 1: ("K", "T"), 2: ("K", "T", "zeta"), 3: ("K", "T", "zeta", "T3")}
 # Poles in z of the starts.
 _FASTEST, _SLOWEST = 1e-3, 1.0 - 1e-4
 _LEAST = 0.05  # of a sample, the shortest dead time of a start
@@ -167,7 +158,7 @@ class Process:
     @property
     def letters(self) -> tuple[str, ...]:
         """Return the letters of the parameters of an input."""
-        return (*_OF_ORDER[self.order], *(("Tz",) if self.zero else ()), "L")
+        return (*("K", "T", "zeta", "T3")[: self.order + 1], *(("Tz",) if self.zero else ()), "L")
 
     @property
     def size(self) -> int:

@@ -94,12 +94,9 @@ class Sweep:
 
 
 def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> Sweep:
-    """Return regressions of one output y (n, 1) of all orders up to `highest`.
+    """Return regressions of one output y (n, 1) of all orders up to `highest`, delays of `least` or more.
 
-    Args:
-        parts: records u (n, r), y (n, 1).
-        least: the shortest delay to try.
-        line: whether the output drifts along one line through all records.
+    With a `line` the output drifts along one line through all records.
     """
     longest, inputs = max(len(y) for _, y in parts), parts[0][0].shape[1]
     samples, most = sum(len(y) for _, y in parts), max(min(_MOST_DELAY, longest // _SHARE), 1)
@@ -120,12 +117,7 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
 
 @dataclass(frozen=True)
 class Regressed:
-    """Computes regressions of order n of one output.
-
-    Attributes:
-        parts: records u (n, r), y (n, 1).
-        line: whether the output drifts along one line through all records.
-    """
+    """Computes regressions of order n of one output y (n, 1) of all records, which may drift along a line."""
 
     parts: Parts
     n: int
@@ -282,11 +274,7 @@ def _solved(gram: Array) -> tuple[Array, float]:
 def delay_ranges(
     parts: Parts, model: Regression, *, least: int, most: int, own: Sequence[int] = ()
 ) -> tuple[tuple[int, int], ...]:
-    """Return the delays of each input within 95 % confidence by the likelihood ratio.
-
-    Args:
-        own: delays of another model, which belong to the ranges.
-    """
+    """Return the delays of each input within 95 % confidence by the likelihood ratio, and `own` ones."""
     samples, found = sum(len(y) for _, y in parts), []
     limit = scipy.special.chdtri(1, 1.0 - _CONFIDENCE)
     for j, (chosen, other) in enumerate(zip(model.delays, own or model.delays, strict=True)):

@@ -206,8 +206,7 @@ def explore(
     """
     from inputdesign_cli.questions.building.header import build_header
     from inputdesign_cli.questions.exploration.build import model_to_judge, naming_model
-    from inputdesign_cli.questions.exploration.explore import explore as explore_log
-    from inputdesign_cli.questions.exploration.judge import judge
+    from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
     from inputdesign_cli.records import Preparation
 
     prepared = preparation or Preparation()

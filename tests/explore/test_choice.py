@@ -86,7 +86,7 @@ def test_a_second_order_is_not_taken_for_a_first():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hold", "delay"), [(1, 0), pytest.param(8, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("hold", "delay"), [(1, 0), (8, 2)])
 def test_a_static_gain_has_no_pole(delay, hold):
     rng = np.random.default_rng(1)
     u = held(rng, 1000, hold)
@@ -96,20 +96,16 @@ def test_a_static_gain_has_no_pole(delay, hold):
     assert found.model.theta == pytest.approx([3.0], abs=4.0 * 0.2 / np.sqrt(1000))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("only", "names"),
     [
         ("arx", ("a", "b")),
-        *(
-            pytest.param(*pair, marks=pytest.mark.slow)
-            for pair in (
-                ("integrator", ("K", "L")),
-                ("sopdt", ("K", "T", "zeta", "L")),
-                ("oe", ("b", "f")),
-                ("bj", ("b", "c", "d", "f")),
-                ("armax", ("a", "b", "c")),
-            )
-        ),
+        ("integrator", ("K", "L")),
+        ("sopdt", ("K", "T", "zeta", "L")),
+        ("oe", ("b", "f")),
+        ("bj", ("b", "c", "d", "f")),
+        ("armax", ("a", "b", "c")),
     ],
 )
 def test_a_structure_that_is_asked_for_is_taken(only, names):
@@ -167,7 +163,7 @@ def looped(rng, samples, noise):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", ["arx", pytest.param("oe", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("noise", ["arx", "oe"])
 def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
     found = explore_records([looped(np.random.default_rng(1), 1000, noise)], feedback=True)
     assert found.taken[0].orders.delays == (1,)
@@ -208,7 +204,8 @@ def test_too_short_a_record_is_refused():
         explore_records([(rng.standard_normal((20, 1)), rng.standard_normal((20, 1)))])
 
 
-@pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), pytest.param(110, 0.02, marks=pytest.mark.slow)])
+@pytest.mark.first(1)
+@pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), (110, 0.02)])
 def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
     """A lag of ten samples, gain one; a part of it says nothing, also where u flickers."""
     rng = np.random.default_rng(1)

@@ -34,13 +34,12 @@ def noise(rng, samples, name, size):
     return size * v / v.std()
 
 
-def looped(rng, plant, colour, hold, samples=800, size=0.3, reference=None):
-    """u (n, 1) and y (n, 1) of a loop that answers y(t) by u(t), its reference held if none is given."""
+def looped(rng, plant, colour, hold):
+    """u (n, 1) and y (n, 1) of a loop that answers y(t) by u(t), its reference held."""
     b, a, (gain, integral) = PLANTS[plant]
-    r = steps(rng, samples, hold) if reference is None else reference
-    v = noise(rng, samples, colour, size)
-    u, y, x, total = np.zeros(samples), np.zeros(samples), np.zeros(samples), 0.0
-    for k in range(samples):
+    r, v = steps(rng, 800, hold), noise(rng, 800, colour, 0.3)
+    u, y, x, total = np.zeros(800), np.zeros(800), np.zeros(800), 0.0
+    for k in range(800):
         x[k] = sum(c * u[k - i] for i, c in enumerate(b) if 0 < i <= k)
         x[k] -= sum(c * x[k - i] for i, c in enumerate(a) if 0 < i <= k)
         y[k] = x[k] + v[k]

@@ -72,9 +72,8 @@ def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path
     spec, path = tmp_path / "structure.yaml", heater_record("a.csv", 300, 1)
     spec.write_text(STRUCTURE)
     out = tmp_path / "run"
-    run = CliRunner().invoke(
-        app, ["identify", str(path), "--spec", str(spec), "-o", str(out), "--no-figures"]
-    )
+    options = ["--spec", str(spec), "-o", str(out), "--no-figures"]
+    run = CliRunner().invoke(app, ["identify", str(path), *options])
     assert run.exit_code == 0, run.output
     run = CliRunner().invoke(app, ["report", str(out)])
     assert run.exit_code == 0, run.output
@@ -93,17 +92,8 @@ def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_
     )
     spec.write_text(STRUCTURE + asked)
     out = tmp_path / "run"
-    call = [
-        "assess",
-        str(spec),
-        str(path),
-        "-o",
-        str(out),
-        "--no-figures",
-        "--operating-point",
-        "u1=40,y1=52.3",
-    ]
-    run = CliRunner().invoke(app, call)
+    options = ["-o", str(out), "--no-figures", "--operating-point", "u1=40,y1=52.3"]
+    run = CliRunner().invoke(app, ["assess", str(spec), str(path), *options])
     assert run.exit_code == 1, run.output
     result = json.loads((out / "result.json").read_text())
     assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}

@@ -23,10 +23,12 @@ campaign: {block: 60}
 GAIN, POLE = 3.5, 0.72
 
 
-def answered(u: np.ndarray, seed: int = 5, gain: float = GAIN, pole: float = POLE) -> np.ndarray:
+def answered(
+    u: np.ndarray, seed: int = 5, gain: float = GAIN, poles: tuple[float, ...] = (POLE,)
+) -> np.ndarray:
     """(n,): what the true plant answers to u (n,) from rest, with white noise of variance one."""
     e = np.random.default_rng(seed).standard_normal(2000)[: len(u)]
-    return lfilter([0.0, gain], [1.0, -pole], u) + e
+    return lfilter([0.0, gain], np.poly(poles), u) + e
 
 
 def planned(directory: Path) -> np.ndarray:
@@ -41,11 +43,11 @@ def written(path: Path, times: np.ndarray, u: np.ndarray, y: np.ndarray) -> Path
     return path
 
 
-def applied(directory: Path, path: Path, scale: float = 1.0, gain: float = GAIN, pole: float = POLE) -> Path:
+def applied(directory: Path, path: Path, scale: float = 1.0, **plant: object) -> Path:
     """What is recorded of the part that comes next."""
     times, u = planned(directory).T
     n = len(np.loadtxt(directory / "signal.csv", delimiter=",", skiprows=1, ndmin=2))
-    y = answered(scale * u, gain=gain, pole=pole)
+    y = answered(scale * u, **plant)
     return written(path, times[-n:], scale * u[-n:], y[-n:])
 
 

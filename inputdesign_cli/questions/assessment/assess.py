@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import bisect
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -89,9 +88,7 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
         topped = found.question.top_up(found.preparation.levels)
     except IdesignError as error:
         return replace(assessment, results=_assessed(judged, no_top_up=told(error)))
-    remarks = _remarks(task, found, topped)
-    needed = partial(_experiments, found.question)
-    return replace(assessment, results=_topped_up(judged, topped, remarks, needed))
+    return replace(assessment, results=_topped_up(task, found, found.question, judged, topped))
 
 
 def judge(task: Identification, found: Identified, began: float, *, first: bool | None = None) -> Assessment:
@@ -164,61 +161,31 @@ def _assessed(judged: Results, **more: Any) -> Results:
     return replace(judged, outcome=replace(judged.outcome, assessment=replace(was, **more)))
 
 
-def _remarks(task: Identification, found: Identified, topped: Results) -> list[Finding]:
-    """Return remarks on a top-up: the levels its record varies about, and what it does not count on."""
-    remarks, signal = [], topped.outcome.signal
-    if "signal" in topped.tables and signal is not None and not task.header.units.closed_loop:
-        point, levels = signal.operating_point, found.preparation.levels
-        remarks += level_notes(levels, point, found.data.means, found.data.u.std(axis=0))
-    if task.has_prior and found.estimate.prior is None:
-        remarks.append(prior_left_out())
-    return remarks
-
-
 def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     """Return the results with the response of the data alone beside the model, where it can be had."""
-    response = response_without_model(units, found.model, found.data)
-    if response is None:
+    tables, curves, lines = response_without_model(units, found.model, found.data)
+    if lines is None:
         return judged
-    table, curves, lines = response
-    shown = _assessed(judged, frequency_response=lines)
+    outcome = _assessed(judged, frequency_response=lines).outcome.saying(response_note(lines))
     return replace(
-        shown,
-        outcome=shown.outcome.saying(response_note(lines)),
-        tables={**judged.tables, "frequency_response": table},
-        curves={**judged.curves, "frequency_response": curves},
+        judged, outcome=outcome, tables={**judged.tables, **tables}, curves={**judged.curves, **curves}
     )
 
 
-def _experiments(question: ModelQuestion, both: Array) -> int | None:
-    """Return the number of experiments that the data lack; with one they have (k, k). None: too many."""
-    data = question.information
-    more = question.experiment.whiten_matrix(both) - data
-
-    def enough(times: int) -> bool:
-        return question.ratio(data + times * more) <= 1.0 + _REACHED
-
-    most = 2
-    while not enough(most):
-        if most >= _MOST_EXPERIMENTS:
-            return None
-        most *= 2
-    return bisect.bisect_left(range(most), True, lo=most // 2, key=enough)
-
-
 def _topped_up(
-    judged: Results, topped: Results, remarks: Sequence[Finding], needed: Callable[[Array], int | None]
+    task: Identification, found: Identified, question: ModelQuestion, judged: Results, topped: Results
 ) -> Results:
-    """Return the top-up, together with the findings on the data.
-
-    Args:
-        remarks: on the top-up.
-        needed: how many such experiments it takes, by the information (k, k) after one of them.
-    """
-    was, design = judged.outcome, topped.outcome.saying(remarks)
-    signal = 0.0 if design.signal is None else design.signal.worst_ratio or 0.0
-    left = max([one.worst_ratio for one in design.requirements or ()] + [signal])
-    often = needed(topped.information) if left > 1.0 + _REACHED else None
+    """Return the top-up, together with the findings on the data."""
+    was, signal, remarks = judged.outcome, topped.outcome.signal, list[Finding]()
+    if "signal" in topped.tables and signal is not None and not task.header.units.closed_loop:
+        levels, data = found.preparation.levels, found.data
+        remarks += level_notes(levels, signal.operating_point, data.means, data.u.std(axis=0))
+    if task.has_prior and found.estimate.prior is None:
+        remarks.append(prior_left_out())
+    design = topped.outcome.saying(remarks)
+    reached = 0.0 if signal is None else signal.worst_ratio or 0.0
+    left = max([one.worst_ratio for one in design.requirements or ()] + [reached])
+    often = _experiments(question, topped.information) if left > 1.0 + _REACHED else None
     completed = _assessed(judged, top_up_status=design.status, left=left, experiments=often)
     outcome = replace(
         design,
@@ -233,6 +200,21 @@ def _topped_up(
         topped,
         outcome=outcome,
         tables={**topped.tables, **{f"data_{name}": table for name, table in judged.tables.items()}},
-        curves={**topped.curves, **{f"data_{name}": figure for name, figure in judged.curves.items()}},
+        curves={**topped.curves, **{f"data_{name}": curves for name, curves in judged.curves.items()}},
         files={**topped.files, **judged.files},
     )
+
+
+def _experiments(question: ModelQuestion, both: Array) -> int | None:
+    """Return the number of experiments that the data lack; with one they have (k, k). None: too many."""
+    data, most = question.information, 2
+    more = question.experiment.whiten_matrix(both) - data
+
+    def enough(times: int) -> bool:
+        return question.ratio(data + times * more) <= 1.0 + _REACHED
+
+    while not enough(most):
+        if most >= _MOST_EXPERIMENTS:
+            return None
+        most *= 2
+    return bisect.bisect_left(range(most), True, lo=most // 2, key=enough)

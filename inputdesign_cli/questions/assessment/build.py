@@ -99,26 +99,6 @@ def operating_point(spec: Spec) -> dict[str, float]:
     return {f"u{j + 1}": float(level) for j, level in enumerate(operating_points(spec))}
 
 
-def _offset(spec: Spec, levels: Mapping[str, float]) -> dict[str, object]:
-    """Return the change that gives a record the levels of the data, unless the spec states an offset."""
-    inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
-    if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
-        return {}
-    offsets = [levels.get(name, 0.0) for name in inputs]
-    return {"signal.offset": offsets if len(offsets) > 1 else offsets[0]}
-
-
-def _reaching(spec: Spec, values: Mapping[str, float]) -> dict[str, object]:
-    """Return the change that widens intervals as far as the estimate."""
-    if spec.uncertainty is None or spec.uncertainty.intervals is None:
-        return {}
-    reaching = {
-        name: (min(low, values.get(name, low)), max(high, values.get(name, high)))
-        for name, (low, high) in spec.uncertainty.intervals.items()
-    }
-    return {"uncertainty.intervals": reaching}
-
-
 def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
     """Return the question of a spec for data of some length, and a factor (k, k) of their information.
 
@@ -132,7 +112,17 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
         # With values it enters the estimate as well, when the spec is assessed with further records.
         values = dict(zip(raw.model.names, raw.model.theta.tolist(), strict=True))
         prior = {"parameters": values, "information": factor @ factor.T}
-        changes = {"experiment.prior": prior, **_offset(spec, levels), **_reaching(spec, values)}
+        changes: dict[str, object] = {"experiment.prior": prior}
+        # The record gets the levels of the data, and intervals reach as far as the estimate.
+        inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
+        if not spec.closed_loop and spec.signal.offset is None and set(inputs) & set(levels):
+            offsets = [levels.get(name, 0.0) for name in inputs]
+            changes["signal.offset"] = offsets if len(offsets) > 1 else offsets[0]
+        if spec.uncertainty is not None and spec.uncertainty.intervals is not None:
+            changes["uncertainty.intervals"] = {
+                name: (min(low, values.get(name, low)), max(high, values.get(name, high)))
+                for name, (low, high) in spec.uncertainty.intervals.items()
+            }
         task = build_convex(spec.revised(changes, file="top-up", design=True))
         if task.foresight is None:
             return task.solve()

@@ -244,6 +244,8 @@ def told(error: IdesignError) -> str:
 def findings_of(task: Identification, found: Identified) -> list[Finding]:
     """Return all findings for or against the data and the estimate."""
     units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
+    # Where an expression ends G may vanish, whatever the inputs do.
+    at_ends = stopped_at_ends(model, estimate)
     rivals = (
         other_minima(units, model, estimate, question.asked, question.entries, question.information)
         if question is not None
@@ -254,8 +256,18 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         *larger_noise(model, found.noise_refuted),
         *started(estimate),
         *on_the_circle(model, estimate),
-        *speaking_against(task, found),
-        *([] if stopped_at_ends(model, estimate) else hardly_explained(units, model, estimate)),
+        # Faults of measurement stand alone, as they upset other tests.
+        *(
+            mismeasured(task, found)
+            or [
+                *([] if at_ends else idle(units, task.nominal, model, estimate)),
+                *shifted_levels(estimate, found.data, units.time_unit),
+                *refutations(model, estimate),
+                *([] if found.loop_told else answering(units, estimate)),
+                *found.data.repeated,
+            ]
+        ),
+        *([] if at_ends else hardly_explained(units, model, estimate)),
         *near_zero(model, estimate),
         *band_limited(model, estimate),
         *differences(estimate, [name for name, _ in found.data.files]),
@@ -266,19 +278,6 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
     ]
 
 
-def speaking_against(task: Identification, found: Identified) -> list[Finding]:
-    """Return findings against the model; faults of measurement alone, as they upset other tests."""
-    data, estimate, units = found.data, found.estimate, task.header.units
-    return mismeasured(task, found) or [
-        # Where an expression ends G may vanish, whatever the inputs do.
-        *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
-        *shifted_levels(estimate, data, units.time_unit),
-        *refutations(found.model, estimate),
-        *([] if found.loop_told else answering(units, estimate)),
-        *data.repeated,
-    ]
-
-
 def mismeasured(task: Identification, found: Identified) -> list[Finding]:
     """Return faults of measurement."""
     own = faults(task.header.units, found.estimate, found.data)
@@ -286,11 +285,7 @@ def mismeasured(task: Identification, found: Identified) -> list[Finding]:
 
 
 def identification_results(task: Identification, found: Identified, began: float) -> Results:
-    """Return the results that `idesign identify` writes.
-
-    Args:
-        began: `time.perf_counter()` when the work began.
-    """
+    """Return the results that `idesign identify` writes; the work `began` at this `time.perf_counter()`."""
     header, question, estimate = task.header, found.question, found.estimate
     tables, curves = data_curves(header.units, found.data, estimate)
     bound = None
@@ -318,11 +313,7 @@ def identification_results(task: Identification, found: Identified, began: float
 
 
 def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:
-    """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
-
-    Raises:
-        DataError: see `identified`.
-    """
+    """Estimate the model whose structure `plant` and `noise` give from records; see `identified`."""
     began = time.perf_counter()
     return identification_results(*identified(task, paths, preparation), began)
 

@@ -172,12 +172,7 @@ def data_curves(units: Units, data: Record, estimate: Estimate) -> tuple[dict[st
 def bound_of_data(
     units: Units, confidence: Confidence, errors: Sequence[OnModelError], *, asked: bool, information: Array
 ) -> tuple[Table, BoundCurves, Bound]:
-    """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
-
-    Args:
-        errors: the model errors of r_u; `asked` says whether requirements state r_adm.
-        information: (k, k) of the data.
-    """
+    """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if requirements state r_adm."""
     bound = Bound(confidence.alpha, confidence=confidence.reported)
     if asked:
         violation = worst([error.worst(information) for error in errors])
@@ -206,8 +201,8 @@ def _pairs(units: Units, name: str, values: Array) -> dict[str, Array]:
 
 def response_without_model(
     units: Units, model: Model, data: Record, *, inputs: Sequence[int] | None = None, loop: bool = False
-) -> tuple[Table, ResponseCurves, MeasuredLines] | None:
-    """Return the frequency response of the data alone beside a model, where it can be had.
+) -> tuple[dict[str, Table], dict[str, Curves], MeasuredLines | None]:
+    """Return the frequency response of the data alone beside a model; nothing where it cannot be had.
 
     A reference counts if it is from outside and moves.
 
@@ -224,11 +219,11 @@ def response_without_model(
         if reference is None or not np.any(np.all(reference == u, axis=0)):
             found = frequency_response(u, data.y, reference, lengths=data.lengths, delays=delays)
             if found is not None:
-                by_reference = reference is not None
-                return response_of_data(
-                    units, model, found, by_reference=by_reference, inputs=inputs, loop=loop
+                table, curves, lines = response_of_data(
+                    units, model, found, by_reference=reference is not None, inputs=inputs, loop=loop
                 )
-    return None
+                return {"frequency_response": table}, {"frequency_response": curves}, lines
+    return {}, {}, None
 
 
 def response_of_data(

@@ -19,8 +19,7 @@ from inputdesign_cli.questions.building.uncertainty import farthest_radius
 from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.rounds import Rounds
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
-from inputdesign_cli.questions.campaign.study import CampaignTask
-from inputdesign_cli.questions.campaign.trials import CampaignStudy
+from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Campaign, Pilot
@@ -29,11 +28,7 @@ _TENTH, _LONGEST, _CAP = 10, 3, 10.0
 
 
 def build_rules(spec: Spec) -> Rules:
-    """Return the rules of the campaign of a spec.
-
-    Raises:
-        SpecError: there is no campaign, or it is not supported in parts; `conflicting-keys`.
-    """
+    """Return the rules of the campaign; raise `SpecError` if there is none, or none that goes in parts."""
     stated = spec.campaign
     if stated is None:
         raise spec.complain(
@@ -113,11 +108,7 @@ def _check(spec: Spec, stated: Campaign) -> None:
 
 
 def build_planner(spec: Spec) -> Planner:
-    """Return the planner of the parts.
-
-    Raises:
-        SpecError, DataError: see `build_experiment` and `farthest_radius`.
-    """
+    """Return the planner of the parts; it raises as `build_experiment` and `farthest_radius` do."""
     nominal = build_experiment(spec)
     return Planner(
         nominal=nominal,
@@ -136,11 +127,7 @@ def _asked(spec: Spec) -> Callable[[int, Array], ModelQuestion]:
 
 
 def build_campaign(spec: Spec) -> CampaignTask:
-    """Return the design of the whole experiment, and the study of whole campaigns.
-
-    Raises:
-        SpecError, DataError: see `build_rules` and the builders of a design.
-    """
+    """Return the design of the whole experiment, and the study of whole campaigns; see `build_rules`."""
     rules, planner = build_rules(spec), build_planner(spec)
     design, study = build_convex(spec), build_simulation(spec, planner.nominal)
     truth = planner.nominal.model if study.truth is None else study.truth.model
@@ -161,22 +148,16 @@ def build_campaign(spec: Spec) -> CampaignTask:
 
 
 def build_rounds(spec: Spec) -> Rounds:
-    """Return all that the rounds of a real campaign need.
-
-    Raises:
-        SpecError, DataError: see `build_rules` and the builders of a design.
-    """
+    """Return all that the rounds of a real campaign need; see `build_rules`."""
     rules, planner = build_rules(spec), build_planner(spec)
     return Rounds(build_identification(spec), planner, rules, operating_points(spec))
 
 
 def check_applied_in_parts(spec: Spec) -> None:
     """Raise `SpecError` (`not-supported`) for keys of `signal` that do not apply to parts."""
-    unlike = {
-        "samples": (spec.signal.samples, "campaign.block or campaign.stages state the lengths of parts"),
-        "also": (spec.signal.also, "remove it: signal.csv is the file of a part"),
-    }
-    for name, (stated, hint) in unlike.items():
-        if stated is not None:
-            key = f"signal.{name}"
-            raise spec.complain("not-supported", f"parts of a campaign have no {key}", hint=hint, key=key)
+    key, hint = "signal.samples", "campaign.block or campaign.stages state the lengths of parts"
+    if spec.signal.samples is None:
+        key, hint = "signal.also", "remove it: signal.csv is the file of a part"
+        if spec.signal.also is None:
+            return
+    raise spec.complain("not-supported", f"parts of a campaign have no {key}", hint=hint, key=key)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,26 +14,21 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.findings.campaigns import campaign_refuted, planned_otherwise, withdrawn_record
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
+from inputdesign_cli.outcome.campaign import Campaign, PlannedPart, Round
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.acceptance import accepted
 from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests
 from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
-from inputdesign_cli.questions.campaign.schedule import Planned, power_of
+from inputdesign_cli.questions.campaign.schedule import power_of
 from inputdesign_cli.regular_file import read_regular
 
 Decide = Callable[[Past], Decision]
 
 
 def begun(decide: Decide, folder: Path, directory: Path) -> Results:
-    """Return the results with the first plan.
-
-    Args:
-        folder: what names of files in the spec are relative to.
-        directory: where the campaign will be.
-    """
+    """Return the results with the first plan; names of files in the spec are relative to a `folder`."""
     decision = decide(Past())
     task = decision.task
     campaign = Campaign(
@@ -73,9 +67,22 @@ def advanced(
     """
     campaign, files, said = memory.campaign, dict(memory.files), Outcome()
     if given is not None and part is not None:
-        name, text = f"record_{len(campaign.records) + 1:02d}", csv_text(part.table)
-        due = _due(memory)
-        _check_new(campaign.records, files, given, text)
+        name, text, due = f"record_{len(campaign.records) + 1:02d}", csv_text(part.table), campaign.plan
+        if campaign.state != "running" or due is None:
+            raise DataError.because(
+                "campaign-over",
+                f"the campaign in {memory.directory} has ended: {campaign.state}",
+                hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; "
+                "where tests refute the structure, --regardless without a record goes on as it is",
+            )
+        for known in campaign.records:
+            if files[known.file] == text.encode():
+                stays = " (this one stays withdrawn)" if known.withdrawn else ""
+                raise DataError.because(
+                    "data-repeated",
+                    f"{given.name} holds the samples of {known.file}, given as {known.given}",
+                    hint=f"give each record once{stays}",
+                )
         record, findings = accepted(memory, due, f"{name}.csv", given, part, unlike=unlike)
         files[f"{name}.csv"] = text.encode()
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
@@ -87,11 +94,7 @@ def advanced(
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
-    """Return the results of the decision without a record, whose file stays.
-
-    Raises:
-        DataError: `record-unknown`.
-    """
+    """Return the results of the decision without a record, whose file stays; raise `record-unknown`."""
     records = list(memory.campaign.records)
     if not 1 <= number <= len(records) or records[number - 1].withdrawn:
         left = [str(n) for n, record in enumerate(records, 1) if not record.withdrawn]
@@ -114,27 +117,38 @@ def _again(
     said: Outcome,
     given: Path | None = None,
 ) -> Results:
-    """Decide on the next part from all records that count.
-
-    Args:
-        said: notes and findings about a new record, which was `given`.
-    """
+    """Decide on the next part from all records that count; `said` is what there is to say of a new one."""
     counting = [record.file for record in campaign.records if not record.withdrawn]
     applied = [
         np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
         for record in campaign.records
     ]
-    with _on_disc(files, counting, given) as paths:
-        past = Past(
-            records=paths,
-            done=campaign.done,
-            applied=np.concatenate(applied) if applied else None,
-            last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
-            first_cost=campaign.first_cost,
-            number=len(campaign.rounds) + 1,
-            regardless=bool(campaign.regardless),
-        )
-        decision = decide(past)
+    past = Past(
+        done=campaign.done,
+        applied=np.concatenate(applied) if applied else None,
+        last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
+        first_cost=campaign.first_cost,
+        number=len(campaign.rounds) + 1,
+        regardless=bool(campaign.regardless),
+    )
+    # The new record is not in the directory yet; errors about it name the file that was given.
+    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
+        paths = [Path(folder) / name for name in counting]
+        for path in paths:
+            path.write_bytes(files[path.name])
+
+        def renamed(text: str) -> str:
+            own = text.removeprefix(f"{folder}{os.sep}")
+            return own if given is None else own.replace(counting[-1], given.name)
+
+        def named(one: Diagnostic) -> Diagnostic:
+            place = None if one.location is None else replace(one.location, file=renamed(one.location.file))
+            return replace(one, message=renamed(one.message), location=place)
+
+        try:
+            decision = decide(replace(past, records=paths))
+        except DataError as error:
+            raise DataError([named(one) for one in error.diagnostics]) from error
     if decision.refuted:
         every, end = len(counting) == len(campaign.records), decision.task.rules.end
         said = said.saying(campaign_refuted(memory.directory, campaign.done, end, counting, every=every))
@@ -143,66 +157,8 @@ def _again(
     return replace(results, outcome=replace(results.outcome, provenance=provenance))
 
 
-@contextmanager
-def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | None) -> Iterator[list[Path]]:
-    """Write the records that count to files; the new one is not in the directory yet.
-
-    Errors about the new one name the file that was `given`.
-    """
-    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
-        paths = [Path(folder) / name for name in names]
-        for path in paths:
-            path.write_bytes(files[path.name])
-
-        def named(diagnostic: Diagnostic) -> Diagnostic:
-            text, place = [diagnostic.message], diagnostic.location
-            if place is not None:
-                text.append(place.file.removeprefix(f"{folder}{os.sep}"))
-            if given is not None:
-                text = [one.replace(names[-1], given.name) for one in text]
-            placed = None if place is None else replace(place, file=text[1])
-            return replace(diagnostic, message=text[0], location=placed)
-
-        try:
-            yield paths
-        except DataError as error:
-            raise DataError([named(one) for one in error.diagnostics]) from error
-
-
-def _due(memory: Memory) -> PlannedPart:
-    """Return the part that is due.
-
-    Raises:
-        DataError: `campaign-over`.
-    """
-    campaign = memory.campaign
-    if campaign.state != "running" or campaign.plan is None:
-        raise DataError.because(
-            "campaign-over",
-            f"the campaign in {memory.directory} has ended: {campaign.state}",
-            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; where "
-            "tests refute the structure, --regardless without a record goes on as it is",
-        )
-    return campaign.plan
-
-
-def _check_new(records: Sequence[PartRecord], files: Mapping[str, bytes], given: Path, text: str) -> None:
-    """Raise `DataError` (`data-repeated`) where the same samples have been given before."""
-    for record in records:
-        if files[record.file] == text.encode():
-            raise DataError.because(
-                "data-repeated",
-                f"{given.name} holds the samples of {record.file}, given as {record.given}",
-                hint="give each record once" + (" (this one stays withdrawn)" if record.withdrawn else ""),
-            )
-
-
 def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], said: Outcome) -> Results:
-    """Return the results of a decision.
-
-    Args:
-        said: notes and findings that come first.
-    """
+    """Return the results of a decision; what was `said` before comes first."""
     number, header, rules = len(campaign.records), decision.task.identification.header, decision.task.rules
     tables: dict[str, Table] = {}
     curves: dict[str, Curves] = {}
@@ -211,12 +167,11 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
         outcome, tables, curves = assessed.outcome, dict(assessed.tables), dict(assessed.curves)
         files[f"model_{number:02d}.yaml"] = assessed.files["model.yaml"]
     said = said.saying(decision.findings)
-    entry = _entry(decision, campaign)
+    plan, file = decision.plan, f"plan_{number + 1:02d}.csv"
+    entry = _entry(decision, campaign, file)
     if entry.share == 1.0:
         campaign = replace(campaign, last=entry.estimate)
-    plan = decision.plan
     if plan is not None and decision.part is not None:
-        file = f"plan_{number + 1:02d}.csv"
         files[file] = csv_text(decision.part).encode()
         fragile = rules.robust_last and rules.schedule.last(campaign.done) and plan.kind == "nominal"
         said = said.saying(
@@ -230,7 +185,6 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
                 fragile=fragile,
             )
         )
-        entry = replace(entry, plan=_planned(file, plan, decision))
         if plan.designed and campaign.first_cost is None:
             campaign = replace(campaign, first_cost=plan.cost)
         time_of, *signals = decision.part.columns.values()
@@ -254,29 +208,27 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
     return Results(outcome, header.resolved_spec, time_unit, tables, curves, files)
 
 
-def _entry(decision: Decision, campaign: Campaign) -> Round:
-    """Return the round of a decision without its plan."""
+def _entry(decision: Decision, campaign: Campaign, file: str) -> Round:
+    """Return the round of a decision, whose plan, if there is one, is kept in a `file`."""
+    stands, plan = decision.standing, decision.plan
     entry = Round(
         samples=campaign.done,
         energy=sum((record.energy for record in campaign.records), start=0.0),
         records=tuple(n for n, record in enumerate(campaign.records, 1) if not record.withdrawn),
         state=decision.state,
     )
-    stands = decision.standing
-    if stands is None:
+    if stands is not None:
+        names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
+        entry = replace(
+            entry,
+            estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
+            standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
+            worst_ratio=stands.ratio,
+            share=stands.share,
+        )
+    if plan is None:
         return entry
-    names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
-    return replace(
-        entry,
-        estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
-        standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
-        worst_ratio=stands.ratio,
-        share=stands.share,
-    )
-
-
-def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:
-    return PlannedPart(
+    planned = PlannedPart(
         file=file,
         samples=plan.take,
         planned_samples=len(plan.record),
@@ -291,14 +243,11 @@ def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:
         design=None if plan.claim is None else plan.claim(),
         why=plan.why or None,
     )
+    return replace(entry, plan=planned)
 
 
 def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]]:
-    """Return rounds.csv, a row for each round with an estimate, and its figures.
-
-    Args:
-        end: samples after which the campaign is over at the latest.
-    """
+    """Return rounds.csv, a row for each round with an estimate, and its figures; `end` is the last sample."""
     known = [one for one in rounds if one.estimate is not None]
 
     def column(values: Iterable[float | None]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -97,22 +97,22 @@ class Planner:
         first: float | None,
         before: Array | None = None,
     ) -> Planned:
-        """Plan the experiment that follows a number of samples.
+        """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
         Args:
             known: None before any data.
-            done: samples that have been applied.
-            seed: of the record.
             first: cost of a sample of the first plan, which the cap is relative to.
             before: (n, r), applied so far about the operating point; None before any.
-
-        Raises:
-            IdesignError: there is no first plan.
         """
         take, rest = rules.schedule.take(done), rules.schedule.rest(done)
         earlier = np.zeros((0, self.nominal.inputs)) if before is None else before
         if known is None and done == 0 and rules.pilot_power is not None:
-            return self._kept(self._pilot(rules.pilot_power, take, seed), rules, np.inf, None, earlier)
+            # White noise of this power, even over the inputs.
+            powers = np.full(self.nominal.inputs, rules.pilot_power / self.nominal.inputs)
+            drawn = Redrawn.flat("pilot", "white", powers, self.nominal.band, take, self.step)
+            record = drawn.draw(1, take, np.random.default_rng(seed))[0]
+            pilot = Planned(record, take, power_of(record), 0.0, "pilot")
+            return self._kept(pilot, rules, np.inf, None, earlier)
         cap = rules.cap(first)
         if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
             cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
@@ -160,23 +160,39 @@ class Planner:
 
         A part may be stronger than its plan is on average. An experiment that costs little at a wrong
         estimate may cost any amount at the plant if outputs are paid for. The cap is wide at the plant of
-        the spec, since plants differ.
+        the spec, since plants differ. Noise does not count, as in the cost of a design.
         """
-        if before.size:
-            plan = plan.following(before[-1], rules.rate)
+        lead = 0
+        if rules.rate is not None and before.size and np.any(before[-1]):
+            # A record starts within one move of zero: moves of at most the rate lead back to it.
+            last, rate = before[-1], np.asarray(rules.rate)
+            lead = int(np.max(np.ceil(np.abs(last) / rate)))
+            left = np.maximum(np.abs(last) - np.arange(1, lead + 1)[:, None] * rate, 0.0)
+            plan = replace(plan, record=np.concatenate([np.sign(last) * left, plan.record]))
         caps = [(self.nominal, cap)]
         if known is not None:
             wide = _ELSEWHERE if any(map(self.nominal.depends_on_plant, self.cost)) else 1.0
             caps = [(self._experiment(known.model), cap), (self.nominal, wide * cap)]
-        return _within_caps(plan, caps, self.cost, self.step, before)
+
+        def cost(experiment: Experiment, scale: float) -> float:
+            """Return the cost of a sample of the part, all of it but the lead at a scale."""
+            factors = np.where(np.arange(plan.take) < lead, 1.0, scale)[: len(plan.applied), None]
+            whole = np.concatenate([before, factors * plan.applied])
+            at = FiniteRecord(replace(experiment, samples=len(whole)), len(whole), self.step)
+            signals = {kind: at.signals(kind, whole)[len(before) :] for kind in self.cost}
+            powers = {kind: np.mean(x**2, axis=0).tolist() for kind, x in signals.items()}
+            return weighted_sum(self.cost, powers)
+
+        scale = min(_largest_scale(partial(cost, at), most) for at, most in caps)
+        beyond = any(cost(at, scale) > most * REACHED for at, most in caps)
+        part_cost, record = cost(caps[0][0], scale), plan.record.copy()
+        record[lead : plan.take] *= scale
+        return replace(plan, record=record, share=scale**2, part_cost=part_cost, beyond=beyond)
 
     def knowing(self, model: Model) -> tuple[float, Array | None]:
-        """Return the cost of the spectrum of the design for a known plant, and the record (samples, r) of it.
+        """Return the cost of the design for a known plant, over all samples, and its record (samples, r).
 
-        The cost is summed over the samples; the record is None if none fits.
-
-        Raises:
-            IdesignError: there is no design.
+        The record is None if none fits. Raise `IdesignError` if there is no design.
         """
         found, record = self._designed(model, Change(self.nominal.samples, self.seed)), None
         with suppress(IdesignError):
@@ -212,21 +228,18 @@ class Planner:
                 found, rest = between, middle
             else:
                 short = middle
-        return found.planned.at_most(cap)
+        plan = found.planned
+        if _fits(found, cap):
+            return plan
+        share = cap / plan.cost
+        weaker = plan.record * np.sqrt(share)
+        return replace(plan, record=weaker, power=plan.power * share, cost=cap, capped=True)
 
     def _designed(self, model: Model | None, change: Change) -> _Found:
         task = self.designs.at(model, change)
         task = replace(task, asked=replace(task.asked, windows=0))  # a part is not the whole record
         kind: PlanKind = "white" if change.white else "nominal" if task.asked.plants is None else "robust"
         return _Found(task, task.designed(), kind)
-
-    def _pilot(self, power: float, take: int, seed: int) -> Planned:
-        """Return white noise of this power, even over the inputs."""
-        nominal = self.nominal
-        powers = np.full(nominal.inputs, power / nominal.inputs)
-        drawn = Redrawn.flat("pilot", "white", powers, nominal.band, take, self.step)
-        record = drawn.draw(1, take, np.random.default_rng(seed))[0]
-        return Planned(record, take, power_of(record), 0.0, "pilot")
 
     def _stopgap(self, rules: Rules, cost: float, rest: int, seed: int, why: IdesignError) -> Planned:
         """Return white noise of this cost a sample; of the power of the pilot if nothing else was applied."""
@@ -258,22 +271,19 @@ class _Found:
     def planned(self) -> Planned:
         """Return the plan with its record; zero if nothing needs to be applied."""
         done = self.done
+
+        def claim() -> PlanClaim:
+            """Return the proof of the design; raise `InaccurateError` if other means do not confirm it."""
+            found = design_outcome(done)
+            audit(done, found, on_grid=False)
+            assert found.objective is not None
+            assert found.spectrum is not None
+            return PlanClaim(done.answer.status, found.objective, found.spectrum)
+
         made = fitting_record(self.task.record, done.question, done.design, done.experiment.samples).record
         silent = np.zeros((done.experiment.samples, done.experiment.inputs))
         record = silent if made is None else made.samples
-        return Planned(record, len(record), power_of(record), self.cost, self.kind, claim=self._claim)
-
-    def _claim(self) -> PlanClaim:
-        """Return the proof of the design, evaluated a second time by other means.
-
-        Raises:
-            InaccurateError: `internal-disagreement`.
-        """
-        found = design_outcome(self.done)
-        audit(self.done, found, on_grid=False)
-        assert found.objective is not None
-        assert found.spectrum is not None
-        return PlanClaim(self.done.answer.status, found.objective, found.spectrum)
+        return Planned(record, len(record), power_of(record), self.cost, self.kind, claim=claim)
 
 
 def _fits(found: _Found | None, cap: float) -> bool:
@@ -285,10 +295,7 @@ def standing(
 ) -> Standing | None:
     """Return the estimate with its accuracy, or the nearest usable model on the way from the `last` one.
 
-    Return None if no model on the way can be used.
-
-    Args:
-        informed: information (k, k) of the data at a model.
+    `informed` returns the information (k, k) of the data at a model. None: no model can be used.
     """
     for share in _SHARES:
         model = estimate if share == 1.0 else estimate.at(last.theta + share * (estimate.theta - last.theta))
@@ -303,37 +310,6 @@ def standing(
         if np.isfinite(ratio):
             return Standing(model, information, ratio, share)
     return None
-
-
-def _within_caps(
-    plan: Planned,
-    caps: Sequence[tuple[Experiment, float]],
-    weights: Mapping[PowerKind, Weight],
-    step: float,
-    before: Array,
-) -> Planned:
-    """Return the plan with a first part whose samples cost at most the cap at each of several plants.
-
-    Noise does not count, as in the cost of a design.
-
-    Args:
-        caps: plants with their caps; the plan is made for the first plant.
-        weights: of the powers; `step`: time between samples in the unit of the experiment's frequencies.
-        before: (m, r), applied earlier, whose effects last.
-    """
-
-    def cost(experiment: Experiment, scale: float) -> float:
-        """Return the cost of a sample of the part, all of it but the lead at a scale."""
-        factors = np.where(np.arange(plan.take) < plan.lead, 1.0, scale)[: len(plan.applied), None]
-        whole = np.concatenate([before, factors * plan.applied])
-        at = FiniteRecord(replace(experiment, samples=len(whole)), len(whole), step)
-        signals = {kind: at.signals(kind, whole)[len(before) :] for kind in weights}
-        return weighted_sum(weights, {kind: np.mean(x**2, axis=0).tolist() for kind, x in signals.items()})
-
-    scale = min(_largest_scale(partial(cost, at), cap) for at, cap in caps)
-    beyond = any(cost(at, scale) > cap * REACHED for at, cap in caps)
-    kept = plan if scale == 1.0 else plan.weaker(scale**2)
-    return replace(kept, part_cost=cost(caps[0][0], scale), beyond=beyond)
 
 
 def _largest_scale(cost: Callable[[float], float], cap: float) -> float:

@@ -21,13 +21,7 @@ from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.assess import judge
-from inputdesign_cli.questions.assessment.identify import (
-    Identification,
-    Identified,
-    estimated,
-    mismeasured,
-    told,
-)
+from inputdesign_cli.questions.assessment.identify import Identification, estimated, mismeasured, told
 from inputdesign_cli.questions.campaign.plans import Planner, standing
 from inputdesign_cli.questions.campaign.schedule import Planned, Rules, Standing
 from inputdesign_cli.records import Preparation, Record, read_data
@@ -123,17 +117,15 @@ class Part:
 
 
 def decide(task: Rounds, past: Past) -> Decision:
-    """Estimate all records jointly, judge, and plan the next part.
-
-    Raises:
-        DataError: a record cannot be used.
-        IdesignError: nothing can be planned.
-    """
-    decision = _judged(task, past)
+    """Estimate all records jointly, judge, and plan the next part; raise `IdesignError` if none can be."""
+    rules = task.rules
+    decision = Decision(task, rules.seed_of(past.number), "missed" if past.done >= rules.end else "running")
+    if past.records:
+        decision = _judged(task, past, decision)
     if decision.state != "running":
         return decision
     before = None if past.applied is None else past.applied - task.offsets
-    plan = task.planner.plan(task.rules, decision.standing, past.done, decision.seed, past.first_cost, before)
+    plan = task.planner.plan(rules, decision.standing, past.done, decision.seed, past.first_cost, before)
     # The times of a part continue the times of the last one.
     units, applied = task.identification.header.units, plan.applied + task.offsets
     time_of = units.sample_time * np.arange(past.done, past.done + len(applied), dtype=np.float64)
@@ -141,12 +133,10 @@ def decide(task: Rounds, past: Past) -> Decision:
     return replace(decision, plan=plan, part=Table({units.time_header: time_of, **columns}))
 
 
-def _judged(task: Rounds, past: Past) -> Decision:
+def _judged(task: Rounds, past: Past, decision: Decision) -> Decision:
+    """Return the decision with the joint estimate of all records, and with its end if that decides it."""
     rules, identification = task.rules, task.identification
-    units = identification.header.units
-    decision = Decision(task, rules.seed_of(past.number), "missed" if past.done >= rules.end else "running")
-    if not past.records:
-        return decision
+    units, nominal = identification.header.units, identification.nominal
     started = time.perf_counter()
     try:
         taken = Preparation(operating_point=identification.operating_point)
@@ -156,18 +146,27 @@ def _judged(task: Rounds, past: Past) -> Decision:
         if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
             raise
         return replace(decision, findings=tuple(no_estimate_yet(told(error))))
+    estimate, earlier = found.estimate, identification.earlier
+
+    def informed(model: Model) -> Array:
+        if model is found.model:
+            return estimate.information
+        return information_of_data(
+            model, data.u, data.y, units.step, lengths=data.lengths, free=estimate.start.free, earlier=earlier
+        )
+
     assessment = judge(identification, found, started, first=past.last is None)
-    stands = _standing(task, found, past)
+    last = nominal if past.last is None else nominal.at(past.last)
+    stands, looks = standing(task.planner, found.model, informed, last), rules.schedule.looks
     findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
-    decision, looks = replace(decision, standing=stands, assessed=assessment.results), rules.schedule.looks
-    if differences(found.estimate, [name for name, _ in found.data.files], looks) or contradictions(
-        found.estimate, looks
-    ):
+    decision = replace(decision, standing=stands, assessed=assessment.results)
+    files = [name for name, _ in data.files]
+    if differences(estimate, files, looks) or contradictions(estimate, looks):
         decision = replace(decision, state="undecided")
     elif rules.over(past.done, met=stands is not None and stands.met):
         decision = replace(decision, state=_ENDED[assessment.verdict])
     # Faulty measurements can be mended, and users may go on.
-    elif not past.regardless and rules.refuted(found.estimate) and not mismeasured(identification, found):
+    elif not past.regardless and rules.refuted(estimate) and not mismeasured(identification, found):
         decision = replace(decision, state="undecided", refuted=True)
     elif assessment.verdict == "undecided":
         findings += campaign_doubted()
@@ -175,11 +174,7 @@ def _judged(task: Rounds, past: Past) -> Decision:
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
-    """Read a record of the user.
-
-    Raises:
-        DataError: the file cannot be used.
-    """
+    """Read a record of the user; raise `DataError` if it cannot be used."""
     units, levels = task.identification.header.units, task.identification.operating_point
     known = replace(preparation, operating_point={**levels, **preparation.operating_point})
     data = read_data([path], units, known)
@@ -195,11 +190,7 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
 
 
 def continued(data: Record, step: float) -> Record:
-    """Join files whose times continue the times of the file before into one record.
-
-    Args:
-        step: the sample time.
-    """
+    """Join files whose times continue the times of the file before, after one `step`, into one record."""
     ends = np.cumsum(data.lengths)
     files = set(np.cumsum([samples for _, samples in data.files]).tolist())
     lengths = [data.lengths[0]]
@@ -210,20 +201,3 @@ def continued(data: Record, step: float) -> Record:
         else:
             lengths.append(length)
     return replace(data, lengths=tuple(lengths))
-
-
-def _standing(task: Rounds, found: Identified, past: Past) -> Standing | None:
-    data, estimate = found.data, found.estimate
-    units, earlier = task.identification.header.units, task.identification.earlier
-
-    def informed(model: Model) -> Array:
-        if model is found.model:
-            return estimate.information
-        return information_of_data(
-            model, data.u, data.y, units.step, lengths=data.lengths, free=estimate.start.free, earlier=earlier
-        )
-
-    nominal = task.identification.nominal
-    return standing(
-        task.planner, found.model, informed, nominal if past.last is None else nominal.at(past.last)
-    )

@@ -7,8 +7,8 @@ repeated looks: it looks at the information, not at the error ([anscombe-1952], 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import accumulate
 
 import numpy as np
@@ -82,9 +82,8 @@ class Rules:
 
     def seed_of(self, number: int) -> int:
         """Return the seed of the record of the round with this number; each has its own."""
-        if not self.seed:
-            return number
-        return int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
+        own = np.random.SeedSequence([self.seed, number])
+        return int(own.generate_state(1)[0]) if self.seed else number
 
     def cap(self, first: float | None) -> float:
         """Return the largest cost of a sample; `first` is that of the first plan. Infinite without a cap."""
@@ -142,7 +141,6 @@ class Planned:
         claim: returns what is proved of the design; None for white noise.
         why: the reason why there is no design.
         share: of its power that the next part has, which would cost more than the cap otherwise.
-        lead: first samples of the part, which lead from the end of the last part to the start of the plan.
         part_cost: of a sample of the next part at the plant that it is planned for, with the effects of
             earlier parts.
         beyond: whether `part_cost` exceeds the cap, whatever is applied.
@@ -157,7 +155,6 @@ class Planned:
     claim: Callable[[], PlanClaim] | None = field(default=None, compare=False, repr=False)
     why: str = ""
     share: float = 1.0
-    lead: int = 0
     part_cost: float = 0.0
     beyond: bool = False
 
@@ -170,44 +167,6 @@ class Planned:
     def applied(self) -> Array:
         """Return the samples of the next part, (take, r)."""
         return self.record[: self.take]
-
-    def following(self, last: Array, rate: Sequence[float] | None) -> Planned:
-        """Return the plan after a part that ended at `last` (r,), led back by moves of at most `rate`.
-
-        A record starts within one move of zero.
-        """
-        if rate is None or not np.any(last):
-            return self
-        steps = int(np.max(np.ceil(np.abs(last) / rate)))
-        back = np.arange(1, steps + 1)[:, None] * np.asarray(rate)
-        ramp = np.sign(last) * np.maximum(np.abs(last) - back, 0.0)
-        return replace(self, record=np.concatenate([ramp, self.record]), lead=len(ramp))
-
-    def at_most(self, cost: float) -> Planned:
-        """Return the plan at a smaller power if a sample would cost more."""
-        if self.cost <= cost * REACHED:
-            return self
-        share = cost / self.cost
-        record = self.record * np.sqrt(share)
-        return replace(self, record=record, power=self.power * share, cost=cost, capped=True)
-
-    def weaker(self, share: float) -> Planned:
-        """Return the plan with this share of the power of its next part."""
-        record = self.record.copy()
-        record[self.lead : self.take] *= np.sqrt(share)
-        return replace(self, record=record, share=share)
-
-
-@dataclass(frozen=True)
-class Oracle:
-    """Holds the cost of an experiment whose design knows the true plant, summed over its samples.
-
-    Attributes:
-        cost: of the spectrum; `record`: of the delivered record on the true plant, None without one.
-    """
-
-    cost: float
-    record: float | None = None
 
 
 def power_of(record: Array) -> float:

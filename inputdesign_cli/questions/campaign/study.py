@@ -1,38 +1,103 @@
-"""Try whole campaigns many times on the true system, and experiments in one shot; say how they ended."""
+"""Try whole campaigns many times on a simulated true system, and experiments in one shot.
+
+Each run estimates, plans and stops as a real campaign does.
+"""
 
 from __future__ import annotations
 
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
+from typing import Literal, get_args
 
 import numpy as np
 
+from inputdesign_cli.accuracy import model_errors
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.errors import IdesignError, bad_spec
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.design.convex.cost import weighted_sum
+from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError, bad_spec
+from inputdesign_cli.findings.neglected import mattering, neglected
+from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
+from inputdesign_cli.monte_carlo.study import responses
 from inputdesign_cli.outcome import Simulation
 from inputdesign_cli.outcome.curves import Curves, RatioCurves, TradeCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
-from inputdesign_cli.questions.campaign.schedule import Oracle, Rules, Schedule
-from inputdesign_cli.questions.campaign.trials import (
-    CampaignStudy,
-    Ended,
-    Ending,
-    Reference,
-    energy_of,
-    run_campaigns,
-)
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.campaign.plans import Planner, standing
+from inputdesign_cli.questions.campaign.schedule import Rules, Schedule, Standing
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 
-_ENDINGS: tuple[Ending, ...] = ("stopped", "missed", "undecided", "unplanned")
+Ending = Literal["stopped", "missed", "undecided", "unplanned"]
+Reference = Literal["true", "estimate", "design"]
+_ENDINGS: tuple[Ending, ...] = get_args(Ending)
+_REFERENCES: tuple[Reference, ...] = get_args(Reference)
+_SEEDS = 2**31
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """Holds the cost of an experiment whose design knows the true plant, summed over its samples.
+
+    Attributes:
+        cost: of the spectrum; `record`: of the delivered record on the true plant, None without one.
+    """
+
+    cost: float
+    record: float | None = None
+
+
+@dataclass(frozen=True)
+class CampaignStudy:
+    """Holds a study of whole campaigns.
+
+    Attributes:
+        true: the experiment on the true system, of the planned length.
+        white: whether to compare with white excitation that suffices at the estimate.
+        uncertain: whether the spec or a pilot bounds the error of the first estimate.
+        has_prior: whether the spec states information that runs would have to draw.
+    """
+
+    planner: Planner
+    rules: Rules
+    true: Experiment
+    runs: int
+    seed: int
+    white: bool
+    uncertain: bool
+    has_prior: bool
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Describes the end of one run.
+
+    Attributes:
+        status: `stopped` if the data met what is asked; `unplanned` if no experiment could be planned.
+        ratio: the largest r_u / r_adm of the true plant by the samples applied; None if the true system has
+            other parameters than the model.
+        energy: cost per sample times samples, on the true plant.
+        within: whether the error of the estimate is within r_adm of the truth, of the estimate and of the
+            plant of the spec; None if r_adm cannot be evaluated.
+        parts: number of applied parts; `shrunk`: number of parts after which the estimate was not used.
+    """
+
+    status: Ending
+    samples: int
+    energy: float
+    ratio: float | None
+    within: Mapping[Reference, bool | None]
+    parts: int
+    shrunk: int
 
 
 @dataclass(frozen=True)
@@ -49,10 +114,14 @@ class CampaignTask:
     def simulate(self, executor: Executor | None = None) -> Results:
         """Design, and simulate whole campaigns and experiments in one shot on the true system.
 
+        Args:
+            executor: where runs are computed (default: in this process); the result does not depend on it.
+
         Raises:
             SpecError: `not-supported` for prior information without data.
         """
-        if self.study.has_prior:
+        study, model = self.study, self.study.true.model
+        if study.has_prior:
             raise bad_spec(
                 "not-supported",
                 "simulated campaigns begin without data: information that is known before would have to be "
@@ -61,28 +130,32 @@ class CampaignTask:
                 key="experiment.prior",
             )
         results = self.design.solve()
+        started = time.perf_counter()
         with time_limit(inf):  # that of the solver is for the design
-            return studied(self.study, results, executor)
-
-
-def studied(study: CampaignStudy, results: Results, executor: Executor | None) -> Results:
-    """Return the results with the study added.
-
-    Args:
-        executor: where the runs are computed (default: in this process); the result does not depend on it.
-    """
-    started = time.perf_counter()
-    oracle = oracle_of(study)
-    ways = {name: tried(study, rules, executor) for name, rules in ways_of(study).items()}
-    simulation = campaigns_entry(study.true, ways, oracle, runs=study.runs, seed=study.seed)
-    timing = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - started}
-    tables, curves = campaigns_curves(ways, oracle)
-    return replace(
-        results,
-        outcome=replace(results.outcome, simulation=simulation, timing_s=timing),
-        tables={**results.tables, **tables},
-        curves={**results.curves, **curves},
-    )
+            oracle = oracle_of(study)
+            ways = {name: tried(study, rules, executor) for name, rules in ways_of(study).items()}
+        record = None if oracle is None else oracle.record
+        simulation = Simulation(
+            runs=study.runs,
+            seed=study.seed,
+            samples=study.true.samples,
+            true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
+            true_variance=float(model.covariance[0, 0])
+            if model.outputs == 1
+            else tuple(map(tuple, model.covariance.tolist())),
+            inputs={name: way_entry(ended, oracle) for name, ended in ways.items()},
+            oracle_cost=None if oracle is None else oracle.cost / study.true.samples,
+            oracle_record_cost=None if record is None else record / study.true.samples,
+            others={"numbers": {"way": list(ways), "status": list(_ENDINGS)}},
+        )
+        tables, curves = campaigns_curves(ways, oracle)
+        timing = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - started}
+        return replace(
+            results,
+            outcome=replace(results.outcome, simulation=simulation, timing_s=timing),
+            tables={**results.tables, **tables},
+            curves={**results.curves, **curves},
+        )
 
 
 def oracle_of(study: CampaignStudy) -> Oracle | None:
@@ -112,37 +185,10 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
 
 def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
     """Return the runs of one way of experimenting."""
-    run = partial(run_campaigns, replace(study, rules=rules))
+    run = partial(_ends, replace(study, rules=rules))
     # One run a batch: all ways meet the same noise in the same run.
     parts = run_batches(run, runs=study.runs, size=1, seed=study.seed, executor=executor)
     return [run for part in parts for run in part]
-
-
-def campaigns_entry(
-    true: Experiment, ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None, *, runs: int, seed: int
-) -> Simulation:
-    """Return the entry of the study in the result.
-
-    Args:
-        true: the experiment on the true system.
-        ways: the runs of the campaign and of the experiments that it is compared with.
-        oracle: cost of an experiment that knows the true plant; None if there is none.
-    """
-    model = true.model
-    record = None if oracle is None else oracle.record
-    return Simulation(
-        runs=runs,
-        seed=seed,
-        samples=true.samples,
-        true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
-        true_variance=float(model.covariance[0, 0])
-        if model.outputs == 1
-        else tuple(map(tuple, model.covariance.tolist())),
-        inputs={name: way_entry(ended, oracle) for name, ended in ways.items()},
-        oracle_cost=None if oracle is None else oracle.cost / true.samples,
-        oracle_record_cost=None if record is None else record / true.samples,
-        others={"numbers": {"way": list(ways), "status": list(_ENDINGS)}},
-    )
 
 
 def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
@@ -193,12 +239,25 @@ def _spread(values: Sequence[float] | np.ndarray, at_most_one: float | None = No
 def campaigns_curves(
     ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """Return campaigns.csv with a row for each run, the true ratios, and cost against coverage."""
-    ratios = {name: [run.ratio for run in ended if run.ratio is not None] for name, ended in ways.items()}
-    curves: dict[str, Curves] = {}
-    if any(ratios.values()):
-        curves["true_ratio"] = RatioCurves({name: np.array(values) for name, values in ratios.items()})
-    tables = {"campaigns": _table(ways)}
+    """Return campaigns.csv with a row for each run, the true ratios, and cost against coverage.
+
+    Ways and endings are written by their numbers. The table has no true ratios if some run has none, for
+    instance if the true system has another structure.
+    """
+    every = [(way, run) for way, ended in enumerate(ways.values()) for run in ended]
+    columns = {
+        "way": [way for way, _ in every],
+        "samples": [run.samples for _, run in every],
+        "energy": [run.energy for _, run in every],
+        "true_ratio": [run.ratio for _, run in every if run.ratio is not None],
+        "status": [_ENDINGS.index(run.status) for _, run in every],
+    }
+    rows = {name: np.array(values, dtype=float) for name, values in columns.items()}
+    tables = {"campaigns": Table({name: x for name, x in rows.items() if len(x) == len(every)})}
+    ratios = {
+        name: np.array([run.ratio for run in ended if run.ratio is not None]) for name, ended in ways.items()
+    }
+    curves: dict[str, Curves] = {"true_ratio": RatioCurves(ratios)} if rows["true_ratio"].size else {}
     if oracle is None:
         return tables, curves
     points = {}
@@ -214,23 +273,134 @@ def campaigns_curves(
     return tables, curves
 
 
-def _table(ways: Mapping[str, Sequence[Ended]]) -> Table:
-    """Return a row for each run; the result has the names of the numbers of ways and endings.
+def _ends(study: CampaignStudy, runs: int, rng: np.random.Generator) -> list[Ended]:
+    """Run several campaigns from rest, one after the other, and return their ends."""
+    return [_Run(study, rng).end() for _ in range(runs)]
 
-    The true ratios are left out if some run has none, for instance if the true system has another structure.
-    """
-    rows = [(way, run) for way, ended in enumerate(ways.values()) for run in ended]
 
-    def column(values: Sequence[float]) -> np.ndarray:
-        return np.array(values, dtype=float)
+@dataclass
+class _Run:
+    """Runs one campaign. The noise of all samples is drawn first, so that other ways meet the same noise."""
 
-    ratios = [run.ratio for _, run in rows if run.ratio is not None]
-    return Table(
-        {
-            "way": column([way for way, _ in rows]),
-            "samples": column([run.samples for _, run in rows]),
-            "energy": column([run.energy for _, run in rows]),
-            **({"true_ratio": column(ratios)} if len(ratios) == len(rows) else {}),
-            "status": column([_ENDINGS.index(run.status) for _, run in rows]),
-        }
-    )
+    study: CampaignStudy
+    rng: np.random.Generator
+    known: Standing | None = None
+    first: float | None = None
+    parts: int = 0
+    shrunk: set[int] = field(default_factory=set)  # parts, by their numbers
+
+    def __post_init__(self) -> None:
+        true = self.study.true
+        size = (self.study.rules.schedule.most, true.model.outputs)
+        self.e = self.rng.standard_normal(size) @ np.linalg.cholesky(true.model.covariance).T
+        self.r: Array = np.zeros((0, true.inputs))
+        self.sound = self.last = self.study.planner.nominal.model
+
+    def end(self) -> Ended:
+        """Run the campaign from its first plan to its end."""
+        rules, planner = self.study.rules, self.study.planner
+        while True:
+            seed = int(self.rng.integers(_SEEDS))
+            try:
+                plan = planner.plan(rules, self.known, len(self.r), seed, self.first, self.r)
+            except (InfeasibleError, InaccurateError, SpecError):
+                return self._ended("unplanned")
+            if self.first is None and plan.designed:
+                self.first = plan.cost
+            self.r = np.concatenate([self.r, plan.applied])
+            signals = responses(self.study.true, self.r[None], self.e[None, : len(self.r)], planner.step)
+            u, y = (total[0] for _, total in signals)
+            self.parts += 1
+            model, found = self.last, None
+            if self.known is not None:
+                found = fit_batch(model, u[None], y[None], planner.step, start=model.theta)
+            if found is not None and found.converged[0]:
+                self._stand(model.at(found.theta[0], found.noise[0]), u, y)
+            else:
+                self._identified(u, y)
+            over = rules.over(len(self.r), met=self._met)
+            asks = rules.stops and not over and self.known is not None
+            near = self._identified(u, y, near=True) if asks else None
+            if not over and (near is None or not rules.refuted(near)):
+                continue
+            full = self._identified(u, y)
+            if full is not None and not over and rules.refuted(full):
+                return self._ended("undecided")
+            if rules.over(len(self.r), met=self._met):
+                against = full is not None and self._speaks_against(full)
+                return self._ended("undecided" if against else "stopped" if self._met else "missed")
+
+    @property
+    def _met(self) -> bool:
+        return self.known is not None and self.known.met
+
+    def _identified(self, u: Array, y: Array, *, near: bool = False) -> Estimate | None:
+        """Return the estimate near the last one, or from several starts; this one is built on from now on."""
+        model, step, feedback = self.last, self.study.planner.step, self.study.true.loop is not None
+        try:
+            found = identify(model, u, y, step, start=model.theta, feedback=feedback, rest=True, near=near)
+        except SpecError:  # too little is known yet
+            return None
+        if not near:
+            self._stand(model.at(found.theta, found.noise), u, y)
+        return found
+
+    def _speaks_against(self, full: Estimate) -> bool:
+        """Return whether the estimate contradicts the structure at the end."""
+        if full.tests.failed or not full.search.converged:
+            return True
+        known = self.known
+        if known is None or not known.met:  # more parameters miss it all the more
+            return False
+        question = self.study.planner.question(known.model, known.information)
+        errors = model_errors(question.requirements)
+        return bool(mattering(neglected(known.model, full, errors, question.information)))
+
+    def _stand(self, estimate: Model, u: Array, y: Array) -> None:
+        informed = partial(information_of_data, u=u, y=y, step=self.study.planner.step)
+        stands = standing(self.study.planner, estimate, informed, self.sound)
+        if stands is None:
+            return
+        self.known, self.last = stands, stands.model
+        self.shrunk.discard(self.parts)  # a part may be estimated anew
+        if stands.share == 1.0:
+            self.sound = stands.model
+        else:
+            self.shrunk.add(self.parts)
+
+    def _ended(self, status: Ending) -> Ended:
+        """Return the end of the run, judged on the true plant."""
+        study, samples, energy, ratio = self.study, len(self.r), 0.0, None
+        if samples:
+            energy = energy_of(study.planner, self.r, study.true)
+        if samples and study.true.model.names == self.last.names:
+            true = replace(study.true, samples=samples)
+            information = FiniteRecord(true, samples, study.planner.step).information(self.r)
+            with suppress(IdesignError, np.linalg.LinAlgError):
+                question = study.planner.question(true.model, information)
+                ratio = question.ratio(question.information)
+        within = {of: self._within(of) for of in _REFERENCES}
+        return Ended(status, samples, energy, ratio, within, self.parts, len(self.shrunk))
+
+    def _within(self, of: Reference) -> bool | None:
+        """Return whether |G_hat - G_0| <= r_adm of the truth, the estimate or the spec at all frequencies."""
+        planner, true = self.study.planner, self.study.true.model
+        model = {"true": true, "estimate": self.last, "design": planner.nominal.model}[of]
+        try:
+            errors = model_errors(planner.question(model, np.eye(len(model.names))).requirements)
+        except IdesignError:
+            return None
+        kept = []
+        for error in errors:
+            off = np.abs(error.concerned(self.last.plant_at(error.grid) - true.plant_at(error.grid)))
+            kept.append(bool(np.all(np.linalg.norm(off, axis=1) <= error.admissible.at(error.grid))))
+        return all(kept) if kept else None
+
+
+def energy_of(planner: Planner, r: Array, true: Experiment) -> float:
+    """Return the cost of a record (n, r) on the true plant, summed over its samples."""
+    at = FiniteRecord(true, len(r), planner.step)
+    powers: dict[PowerKind, list[float]] = {
+        kind: np.mean(at.signals(kind, r) ** 2, axis=0).tolist() for kind in POWER_KINDS
+    }
+    return len(r) * weighted_sum(planner.cost, powers)

@@ -1,28 +1,37 @@
-"""Find a model in a log, list the evidence for and against it, and write a spec for the next experiment."""
+"""Find a model in a log, with the evidence for and against it and the next spec; or judge a given model."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.explore import Family, Found, answers_output, explore_records, levelled
-from inputdesign_cli.findings.explored_logs import DRIVE, doubtful_inputs, doubtful_model, undriven
+from inputdesign_cli.explore import Family, Fits, Found, answers_output, explore_records, fits, levelled
+from inputdesign_cli.findings.explored_logs import (
+    DRIVE,
+    HALF,
+    LEAST_FIT,
+    doubtful_inputs,
+    doubtful_model,
+    undriven,
+)
 from inputdesign_cli.findings.faults import biasing, left_out, shifted_levels
 from inputdesign_cli.findings.frequency_responses import contradicted, response_note, silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
-from inputdesign_cli.identification import silent_in
-from inputdesign_cli.identification.nonlinearity import SilentLines
-from inputdesign_cli.outcome import MeasuredLines, Outcome
-from inputdesign_cli.outcome.curves import ResponseCurves
+from inputdesign_cli.identification import cross_correlations, silent_in
+from inputdesign_cli.identification.checks import check_varying, signal_name
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
-from inputdesign_cli.questions.assessment.outcome import response_without_model
+from inputdesign_cli.questions.assessment.outcome import fit_of, response_without_model
 from inputdesign_cli.questions.exploration.build import build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import (
     exploration_notes,
@@ -30,11 +39,13 @@ from inputdesign_cli.questions.exploration.outcome import (
     structure_curves,
     validation_of,
 )
-from inputdesign_cli.questions.frequency_response.measure import silent_entry
-from inputdesign_cli.records import Preparation, Record, read_logs
+from inputdesign_cli.records import Preparation, Record, read_data, read_logs, read_sheet, with_channels
 
 # Where more shifts appear, once these are left out so often, the plant is none of the models tried.
 _MOST_SHIFTS = 2
+# Probability that past inputs explain the residuals of a model by chance alone.
+_SURELY = 1e-6
+_SEE = "see whether the model is of this plant, and gain, delay, units and columns agree"
 
 
 @dataclass(frozen=True)
@@ -47,36 +58,35 @@ class Exploration:
 
 
 def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None = None) -> Exploration:
-    """Find a model of the plant that a log is of.
+    """Find a model of the plant that a log is of; raise `DataError` if it cannot be read or determines none.
 
     Args:
         only: the structure to take; None: the simplest that explains the log as well as any.
-
-    Raises:
-        DataError: the log cannot be read, or determines no model at all.
     """
     started = time.perf_counter()
     log = read_logs(paths, preparation)
-    loops = answers_output(log.parts)
+    looped = bool(loops := answers_output(log.parts))
     with blaming_columns(paths[0], log):
         try:
-            log, found = explored_beside_shifts(log, loop=bool(loops), only=only)
+            log, found = explored_beside_shifts(log, loop=looped, only=only)
         except SpecError as error:
-            idle = undriven(log.parts)
-            raise (
-                bad_spec("no-structure", idle[0].message, hint=DRIVE, key="u") if idle else error
-            ) from error
+            if idle := undriven(log.parts):
+                raise bad_spec("no-structure", idle[0].message, hint=DRIVE, key="u") from error
+            raise
     measured, log = log, replace(log, y=np.concatenate([y for _, y in levelled(log.parts, found.slopes)]))
-    looped = bool(loops)
     task, data = build_explored(spec_text(log, found, paths)), _data(log, found)
     units, of_log = task.header.units, replace(log, r=log.r if looped else None)
-    response = response_without_model(units, found.model, of_log, inputs=found.moving, loop=looped)
+    tables, curves, lines = response_without_model(
+        units, found.model, of_log, inputs=found.moving, loop=looped
+    )
+    whole = lines is not None and len(log.lengths) == 1
+    silent = silent_in(log.u[:, found.moving], log.y) if whole else {}
     doubts = [
         *doubtful_model(found, measured.parts, log.step, log.time_unit, integrates=only == "integrator"),
         *doubtful_inputs(found, measured.parts, loop=looped),
         *late_inputs(measured.parts),
         *biasing(units, found.estimate, data, found.validation.simulation),
-        *(() if response is None else contradicted(response[2])),
+        *(() if lines is None else contradicted(lines)),
     ]
     reasons = tuple(one.message for one in doubts)
     remarks = (*log.remarks, *exploration_notes(log, found, loops))
@@ -87,23 +97,20 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     outcome = replace(
         results.outcome,
         title=f"What {names} {'tells' if len(paths) == 1 else 'tell'}",
-        exploration=exploration_of(log, found, loops, reasons),
+        exploration=exploration_of(log, found, loops, reasons, lines, silent),
         validation=validation_of(found.validation),
     ).saying(replace(one, message=f"no trust: {one.message}") for one in doubts)
+    outcome = outcome.saying(() if lines is None else response_note(lines))
     results = replace(
         results,
-        outcome=outcome,
+        outcome=outcome.saying(silent_lines_answer(silent)),
         resolved_spec=spec_text(log, found, paths, reasons, loop=looped),
-        curves={**results.curves, **structure_curves(found)},
+        tables={**results.tables, **tables},
+        curves={**results.curves, **structure_curves(found), **curves},
     )
-    if response is not None:
-        silent = silent_in(log.u[:, found.moving], log.y) if len(log.lengths) == 1 else {}
-        results = _beside(results, *response, silent)
-    speaking = (
-        *shifted_levels(found.estimate, data, log.time_unit),
-        *refutations(found.model, found.estimate),
-    )
-    return Exploration(results, reasons, tuple(one.message for one in speaking))
+    against = [*shifted_levels(found.estimate, data, log.time_unit)]
+    against += refutations(found.model, found.estimate)
+    return Exploration(results, reasons, tuple(one.message for one in against))
 
 
 def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = None) -> tuple[Record, Found]:
@@ -143,22 +150,64 @@ def _data(log: Record, found: Found) -> Record:
     return replace(own, u=u, y=y, r=None, findings=(), remarks=(), means=None, repeated=(), lined=False)
 
 
-def _beside(
-    explored: Results,
-    table: Table,
-    curves: ResponseCurves,
-    lines: MeasuredLines,
-    silent: dict[str, SilentLines],
-) -> Results:
-    """Return the results with the frequency response of the data alone, and the findings on it."""
-    outcome: Outcome = explored.outcome.saying((*response_note(lines), *silent_lines_answer(silent)))
-    assert outcome.exploration is not None  # results of an exploration
-    section = replace(
-        outcome.exploration, frequency_response=lines, nonlinearity=silent_entry(silent) or None
+def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
+    """Return the fit and the tests of a given model on other data.
+
+    Raises:
+        DataError: the data cannot be used, or an output never changes.
+    """
+    started = time.perf_counter()
+    counts = {"u": header.units.inputs, "y": header.units.outputs}
+    sheet = read_sheet(paths[0], preparation=preparation)
+    own = {
+        name: column
+        for name, column in with_channels(sheet, preparation.columns).items()
+        if name in preparation.columns or int(name[1:]) <= counts[name[0]]
+    }
+    preparation = replace(preparation, columns=own)
+    data = read_data(paths, header.units, preparation)
+    with blaming_columns(paths[0], data):
+        check_varying((), data.u[:, :0], data.y)
+    found = fits(model, data.parts)
+    simulated = [
+        (fit if np.all(np.isfinite(curve)) else None, curve)
+        for fit, curve in zip(found.simulation, found.simulated.T, strict=True)
+    ]
+    columns, curves = fit_of(header.units, data, found.errors, simulated, data.time)
+    reasons = tuple(_reasons(found, data))
+    outcome = Outcome(
+        title=header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
+        status="validated",
+        samples=len(data.y),
+        validation=validation_of(found, reasons),
+        findings=data.findings or None,
+        notes=(*data.notes, *(f"no trust: {reason}" for reason in reasons)),
+        timing_s={"validation": time.perf_counter() - started},
     )
-    return replace(
-        explored,
-        outcome=replace(outcome, exploration=section),
-        tables={**explored.tables, "frequency_response": table},
-        curves={**explored.curves, "frequency_response": curves},
-    )
+    tables, unit = {"fit": Table(columns)}, header.units.time_unit
+    return Exploration(Results(outcome, header.resolved_spec, unit, tables, {"fit": curves}), reasons)
+
+
+def _reasons(found: Fits, data: Record) -> Iterator[str]:
+    """Yield reasons why a model is not of these data: its simulation explains nothing, or too little.
+
+    A poor fit alone is no fault of the model, since the noise may be strong, unless past inputs explain the
+    rest.
+    """
+    for i, fit in enumerate(found.simulation):
+        output = signal_name("y", i, len(found.simulation))
+        if not np.isfinite(fit):
+            yield f"the model has no simulation of {output}: its plant is unstable; {_SEE}"
+        elif fit < LEAST_FIT:
+            what = (
+                f"the simulation explains {fit:.1f} % of {output}, and less than {LEAST_FIT:g} % is nothing"
+            )
+            yield f"{what}: a level alone explains as much; {_SEE}"
+        elif fit < HALF:
+            test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
+            if not test.probability >= _SURELY:
+                yield (
+                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain the "
+                    f"rest (probability {chance(test.probability)}): the model is not of the plant of "
+                    "these data, or this acts otherwise here"
+                )

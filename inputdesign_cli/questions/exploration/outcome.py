@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore import Candidate, Fits, Found
 from inputdesign_cli.findings.explored_logs import open_parameters
 from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.identification.response_chance import driving_nothing
+from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import Curves, OrderCurves
 from inputdesign_cli.outcome.estimate import (
     Exploration,
@@ -21,24 +23,27 @@ from inputdesign_cli.outcome.estimate import (
     Validation,
 )
 from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.questions.frequency_response.measure import silent_entry
 from inputdesign_cli.records import Record
 
 
 def validation_of(found: Fits, reasons: tuple[str, ...] | None = None) -> Validation:
     """Return the entry `validation` of the result: numbers for one output, else lists."""
-    simulation, prediction = (
-        tuple(float(x) if np.isfinite(x) else None for x in values)
-        for values in (found.simulation, found.prediction)
-    )
-    return Validation(_single(simulation), _single(prediction), reasons)
 
+    def entry(values: Sequence[float]) -> Fit:
+        finite = tuple(float(x) if np.isfinite(x) else None for x in values)
+        return finite[0] if len(finite) == 1 else finite
 
-def _single(values: tuple[float | None, ...]) -> Fit:
-    return values[0] if len(values) == 1 else values
+    return Validation(entry(found.simulation), entry(found.prediction), reasons)
 
 
 def exploration_of(
-    log: Record, found: Found, loops: Sequence[tuple[int, float]], reasons: tuple[str, ...]
+    log: Record,
+    found: Found,
+    loops: Sequence[tuple[int, float]],
+    reasons: tuple[str, ...],
+    lines: MeasuredLines | None,
+    silent: Mapping[str, SilentLines],
 ) -> Exploration:
     """Return the entry `exploration` of the result."""
     return Exploration(
@@ -69,6 +74,8 @@ def exploration_of(
         ),
         trusted=not reasons,
         reasons=reasons,
+        frequency_response=lines,
+        nonlinearity=silent_entry(silent) or None,
     )
 
 
@@ -138,7 +145,8 @@ def _chosen(log: Record, found: Found, i: int) -> str:
     orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
     orders += f"; times in {log.time_unit}" if taken.orders.physical else ""
     delays = " and ".join(
-        f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {_between(low, high)})"
+        f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: "
+        f"{f'{low} at least' if high is None else low if low == high else f'{low} to {high}'})"
         for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
     )
     judge = "the record" if found.split == "none" else "the part that judges"
@@ -149,12 +157,6 @@ def _chosen(log: Record, found: Found, i: int) -> str:
         f"{delays}; chosen of {len(chosen.candidates)} structures, of which "
         f"{beside if better > 0.0 else f'it simulates {judge} best'}"
     )
-
-
-def _between(low: int, high: int | None) -> str:
-    if high is None:
-        return f"{low} at least"
-    return f"{low}" if low == high else f"{low} to {high}"
 
 
 def structure_curves(found: Found) -> dict[str, Curves]:

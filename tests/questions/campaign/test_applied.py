@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from inputdesign_cli.questions.campaign.applied import copied, matched, standing_in
+from inputdesign_cli.questions.campaign.acceptance import copied, matched, standing_in
 
 PLANS = {"white": ([1.0], [1.0]), "slow": ([1.0], [1.0, -0.8]), "resonant": ([1.0], [1.0, -1.6, 0.94])}
 LENGTHS = (30, 120)

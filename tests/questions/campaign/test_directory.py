@@ -8,17 +8,20 @@ import sys
 import numpy as np
 import pytest
 
+from inputdesign_cli import parse_spec
 from inputdesign_cli.outcome.run_directory import read_run
+from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.campaign.memory import held
-from tests.support.campaigns import answered, applied, found, planned, written
+from tests.support.campaigns import SPEC, answered, applied, found, planned, written
 
 
 def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
     assert len(planned(begun)) == 20  # a pilot of a tenth
     for number in range(1, 12):
-        code, out, _ = run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--json", "--no-figures")
+        record = applied(begun, tmp_path / f"r{number}.csv")
+        code, out, err = run("next", "c", record, "--json", "--no-figures")
+        assert code == 0, err
         result = json.loads(out)
-        assert code == 0
         if result["status"] != "running":
             break
     assert result["status"] == "stopped"
@@ -124,26 +127,19 @@ def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_pat
     assert (begun / "result.json").read_bytes() == before
 
 
-def test_rows_without_values_leave_the_others_where_they_are(run, begun, tmp_path):
-    record = applied(begun, tmp_path / "r1.csv")
-    rows = record.read_text().splitlines()
-    u = rows[4].split(",")[1]
-    rows[4] = rows[4].replace(u, "nan", 1)
-    record.write_text("\n".join(rows) + "\n")
-    code, out, _ = run("next", "c", record, "--json", "--no-figures")
-    result = json.loads(out)
-    (kept,) = result["campaign"]["records"]
-    assert (code, kept["samples"]) == (0, len(rows) - 1)
-    assert kept["likeness"] == pytest.approx(1.0, abs=1e-6)
-    assert any("1 of" in note or "row" in note for note in result["notes"])
+def without_a_value(rows):
+    return [*rows[:3], rows[3].replace(rows[3].split(",")[1], "nan", 1), *rows[4:]]
 
 
-def test_a_record_whose_first_rows_are_missing_is_placed_in_its_plan(run, begun, tmp_path):
+@pytest.mark.parametrize("mend", [without_a_value, lambda rows: rows[5:]])
+def test_rows_that_are_missing_leave_the_others_where_they_are(run, begun, tmp_path, mend):
+    """So many count as were applied, whether the record begins late or has a gap."""
     record = applied(begun, tmp_path / "r1.csv")
     head, *rows = record.read_text().splitlines()
-    record.write_text("\n".join([head, *rows[5:]]) + "\n")
-    (kept,) = json.loads(run("next", "c", record, "--json", "--no-figures")[1])["campaign"]["records"]
-    assert kept["samples"] == len(rows)
+    record.write_text("\n".join([head, *mend(rows)]) + "\n")
+    code, out, _ = run("next", "c", record, "--json", "--no-figures")
+    (kept,) = json.loads(out)["campaign"]["records"]
+    assert (code, kept["samples"]) == (0, len(rows))
     assert kept["likeness"] == pytest.approx(1.0, abs=1e-6)
 
 
@@ -211,7 +207,7 @@ def test_directories_of_another_kind_and_version_are_refused(run, begun):
 
 def test_data_of_another_plant_are_undecided(run, begun, tmp_path):
     assert run("next", "c", applied(begun, tmp_path / "a.csv"), "--no-figures")[0] == 0
-    other = applied(begun, tmp_path / "b.csv", gain=-2.0, pole=-0.5)
+    other = applied(begun, tmp_path / "b.csv", gain=-2.0, poles=(-0.5,))
     code, out, _ = run("next", "c", other, "--json", "--no-figures")
     assert code == 5
     assert json.loads(out)["status"] == "undecided"
@@ -272,3 +268,49 @@ def test_one_process_decides_at_a_time(run, begun, tmp_path):
         code, _, err = run("next", "c", record, "--no-figures")
         assert (code, "output-busy" in err) == (2, True)
     assert run("next", "c", record, "--no-figures")[0] == 0
+
+
+def begin(run, tmp_path, name, *overrides):
+    told = [part for one in overrides for part in ("--set", one)]
+    code, _, err = run("campaign", "s.yaml", "-o", name, "--no-figures", *told)
+    return tmp_path / name, code, err
+
+
+def test_every_part_has_a_record_by_the_seed_of_the_spec(run, tmp_path):
+    """The same again by the same seed, and another by another."""
+    plans = {}
+    for name, seed in {"none": None, "0": 0, "6": 6, "again": 6}.items():
+        overrides = [] if seed is None else [f"signal.seed={seed}"]
+        directory, code, _ = begin(run, tmp_path, name, *overrides)
+        assert code == 0
+        if seed:
+            assert run("next", name, applied(directory, tmp_path / "r.csv"), "--no-figures")[0] == 0
+            seeds = [entry["plan"]["seed"] for entry in read_run(directory)["campaign"]["rounds"]]
+            assert len(set(seeds)) == len(seeds) == 2
+        plans[name] = planned(directory)
+    assert np.array_equal(plans["none"], plans["0"])  # as everywhere, none is 0
+    assert not np.array_equal(plans["none"], plans["6"][: len(plans["none"])])
+    assert np.array_equal(plans["6"], plans["again"])
+
+
+def test_parts_have_values_of_the_converter_only(run, tmp_path):
+    """2^6 values over 20, so 0.3125 apart; the offset lies between two of them."""
+    converter = "signal.quantisation={bits: 6, range: 10}"
+    directory, code, _ = begin(run, tmp_path, "c", converter, "signal.offset=0.4")
+    assert code == 0
+    steps = planned(directory)[:, 1] / (20.0 / 2**6)
+    assert np.allclose(steps, np.rint(steps), atol=1e-9)
+    (round_,) = read_run(directory)["campaign"]["rounds"]
+    assert round_["plan"]["offset"] == [0.3125]  # 0.4 is nearer to it than to 0.625
+    # Records vary about the same value.
+    spec = parse_spec(SPEC, overrides=[converter, "signal.offset=0.4"])
+    assert build_identification(spec).operating_point == {"u1": 0.3125}
+
+
+@pytest.mark.parametrize("asked", ["signal.samples=50", "signal.also=[mat]"])
+def test_what_no_part_has_is_refused(run, tmp_path, asked):
+    directory, code, err = begin(run, tmp_path, "c", asked)
+    assert code == 2
+    assert "not-supported" in err
+    assert asked.split("=")[0] in err
+    assert not directory.exists()

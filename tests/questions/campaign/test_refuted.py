@@ -4,26 +4,16 @@ import json
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
-from tests.support.campaigns import SPEC, planned, written
+from tests.support.campaigns import SPEC, applied
 
-TWO_POLES = [1.0, -1.3, 0.42]  # where the model has one
-
-
-def recorded(directory, path, seed=5):
-    """What a plant with another pole answers to the part that comes next."""
-    times, u = planned(directory).T
-    n = len(np.loadtxt(directory / "signal.csv", delimiter=",", skiprows=1, ndmin=2))
-    e = np.random.default_rng(seed).standard_normal(2000)[: len(u)]
-    y = lfilter([0.0, 1.4], TWO_POLES, u) + e
-    return written(path, times[-n:], u[-n:], y[-n:])
+TRUE = {"gain": 1.4, "poles": (0.7, 0.6)}  # where the model has one pole
 
 
 def until_it_ends(run, directory, folder, *options, most=12):
     """Exit code and result of the last part."""
     for part in range(most):
-        given = recorded(directory, folder / f"r{part}.csv")
+        given = applied(directory, folder / f"r{part}.csv", **TRUE)
         code, out, err = run("next", "c", given, "--json", "--no-figures", *options)
         assert code in (0, 1, 5), err
         if json.loads(out)["status"] != "running":
