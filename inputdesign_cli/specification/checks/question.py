@@ -30,6 +30,8 @@ _PER_CHANNEL = {
     ),
     "output": (
         *("cost.output_power", "limits.amplitude.output"),
+        *("noise.standard_deviation", "noise.correlation_time"),
+        *("simulation.noise.standard_deviation", "simulation.noise.correlation_time"),
         *("limits.output_power.max", "limits.output_power.min"),
         "accuracy.closed_loop_error.reference.variance",
     ),
