@@ -49,7 +49,7 @@ def wizard(
     brief = said.spread()
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     draft = None
-    if (needed_of(said.texts) and (terminal or answers is None)) or (brief and terminal):
+    if (brief or needed_of(said.texts)) and (terminal or answers is None):
         draft, said = _asked(said, output, brief, quiet, terminal)
     if (unanswered := needed_of(said.texts)) and not said.texts:
         raise SpecError.because(

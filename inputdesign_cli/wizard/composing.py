@@ -121,6 +121,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     # Lines of a response are one over the time apart: it takes all of it.
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"])
+    made, hold = asking.chosen("signals", said["signals"], _TYPES), dwell(said["hold"], step)
     unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
     facts = {
         "said": said,
@@ -136,9 +137,9 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "duration": there if nonparametric else duration,
         "there": there,
         "most": _MOST,
-        "made": asking.chosen("signals", said["signals"], _TYPES),
+        "made": "binary" if made == "multisine" and hold > 1 and control is None else made,
         "converter": quantisation(said["converter"], span),
-        "hold": dwell(said["hold"], step),
+        "hold": hold,
         "returns": asking.chosen("return", said["return"], {"yes": _RETURNS, "no": False}),
         "channels": channels_of(said, plant, span),
     }

@@ -116,9 +116,9 @@ class Answers:
             found = in_sentence(self.texts.get("plant", ""))
         if found:
             del self.texts["plant"]
-            places = {key: self.places["plant"] for key in found if "plant" in self.places}
-            self.texts |= found | self.texts
-            self.places |= places | self.places
+            for key, text in found.items():
+                if self.texts.setdefault(key, text) is text and "plant" in self.places:
+                    self.places[key] = self.places["plant"]
         return bool(found)
 
     @contextmanager
