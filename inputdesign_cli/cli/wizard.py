@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,9 +19,11 @@ if TYPE_CHECKING:
     from inputdesign_cli.outcome.results import Result
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.wizard.composing import Draft
+    from inputdesign_cli.wizard.questions import Answers
 
 
 def wizard(
+    sentence: str | None = None,
     *,
     answers: Path | None = None,
     given: list[str] | None = None,
@@ -31,34 +35,35 @@ def wizard(
 ) -> None:
     """Ask for an experiment in your words, and write a commented spec.
 
-    At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
-    They are asked in the terminal where no option answers them. What is written is an ordinary spec.
+    The plant, what the model is for, what the experiment may use, the noise: say it in SENTENCE, and three
+    questions are left. Without it all are asked that no option answers, in the terminal or from a pipe, a
+    line an answer. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import Answers, needed_of, read_answers
+    from inputdesign_cli.wizard.questions import needed_of, read_answers
 
     if answers is not None and output.exists() and output.samefile(answers):
         hint = "choose another name for the spec with -o"
         raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
     refuse_existing(output, overwrite)
-    said = read_answers(answers, given or [])
+    said = read_answers(answers, [*([f"plant={sentence}"] if sentence else []), *(given or [])])
+    brief = said.spread()
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
-    draft, known = None, said.texts
-    unanswered = needed_of(known)
-    if unanswered and terminal:
-        draft, said = _asked(known, output, quiet), Answers()  # what is typed stands in no file
-    elif unanswered and not known:
+    draft = None
+    if (brief or needed_of(said.texts)) and (terminal or answers is None):
+        draft, said = _asked(said, output, brief, quiet, terminal)
+    if (unanswered := needed_of(said.texts)) and not said.texts:
         raise SpecError.because(
             "no-terminal",
             "there is no terminal to ask in, and no answers are given",
-            "write them into a file (--answers answers.yaml) or behind --answer KEY=TEXT; needed are "
-            f"{', '.join(unanswered)}",
+            "write them into a file (--answers answers.yaml), behind --answer KEY=TEXT, or as lines into a "
+            f"pipe; needed are {', '.join(unanswered)}",
         )
     with said.located(), computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.outcome.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose, with_spectrum
 
         if draft is None:
-            draft = compose(known, output.stem, output.parent)
+            draft = compose(said.texts, output.stem, output.parent)
             draft.validate()
         draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
@@ -96,25 +101,44 @@ def _result(spec: Spec) -> Result:
     return questions.solve(spec).result
 
 
-def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
-    """Ask for a draft at the terminal, again where an answer cannot be used."""
-    with status("thinking ...", quiet=quiet):
-        import questionary
+def _asked(
+    said: Answers, output: Path, brief: bool, quiet: bool, terminal: bool
+) -> tuple[Draft | None, Answers]:
+    """Ask for a draft, again where an answer cannot be used; return it and the answers.
 
+    Without a terminal the lines of stdin are the answers. There is no draft if they end before the questions.
+    """
+    with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.composing import Conversation
-    talk = Conversation(known, output.stem, output.parent)
+    talk = Conversation(said.texts, output.stem, output.parent, brief=brief)
     while (one := talk.question) is not None:
-        typer.echo(f"  {one.allowed}", err=True)
         default = one.default or ""  # stands in grey at the prompt
         asks = f"{one.asks} (Enter: {default})" if default else one.asks
-        try:
-            text = questionary.text(asks, placeholder=[("class:placeholder", default)]).unsafe_ask()
-        except EOFError:  # Ctrl-D
-            raise KeyboardInterrupt from None
-        text = text if text.strip() else default
+        text = _typed(asks, one.allowed, default) if terminal else _piped(asks)
+        if text is None:
+            return None, replace(said, texts=talk.answers)
         with status("thinking ...", quiet=quiet):
-            wrong = talk.answer(text)
+            wrong = talk.answer(text if text.strip() else default)
         if wrong is not None:
             complain(wrong)
-    assert talk.draft is not None
-    return talk.draft
+    return talk.draft, replace(said, texts=talk.answers, places={})  # what is typed stands in no file
+
+
+def _typed(asks: str, allowed: str, default: str) -> str:
+    import questionary
+
+    typer.echo(f"  {allowed}", err=True)
+    try:
+        return str(questionary.text(asks, placeholder=[("class:placeholder", default)]).unsafe_ask())
+    except EOFError:  # Ctrl-D
+        raise KeyboardInterrupt from None
+
+
+def _piped(asks: str) -> str | None:
+    """Return the next line of stdin, or None at its end."""
+    line = ""
+    with suppress(OSError, ValueError):  # it is closed, or no text
+        line = sys.stdin.readline() if sys.stdin is not None else ""
+    if line:
+        typer.echo(f"{asks} {line.strip()}", err=True)
+    return line.strip() if line else None

@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification.checks import related, run_checks
+from inputdesign_cli.specification.fading_noise import in_filters
 from inputdesign_cli.specification.models.experiment import Cost, Estimated
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.section import PathDiagnostic
@@ -162,11 +163,12 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
     section around it, are consequences and are not reported.
     """
     data = copy.deepcopy(tree.data)
-    if not design and isinstance(noise := data.setdefault("noise", {}), dict):
+    noise = None if design else data.setdefault("noise", {})
+    if isinstance(noise, dict) and "standard_deviation" not in noise:
         noise.setdefault("variance", 1.0)  # it may be left out if it is to be estimated
     reported: list[PathDiagnostic] = []
     broken = set(tree.broken)
-    for find in (_empty, in_samples):
+    for find in (_empty, in_samples, in_filters):
         for one in list(find(data)):
             reported.append(one)
             broken.add(one.path)

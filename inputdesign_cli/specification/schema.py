@@ -30,7 +30,8 @@ def json_schema() -> dict[str, Plain]:
         "anyOf": [names, {"type": "array", "items": names, "minItems": 1}],
     }
     schema.pop("required")
-    variance = {"noise": {"required": schema["$defs"]["Noise"].pop("required")}}
+    size = ({"required": [key]} for key in (*schema["$defs"]["Noise"].pop("required"), "standard_deviation"))
+    variance = {"noise": {"anyOf": [*size]}}
     schema["anyOf"] = [
         {"required": ["plant", "noise"], "properties": variance},
         {"required": [KEY]},

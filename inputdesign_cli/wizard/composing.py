@@ -11,12 +11,22 @@ from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification.models.realisation import Signal
 from inputdesign_cli.wizard import questions as asking
 from inputdesign_cli.wizard.grammar import Phrase, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, in_their_words
-from inputdesign_cli.wizard.wishes import controller, input_range, limited, quantisation, wished
+from inputdesign_cli.wizard.sentence import in_sentence
+from inputdesign_cli.wizard.wishes import (
+    channels_of,
+    controller,
+    dwell,
+    input_range,
+    limited,
+    quantisation,
+    wished,
+)
 
 _MOST, LEAST = 5000, 50  # samples
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
@@ -35,6 +45,7 @@ _MEANWHILE = {
 _ORDERS, _LINES = (20, 40), (60, 120, 240)
 _ENOUGH = 1.02  # of the bound over every spectrum
 _LEAST_GAP = 1e-3  # smaller gaps are written as this
+_RETURNS = "return" in Signal.model_fields  # records can end at the operating point
 _BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
 
 Solve = Callable[[Spec], Result]
@@ -110,6 +121,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     # Lines of a response are one over the time apart: it takes all of it.
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"])
+    made, hold = asking.chosen("signals", said["signals"], _TYPES), dwell(said["hold"], step)
     unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
     facts = {
         "said": said,
@@ -125,12 +137,16 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "duration": there if nonparametric else duration,
         "there": there,
         "most": _MOST,
-        "made": asking.chosen("signals", said["signals"], _TYPES),
-        "converter": quantisation(said["converter"]),
+        "made": "binary" if made == "multisine" and hold > 1 and control is None else made,
+        "converter": quantisation(said["converter"], span),
+        "hold": hold,
+        "returns": asking.chosen("return", said["return"], {"yes": _RETURNS, "no": False}),
+        "channels": channels_of(said, plant, span),
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
     spectrum = None if nonparametric else "{type: fir, order: 20}"
-    return Draft(facts, plant.files, spectrum, folder, said, there, (*against, *[_UNUSED] * unused))
+    notes = (*plant.heard, *against, *[_UNUSED] * unused)
+    return Draft(facts, plant.files, spectrum, folder, said, there, notes)
 
 
 def with_spectrum(draft: Draft, solve: Solve) -> Draft:
@@ -171,19 +187,25 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
 
 
 class Conversation:
-    """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again."""
+    """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again.
 
-    def __init__(self, known: Mapping[str, str], stem: str, folder: Path) -> None:
-        """Begin with the answers that are known; stem and folder as of `compose`."""
-        self._answers, self._stem, self._folder = dict(known), stem, folder
+    The first answer may be a sentence that answers several questions. Then only what it leaves open is asked,
+    and what is asked always.
+    """
+
+    def __init__(self, known: Mapping[str, str], stem: str, folder: Path, *, brief: bool = False) -> None:
+        """Begin with the answers that are known, from a sentence if `brief`; the rest as of `compose`."""
+        self.answers, self._stem, self._folder = dict(known), stem, folder
         self._plant: PlantAnswer | None = None
+        self._brief = brief
         self.draft: Draft | None = None  # of all answers, once they are there
 
     @property
     def question(self) -> Question | None:
         """Return the next question; None if all are answered."""
-        there = {*self._answers, *asking.known_from(self._answers)}
-        return next((one for one in QUESTIONS if one.key not in there), None)
+        there = {*self.answers, *asking.known_from(self.answers)}
+        left = (one for one in QUESTIONS if one.key not in there)
+        return next((one for one in left if not self._brief or one.always or one.default is None), None)
 
     def answer(self, text: str) -> IdesignError | None:
         """Answer the question, and return the error of an answer, whose question then comes again.
@@ -193,12 +215,14 @@ class Conversation:
         """
         asked = self.question
         assert asked is not None
-        self._answers[asked.key] = text
         try:
+            several = in_sentence(text) if asked.key == "plant" else {}
+            self._brief = self._brief or bool(several)
+            self.answers |= several or {asked.key: text}
             # The plant, which may be a log to be explored, is read once only.
-            if self._plant is None and self._answers["plant"].strip():
-                self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
-            draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)
+            if self._plant is None and (plant := self.answers.get("plant", "").strip()):
+                self._plant = understand_plant(plant, self._stem, self._folder)
+            draft = compose({**_MEANWHILE, **self.answers}, self._stem, self._folder, self._plant)
             if self.question is None:
                 draft.validate()
                 self.draft = draft
@@ -206,7 +230,7 @@ class Conversation:
             raise  # no answer can help
         except IdesignError as error:
             key = error.diagnostics[0].key
-            if self._answers.pop(key, None) is None:
+            if self.answers.pop(key, None) is None and key != asked.key:
                 return None  # it is about what stands in for an answer
             if key == "plant":
                 self._plant = None

@@ -18,21 +18,33 @@ PLUS_MINUS = r"(?:plus/minus|plus or minus|\+/?-|±)"
 # A unit that is not converted: "%", "bar", "degC", "m/s"; not a word of the answers.
 UNIT = r"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)[^\s\d,;|+±-][^\s,;|]*)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
-_OF = r"\s*(?:(?:of|about|is|ca\.?|up to)\b\s*|[:=]\s*)*"
+ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly)\b\.?|~|≈)"
+_OF = rf"\s*(?:,\s+|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
 _WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*{NUMBER}{_PER_CENT})?"
-_MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
+_MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
+VAGUE = 0.2
+"""The share within which a value that is "about" right is taken to be known."""
 # Kinds of units -> each unit in the one that a spec has.
 SCALES = {
-    "time": {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": _MINUTE, "minutes": _MINUTE,
-             "h": _HOUR, "hour": _HOUR, "hours": _HOUR, "d": _DAY},
+    "time": {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "second": 1.0, "min": _MINUTE, "minute": _MINUTE,
+             "h": _HOUR, "hour": _HOUR, "shift": _SHIFT, "d": _DAY, "day": _DAY, "week": 7 * _DAY},
     "frequency": {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "mhz": 2e-3 * math.pi, "hz": 2.0 * math.pi,
                   "khz": 2e3 * math.pi},
     "rate": {"s": 1.0, "sec": 1.0, "second": 1.0, "min": 1.0 / _MINUTE, "minute": 1.0 / _MINUTE,
              "h": 1.0 / _HOUR, "hour": 1.0 / _HOUR},
 }  # fmt: skip
+# "a minute", "half an hour", "two shifts": words in place of numbers.
+_COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
+            "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30}  # fmt: skip
+_UNIT_OF_TIME = rf"(?:{'|'.join(SCALES['time'])})s?\b"
+_SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={_UNIT_OF_TIME})", re.I)
+AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+\.?\d*|\.\d+)\s*){_UNIT_OF_TIME}"
+"""A time, as in "45 min" or "one shift"."""
+_PER = rf"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?(?:\s*(?:per|/)\s*({'|'.join(SCALES['rate'])})\b)?"
 # A group each, which holds a unit of the kind; the last three convert nothing.
-_UNITS = {kind: rf"(?:\s*({'|'.join(scales)})\b)?" for kind, scales in SCALES.items()} | {
-    "rate": rf"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?(?:\s*(?:per|/)\s*({'|'.join(SCALES['rate'])})\b)?",
+_UNITS = {kind: rf"(?:\s*({'|'.join(scales)})s?\b)?" for kind, scales in SCALES.items()} | {
+    "rate": _PER,
+    "slope": rf"{_PER}(?:\s*(?:per|/)\s*[^\s,;|]+)?",
     "gain": r"((?:\s*[^\s\d,;|]*/[^\s,;|]+)?)",
     "any": rf"({UNIT})",
     "none": "()",
@@ -48,7 +60,8 @@ class Phrase:
 
     def __init__(self, text: str, key: str) -> None:
         """Begin with the whole answer to a question; refuse numbers too large or too small to be meant."""
-        self.text, self.key, self._left = text, key, text
+        spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", text)
+        self.text, self.key, self._left = text, key, spoken
         sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
         strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
         if strange is not None:
@@ -84,12 +97,13 @@ class Phrase:
             raise bad_answer(self.key, f'"{alone[0]}" has no number behind it')
         return None if found is None else _scaled(found[1], found[2], kind)
 
-    def known_within(self, words: str, kind: str) -> tuple[float, float | None] | None:
-        """Read as `after` does, and the share "within 30 %" that may stand behind the unit."""
-        found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}{_WITHIN}")
+    def known_within(self, words: str, kind: str) -> tuple[float, float | None, bool] | None:
+        """Read as `after` does; also the share "within 30 %" that may follow, and whether it is "about"."""
+        found = self.take(rf"({ABOUT}?\s*\b(?:{words})\b{_OF}){NUMBER}{_UNITS[kind]}{_WITHIN}")
         if found is None:
             return None
-        return _scaled(found[1], found[2], kind), None if found[3] is None else float(found[3]) / 100.0
+        share = None if found[4] is None else float(found[4]) / 100.0
+        return _scaled(found[2], found[3], kind), share, re.search(ABOUT, found[1], re.I) is not None
 
     def band(self) -> tuple[float | None, float | None]:
         """Read the ends of a band of frequencies in rad/s; one unit holds for both."""
@@ -106,14 +120,15 @@ class Phrase:
         return None if found is None else found / 100.0
 
     def seconds(self) -> float:
-        """Read the whole answer as a time, as in "45 min"."""
-        found = self.take(rf"{NUMBER}\s*([a-z]*)")
+        """Read the whole answer as a time, as in "45 min" or "one shift"."""
+        found = self.take(rf"{NUMBER}\s*([a-z]*?)s?(?![a-z])")
         if found is None:
             raise bad_answer(self.key, f'"{self.text}" is no time')
-        if (found[2].lower() or "s") not in SCALES["time"]:
-            raise bad_answer(self.key, f'"{found[2]}" is no unit of time: s, min or h')
-        self.finish()
-        return needed(_scaled(found[1], found[2], "time"), self.key, "the time")
+        unit = found[2].lower() or "s"
+        if unit not in SCALES["time"]:
+            raise bad_answer(self.key, f'"{found[2]}" is no unit of time: s, min, h, shifts or days')
+        self.finish("there only for up to")
+        return needed(_scaled(found[1], unit, "time"), self.key, "the time")
 
     def finish(self, also: str = "") -> None:
         """Refuse what was not read, except words without content and `also` (words between blanks)."""
@@ -124,7 +139,8 @@ class Phrase:
 
 
 def _scaled(number: str, unit: str | None, kind: str) -> float:
-    return float(number) * SCALES.get(kind, {}).get((unit or "").lower(), 1.0)
+    scales = SCALES.get("rate" if kind == "slope" else kind, {})
+    return float(number) * scales.get((unit or "").lower(), 1.0)
 
 
 def needed(value: float | None, key: str, what: str) -> float:

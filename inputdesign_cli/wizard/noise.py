@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
+from inputdesign_cli.specification.fading_noise import discrete
 from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer
-from inputdesign_cli.wizard.questions import AS_LOG, bad_answer, chosen, file_of, in_their_words
+from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
-_DRIFTING = (1.0, -0.8)  # C of noise that drifts
+if TYPE_CHECKING:
+    from inputdesign_cli.records.sheet import Sheet
+
+_DRIFTING = 0.2  # the step of a drift from one sample to the next, of the deviation of white noise
+_LASTING = r"(?:fad|chang)\w*(?: slowly)?(?: in| within)?|correlation time|lasts|slow(?:ly)?"
+_FADING = 0.2  # of the time constant of the plant: how long noise lasts of which nothing is said
+_WHITE_IN = 0.2  # samples: noise that fades faster is white
 _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
@@ -27,16 +36,22 @@ _LONG = 100_000  # samples after which no pole of a log remembers anything
 
 @dataclass(frozen=True)
 class _Level:
-    """Holds the variance of the innovation, the pole of the noise (0: white), and how they are known."""
+    """Holds the standard deviation of the noise, its colour, and how they are known."""
 
-    variance: float
-    pole: float
+    deviation: float
     why: str
+    fades: float | None = None  # seconds of its correlation, as stated: 0 for white noise
+    pole: float = 0.0  # as measured
+    guessed: bool = False  # it has a colour that nobody knows
     rounded: bool = False  # it is the least that noise can be
+    drifts: bool = False
 
 
 def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list[str]:
     """Return the lines of `noise` from the answers, and from the model of a log where they leave it open.
+
+    Of noise whose colour nobody knows a colour is taken. It costs a parameter. White noise in the spec of
+    noise that lasts would make `assess` blame the plant.
 
     Raises:
         SpecError: `bad-answer`.
@@ -44,15 +59,32 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     """
     explored = plant.explored
     moves = explored is not None and _moves(explored.noise)
-    drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moves})
-    level = None if text == AS_LOG and explored else _stated(text, folder, plant.sample_time)
-    if explored is not None:
+    level = None if text.lower() in AS_LOGGED and explored else _stated(text, folder, plant.sample_time)
+    moved = moves or (level is not None and level.drifts)
+    drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moved})
+    if explored is not None and (level is None or level.fades is None):
         return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
     assert level is not None
-    lines = ["noise:", f"  variance: {short(level.variance)}  # {level.why}"]
-    if drifts:
-        return [*lines, *_drift(drifts), f"  C: {list(_DRIFTING)}"]
-    return [*lines, f"  D: [1, {short(-level.pole)}]  # {level.why}"] if level.pole else lines
+    fades, pole, why = level.fades, level.pole, level.why
+    colour = f"fades in {short(fades)} s, as you said" if fades else "white"
+    if level.guessed and not drifts:
+        fades = float(f"{max(_FADING * plant.slow, 2.0 * plant.sample_time):.1g}")
+        colour = "a guess: if the noise lasts and the spec calls it white, assess blames the plant"
+    variance = level.deviation**2 * (1.0 - pole**2)
+    if fades:
+        variance, pole = discrete(level.deviation, fades, plant.sample_time)
+    exact = f"D: [1, {short(-pole)}], variance: {short(variance)}"
+    if fades and not drifts:
+        return [
+            f"noise:  # every {short(plant.sample_time)} s exactly e/D with {exact}",
+            f"  standard_deviation: {short(level.deviation)}  # {why}",
+            f"  correlation_time: {short(fades)}  # {colour}",
+        ]
+    lines = ["noise:", f"  variance: {short(variance)}  # {why}", *_drift(drifts)]
+    # A drift moves as fast whatever the colour of the rest.
+    root = 1.0 - _DRIFTING * np.sqrt((1.0 - pole) / (1.0 + pole))
+    lines += [f"  C: [1, {short(-root)}]"] * drifts
+    return lines + [f"  D: [1, {short(-pole)}]  # {colour if fades else why}"] * bool(pole)
 
 
 def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: bool, drifts: bool) -> list[str]:
@@ -72,7 +104,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
         gains = [np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows]
         powers = powers * np.array(gains)
     if level is not None:
-        shares = level.variance / powers
+        shares = level.deviation**2 / powers
         scale = np.sqrt(np.maximum(shares, 1.0) if level.rounded else shares)
         variance = variance * np.outer(scale, scale)
     own = short(variance[0, 0]) if len(A) == 1 else json.dumps(variance.tolist())
@@ -82,7 +114,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
     if moves and not drifts:
         return lines
     C, D = _per_output(noise.C, len(A)), _per_output(noise.D, len(A))
-    drift, new = (True, _DRIFTING) if drifts and not moves else (noise.drift, (1.0,))
+    drift, new = (True, (1.0, _DRIFTING - 1.0)) if drifts and not moves else (noise.drift, (1.0,))
     C = [np.convolve(row, new).tolist() for row in C]
     named = [(name, rows) for name, rows in (("C", C), ("D", D)) if any(len(row) > 1 for row in rows)]
     shape = [f"  {name}: {json.dumps(rows if len(rows) > 1 else rows[0])}" for name, rows in named]
@@ -106,22 +138,41 @@ def _drift(drift: Any) -> list[str]:
 
 def _stated(text: str, folder: Path, step: float) -> _Level:
     """Return the noise level that an answer states; `step` is the seconds between samples."""
-    word, _, name = text.partition(" ")
-    if word.lower() == "rest":
-        return _at_rest(folder / name.strip(), step)
+    if text.lower() in AS_LOGGED:
+        raise bad_answer("noise", 'the plant is no log: write plant "log FILE", or here "rest FILE"')
+    if rests := re.fullmatch(r"(?:rest|as in)\s+(.*)", text, re.I):
+        return _at_rest(folder / rests[1].strip(), step)
     said = Phrase(text, "noise")
-    deviation, rounding = said.after("standard deviation|deviation|std"), _resolution(said)
+    fades, drifts = _colour(said, step), said.take(r"\bdrift\w*") is not None
+    rounding = _resolution(said)
+    deviation = said.after("standard deviation|deviation|std|noise", named=True)
+    if deviation is None and not re.fullmatch(rf"\s*{NUMBER}\s*", text):
+        deviation = said.number(rf"^[\s|]*{NUMBER}{UNIT}")
     said_both = {"the standard deviation": deviation, "the resolution": rounding}
     sizes = {what: needed(one, "noise", what) for what, one in said_both.items() if one is not None}
     if not sizes:
         raise bad_answer("noise", "it does not say a standard deviation or a resolution")
-    said.finish()
+    said.finish("that which it noise has slow slowly")
     why = [f"standard deviation {short(deviation)}"] if deviation is not None else []
     if rounding is not None:
         least = "" if why else ": the least that noise can be"
         why.append(f"rounding to {short(rounding)} has a variance of its square over 12{least}")
-    size = (deviation or 0.0) ** 2 + (rounding or 0.0) ** 2 / 12.0
-    return _Level(size, 0.0, "; ".join(why), rounded=rounding is not None)
+    size = math.hypot(deviation or 0.0, (rounding or 0.0) / math.sqrt(12.0))
+    guessed = fades is None and deviation is not None
+    return _Level(size, "; ".join(why), fades, guessed=guessed, rounded=rounding is not None, drifts=drifts)
+
+
+def _colour(said: Phrase, step: float) -> float | None:
+    """Return the seconds in which noise fades, 0 if it is white; None if the answer leaves it open."""
+    if said.take(r"\bwhite\b") is not None:
+        return 0.0
+    fades = said.after(_LASTING, "time")
+    if fades is None:
+        return None
+    if needed(fades, "noise", "the time in which it fades") < _WHITE_IN * step:
+        why = f"noise that fades in {short(fades)} s is white in samples {short(step)} s apart"
+        raise bad_answer("noise", f'{why}: write "white"')
+    return fades
 
 
 def _resolution(said: Phrase) -> float | None:
@@ -138,16 +189,22 @@ def _resolution(said: Phrase) -> float | None:
 
 
 def _at_rest(path: Path, step: float) -> _Level:
-    """Return the level of the noise in the column y of a file.
+    """Return the level of the noise in the column y of a file in which u, if it is there, rests.
 
     Noise with one pole is assumed where rows are not as far apart as samples. Its correlation then fades by
     the same factor in the same time.
     """
     from inputdesign_cli.questions.building.tables import read_samples
+    from inputdesign_cli.records import read_sheet
 
     file_of("noise", path)
     with in_their_words({}, "noise"):
-        y, apart = read_samples(path, {"y": "y"}, key="noise")["y"], _seconds_apart(path) or step
+        sheet = read_sheet(path, key="noise")
+        wanted = {"y": "y"} | {name: name for name in sheet.header if name.lower() in ("u", "u1")}
+        found, apart = read_samples(path, wanted, key="noise"), _seconds_apart(sheet) or step
+    y = found.pop("y")
+    if any(np.ptp(u) > 0.0 for u in found.values()):
+        raise bad_answer("noise", f'u in {path.name} moves: name its plant, too, as "log {path.name}"')
     if y.size < _FEWEST:
         raise bad_answer("noise", f"{path.name} has {y.size} rows, and {_FEWEST} are the least")
     v = y - y.mean()
@@ -158,18 +215,16 @@ def _at_rest(path: Path, step: float) -> _Level:
     same = abs(apart - step) <= _SAME_STEP * step
     seen = f"of {path.name}: {y.size} samples" + ("" if same else f", {short(apart)} s apart")
     if abs(rho) <= _WHITE / np.sqrt(y.size):
-        return _Level(power, 0.0, f"{seen}, white as far as they show")
+        return _Level(math.sqrt(power), f"{seen}, white as far as they show")
     pole = min(rho if same else max(rho, 0.0) ** (step / apart), _STRONGEST)
     why = f"{seen}, correlation {rho:.2g} from one to the next"
-    return _Level(power * (1.0 - pole**2), pole, why)
+    return _Level(math.sqrt(power), why, pole=pole)
 
 
-def _seconds_apart(path: Path) -> float | None:
+def _seconds_apart(sheet: Sheet) -> float | None:
     """Return the time between the rows of a file; None without a column of times that grow."""
-    from inputdesign_cli.records import read_sheet
     from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
 
-    sheet = read_sheet(path, key="noise")
     name = next(iter(time_columns(sheet)), None)
     if name is None:
         return None

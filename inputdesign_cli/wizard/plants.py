@@ -6,12 +6,13 @@ What cannot be used is a SpecError `bad-answer`, or a DataError about a file.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -19,11 +20,22 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.wizard.grammar import LARGEST, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import ABOUT, LARGEST, VAGUE, Phrase, needed, short
 from inputdesign_cli.wizard.questions import bad_answer, file_of, in_their_words, package_data
 
+if TYPE_CHECKING:
+    from inputdesign_cli.questions.exploration.explore import Exploration
+
 _NONE: Mapping[str, float] = MappingProxyType({})
-_QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
+# Names in a spec -> words and units of an answer.
+_QUANTITIES = {
+    "gain": ("gain", "gain"),
+    "slope": (r"integrat\w+(?: (?:with|gain|slope))*", "slope"),
+    "time_constant": ("time constant|lag", "time"),
+    "dead_time": ("dead time|delay", "time"),
+}
+_SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
+_NEARLY = 2.0  # points of fit that a model may lose which rules of tuning know
 _LEAST_ROWS = 10  # of a step response
 _LONGER = 2.0  # a time constant of more records than this is none
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
@@ -50,8 +62,10 @@ class PlantAnswer:
     tunable: bool = False  # whether rules of tuning know it
     channels: int = 1  # the larger number of its inputs and outputs
     explored: Spec | None = None  # the model of a log, which has its noise
+    called: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # channels: names and units in a log
     source: str = ""  # the name of the data file
     against: tuple[str, ...] = ()  # what the data say against the model, a sentence each
+    heard: tuple[str, ...] = ()  # how the answer was taken, a sentence each
 
     @property
     def sample_time(self) -> float:
@@ -71,28 +85,43 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
     if text.lower() in TEMPLATES:
         return TEMPLATES[text.lower()]
     if word.lower() in ("step", "log") and rest.strip():
-        path = file_of("plant", folder / rest.strip())
+        name, *named = re.split(r",?\s+(?:with\s+)?columns?\s+", rest.strip(), maxsplit=1)
+        path, columns = file_of("plant", folder / name), _columns(*named)
         with in_their_words({}, "plant"):
-            return _stepped(path, stem) if word.lower() == "step" else _explored(path, stem)
+            return (_stepped if word.lower() == "step" else _explored)(path, stem, columns)
     if text.endswith(".json"):
         return system_of(file_of("plant", folder / text))
-    if re.search(r"\bgain\b", text, re.I):
+    if re.search(r"\b(?:gain|integrat\w+)\b", text, re.I):
         return plant_of_words(text)
     raise bad_answer("plant", f'"{text}" is none of these')
 
 
+def _columns(text: str = "") -> dict[str, str]:
+    """Return channel -> column of "time=Date, u=valve, y=level", as `explore --columns` takes them."""
+    found = {}
+    for part in filter(None, map(str.strip, text.split(","))):
+        if (named := re.fullmatch(r"(?:(time)|([uy])(\d*))\s*=\s*(.+)", part)) is None:
+            raise bad_answer("plant", f'"{part}" names no column, as u=valve and y=level do')
+        found[named[1] or f"{named[2]}{named[3] or 1}"] = named[4].strip().strip("\"'")
+    return found
+
+
 def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswer:
-    """Return the plant of "gain 2, time constant 180 s, dead time 25 s, each within 30 %"."""
+    """Return the plant of "gain 2, time constant 180 s, dead time 25 s, each within 30 %".
+
+    An integrator has a slope in place of the gain: "integrates 0.02 %/s per %, dead time 20 s".
+    """
     phrase = Phrase(text, "plant")
-    kinds = dict.fromkeys(_QUANTITIES, "time") | {"gain": "gain"}
-    read = {name: phrase.known_within(words, kinds[name]) for name, words in _QUANTITIES.items()}
-    values = {name: found[0] for name, found in read.items() if found is not None}
-    own = {name: found[1] for name, found in read.items() if found is not None and found[1] is not None}
-    part = phrase.share()
-    phrase.finish("known")
-    if not values.get("gain"):
+    read = {name: phrase.known_within(*words) for name, words in _QUANTITIES.items()}
+    found = {name: one for name, one in read.items() if one is not None}
+    values = {name: value for name, (value, _, _) in found.items()}
+    own = {name: share for name, (_, share, _) in found.items() if share is not None}
+    part, whole = phrase.share(), phrase.take(ABOUT)
+    phrase.finish("known it")
+    if not values.get("slope", values.get("gain")) or {"slope", "gain"} <= values.keys():
         raise bad_answer("plant", "it does not say the gain, or says that it is zero")
-    slow = needed(values.get("time_constant"), "plant", "the time constant")
+    if "gain" in values or "time_constant" in values:
+        needed(values.get("time_constant"), "plant", "the time constant")
     if values.get("dead_time", 0.0) < 0.0:
         raise bad_answer("plant", "the dead time is negative")
     values = {name: value for name, value in values.items() if value}
@@ -101,8 +130,52 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     shares = own if part is None else dict.fromkeys(values, part) | own
     if not all(0.0 < share < 0.9 for share in shares.values()):
         raise bad_answer("plant", "within must be more than 0 and less than 90 %")
+    vague = [name for name in values if name not in shares and (whole or found[name][2])]
+    around = _around(values, shares | dict.fromkeys(vague, VAGUE))
+    ends = (
+        f"{name.replace('_', ' ')} {short(around[name][0])} to {short(around[name][1])}" for name in vague
+    )
+    said = (
+        f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}; the design holds for all of these'
+    )
+    heard = (said,) if vague else ()
+    if "slope" in values:
+        return _integrating(head, values, around, heard)
     lines = (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds")
-    return PlantAnswer(lines, slow, _around(values, shares), values, tunable=True)
+    return PlantAnswer(lines, values["time_constant"], around, values, tunable=True, heard=heard)
+
+
+def _integrating(
+    head: str, values: Mapping[str, float], around: Mapping[str, tuple[float, float]], heard: tuple[str, ...]
+) -> PlantAnswer:
+    """Return an integrator behind a lag and a dead time, held by a slow PI of Skogestad's rule meanwhile."""
+    late = values.get("dead_time", 0.0) + values.get("time_constant", 0.0)
+    if not late:
+        raise bad_answer(
+            "plant", "it integrates: say its dead time, however small, or the lag of its actuator"
+        )
+    below = "[time_constant, 1, 0]" if "time_constant" in values else "[1, 0]"
+    delay = ", delay: dead_time" if "dead_time" in values else ""
+    settings = f"Kp: {short(1.0 / (values['slope'] * _SLOWER * late))}, Ti: {short(4.0 * _SLOWER * late)}"
+    holds = (
+        f"a plant that integrates needs a controller meanwhile: PI {{{settings}}} is taken; name yours (loop)"
+    )
+    return PlantAnswer(
+        (
+            head,
+            f"  parameters: {_listed(values)}",
+            f"  continuous: {{numerator: [slope], denominator: {below}{delay}}}  # it is known to integrate",
+            "  sample: zoh  # what a converter holds",
+        ),
+        values.get("time_constant", late),
+        around,
+        values,
+        controller=f"{{pid: {{{settings}}}}}",
+        sampling=_round_step(late / 2.0),
+        why_sampling="half of dead time and lag, or a little less",
+        tunable=True,
+        heard=(*heard, holds.replace(": {", " {")),
+    )
 
 
 def _listed(values: Mapping[str, float]) -> str:
@@ -207,13 +280,14 @@ def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dic
     return values, [f"  parameters: {{{listed}}}", f"  continuous: {written}  # it is known to integrate"]
 
 
-def _stepped(path: Path, stem: str) -> PlantAnswer:
+def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     """Estimate gain, time constant and dead time from a record that begins at rest."""
     from inputdesign_cli import parse_spec, questions
     from inputdesign_cli.questions.building.tables import read_columns
+    from inputdesign_cli.records import Preparation
 
-    found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
-    t, u, y = found["time"], found["u"], found["y"]
+    wanted = {"time": "time", "u1": "u", "y1": "y"} | dict(columns)
+    t, u, y = (read_columns(path, wanted, key="plant")[role] for role in ("time", "u1", "y1"))
     if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
         raise bad_answer("plant", f"{path.name} needs {_LEAST_ROWS} rows at least, at times that grow")
     moved, step = np.abs(u - u[0]), float(np.median(np.diff(t)))
@@ -232,7 +306,8 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
     start = f"gain: {answers / moves!r}, time_constant: {slow!r}, dead_time: {late!r}"
     text = f"sample_time: {step!r}\nplant: {{continuous: {{{start}}}, sample: zoh}}\n"
     point = {"u1": float(u[0]), "y1": float(np.mean(y[: max(begun, 1)]))}
-    identified = questions.identify(parse_spec(text, design=False), path, operating_point=point)
+    spec, named = parse_spec(text, design=False), Preparation(columns=columns)
+    identified = questions.identify(spec, path, operating_point=point, preparation=named)
     model, failed = identified.files["model.yaml"], identified.result["identification"]["failed"]
     values = dict(identified.result["identification"]["theta"])
     lasts = float(t[-1] - t[begun])
@@ -256,24 +331,41 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
     )
 
 
-def _explored(path: Path, stem: str) -> PlantAnswer:
-    """Explore a log as `idesign explore` does; the model is a file next to the spec."""
+def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
+    """Explore a log as `idesign explore` does; the model is a file next to the spec.
+
+    A gain, a lag and a dead time, which rules of tuning know, are taken where they do nearly as well.
+    """
     from inputdesign_cli import parse_spec, questions
     from inputdesign_cli.questions.building.controllers import process_of
+    from inputdesign_cli.records import Preparation
 
-    found, name = questions.explore([path]), f"{stem}-model.yaml"
+    named, name = Preparation(columns=columns), f"{stem}-model.yaml"
+    found = questions.explore([path], named)
     if "model.yaml" not in found.results.files:
         why = "; ".join(found.reasons) or "no model deserves trust"
         raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
+
+    def read(one: Exploration) -> tuple[Spec, int, bool]:
+        spec = parse_spec(one.results.files["model.yaml"].decode(), name, design=False)
+        assert spec.plant.kind != "regression"
+        try:
+            process_of(spec)
+        except SpecError:
+            return spec, max(spec.plant.inputs, spec.plant.outputs), False
+        return spec, max(spec.plant.inputs, spec.plant.outputs), True
+
+    heard: tuple[str, ...] = ()
+    spec, channels, tunable = read(found)
+    if channels == 1 and not tunable:
+        simple = questions.explore([path], named, structure="fopdt")
+        if "model.yaml" in simple.results.files and not simple.reasons and _as_good(simple, found):
+            found, (spec, channels, tunable) = simple, read(simple)
+            heard = (f"another structure fits {path.name} a little better than gain, lag and dead time do",)
     text = found.results.files["model.yaml"].decode()
-    spec = parse_spec(text, name, design=False)
-    assert spec.plant.kind != "regression"
-    channels = max(spec.plant.inputs, spec.plant.outputs)
-    tunable = True
-    try:
-        process_of(spec)
-    except SpecError:
-        tunable = False
+    shown = {
+        channel: re.match(r"(.*?)\s*(?:[\[(](.*)[\])])?$", header) for channel, header in columns.items()
+    }
     return PlantAnswer(
         (f"include: [{name}]  # the plant, explored in {path.name}",),
         20.0 * spec.sample_time,
@@ -283,6 +375,19 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
         tunable=tunable,
         channels=channels,
         explored=spec,
+        called={
+            channel: (one[1], one[2] or "") for channel, one in shown.items() if one and channel != "time"
+        },
         source=path.name,
         against=found.against,
+        heard=heard,
+    )
+
+
+def _as_good(simple: Exploration, best: Exploration) -> bool:
+    """Return whether a model simulates and predicts the data that judge nearly as well as the best."""
+    fits = [one.results.result.get("validation") or {} for one in (simple, best)]
+    return all(
+        key in fits[1] and fits[0].get(key, -math.inf) >= fits[1][key] - _NEARLY
+        for key in ("simulation_fit_percent", "prediction_fit_percent")
     )

@@ -1,4 +1,4 @@
-"""The ten questions of `idesign wizard`, their answers, and errors in words of the answers."""
+"""The questions of `idesign wizard`, their answers, and errors in words of the answers."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ class Question:
     asks: str
     allowed: str
     default: str | None = None
+    always: bool = False  # it is asked beyond a sentence, too
 
 
 def package_data(name: str) -> Any:
@@ -37,7 +38,7 @@ QUESTIONS = tuple(Question(**entry) for entry in package_data("questions.yaml"))
 KEYS = tuple(question.key for question in QUESTIONS)
 _FAULTS = package_data("faults.yaml")
 _ALL = f"the questions are {', '.join(KEYS)}"
-AS_LOG = "as the log"
+AS_LOGGED = ("as the log", "as in the log", "as in this log")
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 
 
@@ -49,7 +50,7 @@ def question(key: str) -> Question:
 def known_from(answers: Mapping[str, str]) -> dict[str, str]:
     """Return the answers that the answer `plant` gives: a log shows the noise, and whether it drifts."""
     explored = answers.get("plant", "").strip().lower().startswith("log ")
-    return {"noise": AS_LOG, "drift": "not known"} if explored else {}
+    return {"noise": AS_LOGGED[0], "drift": "not known"} if explored else {}
 
 
 def needed_of(answers: Mapping[str, str]) -> list[str]:
@@ -102,6 +103,23 @@ class Answers:
 
     texts: dict[str, str] = field(default_factory=dict)
     places: dict[str, Location] = field(default_factory=dict)
+
+    def spread(self) -> bool:
+        """Put the answers of a sentence in the place of the plant; return whether it is one.
+
+        Raises:
+            SpecError: `bad-answer` for a clause that answers no question.
+        """
+        from inputdesign_cli.wizard.sentence import in_sentence
+
+        with self.located():
+            found = in_sentence(self.texts.get("plant", ""))
+        if found:
+            del self.texts["plant"]
+            for key, text in found.items():
+                if self.texts.setdefault(key, text) is text and "plant" in self.places:
+                    self.places[key] = self.places["plant"]
+        return bool(found)
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -114,8 +114,9 @@ def lasting(seconds: float) -> str:
 
 def to_log(spec: Spec, results: Results, file: str) -> list[str]:
     """Return instructions: what to apply and record, and the command that judges the record."""
+    # "u1 valve (%)": behind the channel stands its name.
     applied, caused = (
-        [name for name in results.tables[table].columns if re.fullmatch(r"[ruy]\d+", name)]
+        [name.split()[0] for name in results.tables[table].columns if re.match(r"[ruy]\d+(?= |$)", name)]
         for table in ("signal", "predicted_output")
     )
     inputs, outputs = [f"u{name[1:]}" for name in applied], [name for name in caused if name.startswith("y")]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
@@ -16,40 +17,75 @@ from inputdesign_cli.wizard.questions import bad_answer
 
 _NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations
 _LINES = 20
+_SAFE = 6.0  # dB of |S|, which keep a gain margin of 2 and a phase margin of 29 degrees
 _LEAST_BITS, _MOST_BITS = 2, 32
 _WITHIN = {
-    "prediction": r"\bpredict\w*",
+    "prediction": r"\bpredict\w*(?:\s+(?:of\s+)?(?:the|a|my|our)\s+[a-z ]+?(?=\s+within|[|,;]|\s*$))?",
     "parameters": r"\bparameters?\b",
     "response": r"\b(?:bode(?: plot| diagram)?|frequency response)\b",
 }
 
 
+_ACTUATOR = (
+    r"((?:(?!(?:the|our|my|move|may|can|by|from|around)\b)[a-z]+ )?(?:valve|heater|heating|pump|voltage|power"
+    r"|flow|steam|reflux|damper|fan|current|opening|radiator|drive|input|actuator))"
+)
+
+
 @dataclass(frozen=True)
 class Range:
-    """Holds the amplitude about an operating point."""
+    """Holds the amplitude about an operating point, and what moves there, in which unit."""
 
     amplitude: float
     offset: float
+    name: str = ""
+    unit: str = ""
 
 
 def input_range(text: str) -> Range:
-    """Return the range of "plus/minus 5 around 40", or of "35 to 45"."""
-    said = Phrase(text, "range")
-    ends = said.take(rf"^\s*(?:from\s*)?{NUMBER}{UNIT}\s*(?:to\b|\.\.)\s*{NUMBER}{UNIT}\s*$")
+    """Return the range of "valve 40 +- 5 %", of "may move +-5 around 40", or of "35 to 45"."""
+    said, number = Phrase(text, "range"), f"{NUMBER}({UNIT})"
+    named = said.take(rf"\b(?:(?:the|our|my)\s+)?{_ACTUATOR}\b")
+    ends = said.take(rf"(?<![-+±\w.]){number}\s*(?:to\b|\.\.)\s*{number}")
+    about = None if ends else said.take(rf"(?<![-+±\w.]){number}\s*{PLUS_MINUS}\s*{number}")
+    units = [unit for found in (ends, about) if found for unit in (found[2], found[4])]
     if ends is not None:
-        low, high = float(ends[1]), float(ends[2])
+        low, high = float(ends[1]), float(ends[3])
         if not low < high:
             raise bad_answer("range", f"{low:g} is not below {high:g}")
-        return Range(0.5 * (high - low), 0.5 * (low + high))
-    about = said.take(rf"^\s*{NUMBER}{UNIT}\s*{PLUS_MINUS}\s*{NUMBER}{UNIT}\s*$")
-    middle = float(about[1]) if about is not None else said.after("around|about|at", named=True)
-    side = float(about[2]) if about is not None else said.number(rf"(?:{PLUS_MINUS}|\bby\b)\s*{NUMBER}{UNIT}")
-    if side is None and middle is not None:
-        side = said.number(rf"{NUMBER}{UNIT}")
-    if side is None:
-        raise bad_answer("range", f'"{text}" is no range')
-    said.finish()
-    return Range(needed(side, "range", "the amplitude"), middle or 0.0)
+        side, middle = 0.5 * (high - low), 0.5 * (low + high)
+    elif about is not None:
+        side, middle = float(about[3]), float(about[1])
+    else:
+        around = said.take(rf"\b(?:around|about|at)\b\s*{number}")
+        by = said.take(rf"(?:{PLUS_MINUS}|\bby\b)\s*{number}") or (around and said.take(number))
+        if by is None:
+            raise bad_answer("range", f'"{text}" is no range')
+        side, middle = float(by[1]), float(around[1]) if around else 0.0
+        units = [by[2], around[2] if around else ""]
+    said.finish("may move moves moved can be go goes swing from it")
+    unit = next((one.strip() for one in units if one.strip()), "")
+    name = named[1].strip() if named and named[1].lower() not in ("input", "actuator") else ""
+    return Range(needed(side, "range", "the amplitude"), middle, name, unit)
+
+
+def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
+    """Return names and units of the channels: as told, else as a log, the range and the gain show them."""
+    names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
+    text = said["names"]
+    if text.lower() != "as said":
+        parts = [
+            re.match(r"(.*?)(?:\s+in\s+(.*)|\s*[\[(](.*)[\])])?$", one.strip()) for one in text.split(",")
+        ]
+        if len(parts) != len(names) or not all(one and one[1] for one in parts):
+            raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
+        told = {name: (one[1], one[2] or one[3] or "") for name, one in zip(names, parts, strict=True) if one}
+    else:
+        ratio = re.search(rf"\bgain\b\D*{NUMBER}\s*(\S+)/([^\s,;/]+)", said["plant"])
+        output, unit = (ratio[2].strip("()"), ratio[3]) if ratio else ("", "")
+        told = {"u1": (span.name, span.unit or unit), "y1": ("", output)} | dict(plant.called)
+    rows = {name: {"name": called, "unit": unit} for name, (called, unit) in told.items()}
+    return {name: kept for name, row in rows.items() if (kept := {k: v for k, v in row.items() if v})}
 
 
 def limited(text: str) -> tuple[float | None, float | None]:
@@ -78,18 +114,31 @@ def controller(text: str, plant: PlantAnswer) -> str | None:
     return f"{{pid: {settings}}}"
 
 
-def quantisation(text: str) -> str | None:
-    """Return the converter of "12 bits up to 100" as YAML; None without one."""
+def quantisation(text: str, span: Range) -> str | None:
+    """Return the converter of "12 bits up to 100", or of "steps of 0.1 %", as YAML; None without one."""
     if text.lower() in ("no", "none"):
         return None
     said = Phrase(text, "converter")
     bits, most = said.number(r"(?<![\w.+-])(\d+)\s*bits?\b"), said.after("up to|over|to|range")
+    if bits is None and most is None:
+        step = said.after("steps?|resolution")
+        step = said.number(rf"{NUMBER}{UNIT}") if step is None else step
+        reach = abs(span.offset) + span.amplitude
+        bits = max(math.ceil(math.log2(reach / needed(step, "converter", "its step") + 1.0)) + 1, _LEAST_BITS)
+        most = (step or 0.0) * 2.0 ** (bits - 1)
     if bits is None or most is None:
         raise bad_answer("converter", f'"{text}" is none of these')
     said.finish()
     if not _LEAST_BITS <= bits <= _MOST_BITS:
         raise bad_answer("converter", f"converters have {_LEAST_BITS} to {_MOST_BITS} bits")
     return f"{{bits: {bits:.0f}, range: {short(needed(most, 'converter', 'its range'))}}}"
+
+
+def dwell(text: str, step: float) -> int:
+    """Return the samples for which the actuator keeps a position, in answer to "60 s" or "no"."""
+    if text.lower() in ("no", "none"):
+        return 1
+    return max(math.ceil(Phrase(text, "hold").seconds() / step - 1e-9), 1)
 
 
 def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> list[str]:
@@ -100,6 +149,7 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         duration: of the experiment, in seconds.
     """
     said = Phrase(text, "wish")
+    said.take(r"\bfor (?:an?|the|my|our) [a-z][^,;]*$")  # which plant, for the reader
     if said.take(r"\bloop\b"):
         return _loop(said, plant, controlled)
     part = said.share()
@@ -190,10 +240,14 @@ def _margin(said: Phrase) -> str:
             why = f"{peak:g} dB are no margin: 6 dB are usual, and {MOST_DECIBELS:g} the most"
             raise bad_answer("wish", why)
         return f"max_sensitivity_db: {short(needed(peak, 'wish', 'the margin in dB'))}"
+    if said.take(r"\b(?:safe|usual|good)\b(?:\s*margins?\b)?") is not None:
+        return f"max_sensitivity_db: {_SAFE:g}"
     said.take(r"\bphase margin\b")
     degrees = said.number(rf"{ALONE}{NUMBER}\s*(?:degrees\b|deg\b|°)")
     if degrees is None:
-        raise bad_answer("wish", "it does not say the margin: 6 dB, 29 degrees or gain margin 2")
+        raise bad_answer(
+            "wish", "it does not say the margin: 6 dB, 29 degrees, gain margin 2 or a safe margin"
+        )
     if not 0.0 < degrees < 60.0:
         raise bad_answer("wish", "a phase margin is between 0 and 60 degrees here")
     return f"phase_margin: {short(degrees)}"

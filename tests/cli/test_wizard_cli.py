@@ -40,7 +40,11 @@ TYPED = [
     ("Does the output drift", ""),
     ("open loop, or under", "\x15open"),
     ("hardware apply", ""),
-    ("quantised", ""),
+    ("keep each position", ""),
+    ("which steps", "\x15square"),
+    ("which steps", ""),
+    ("where it began", ""),
+    ("called", ""),
     ("Design the experiment now", "n"),
 ]
 
@@ -89,7 +93,7 @@ def test_in_a_terminal_a_bad_answer_is_asked_again(tmp_path):
             terminal.wait_for(part)
             terminal.type(f"{text}\r")
         assert terminal.process.wait(60) == 0
-    assert terminal.shown.count("error[bad-answer]") == 4
+    assert terminal.shown.count("error[bad-answer]") == 5
     written = yaml.safe_load((tmp_path / "experiment.yaml").read_text())
     assert (written["limits"]["duration"], written["signal"]["offset"]) == (1200, 40)
 
@@ -178,6 +182,9 @@ _WRONG = {
     "loop": "PI Ti 3",
     "signals": "square",
     "converter": "99 bits up to 3",
+    "hold": "a while",
+    "return": "perhaps",
+    "names": "valve",
 }
 
 

@@ -18,6 +18,7 @@ BASE: dict[str, str | None] = {
     "noise": "{variance: 1}",
     "accuracy": "{model_error: {relative: 0.01}}",
 }
+STEP: dict[str, str | None] = {"sample_time": "10"}
 CONTROLLER = "{controller: {numerator: [0.1], denominator: [1, -1]}}"
 REGRESSION: dict[str, str | None] = {
     "plant": "{regression: {estimated: 1, neglected: 1}}",
@@ -76,6 +77,42 @@ ROWS: list[Row] = [
     ("yaml-merge-key", "plant.<<", "alias", {"plant": "{B: [0, 1], §<<: {F: [1]}}"}),
     ("bad-key", "plant", "not a word", {"plant": "{B: [0, 1], §[1]: 2}"}),
     ("bad-text", "title", "U+0001", {"title": '§"\\x01"'}),
+    # noise in words
+    ("missing-key", "noise.correlation_time", "needs sample_time", {
+        "noise": "{standard_deviation: 0.1, §correlation_time: 60}"}),
+    ("missing-key", "noise.correlation_time", "add standard_deviation", {**STEP, "noise": "{§correlation_time: 60}"}),
+    ("conflicting-keys", "noise.variance", "remove it", {"noise": "{standard_deviation: 1, §variance: 1}"}),
+    ("conflicting-keys", "noise.D", "remove it", {"noise": "{standard_deviation: 1, §D: [1, -0.5]}"}),
+    ("conflicting-keys", "noise.drift", "variance, C and drift", {"noise": "{standard_deviation: 1, §drift: true}"}),
+    ("conflicting-keys", "simulation.noise.relative_std", "remove it", {
+        "simulation": "{noise: {standard_deviation: 1, §relative_std: 0.1}}"}),
+    ("out-of-range", "noise.standard_deviation", "greater than 0", {"noise": "{standard_deviation: §0}"}),
+    ("out-of-range", "noise.standard_deviation", "greater than 0", {"noise": "{standard_deviation: §-0.1}"}),
+    ("out-of-range", "noise.standard_deviation", "another unit", {"noise": "{standard_deviation: §1e-30}"}),
+    ("not-finite", "noise.standard_deviation", "finite", {"noise": "{standard_deviation: §.nan}"}),
+    ("not-a-number", "noise.standard_deviation", "a number", {"noise": "{standard_deviation: §true}"}),
+    ("out-of-range", "noise.correlation_time", "remove the key", {
+        **STEP, "noise": "{standard_deviation: 1, correlation_time: §0}"}),
+    ("not-finite", "noise.correlation_time", "finite", {
+        **STEP, "noise": "{standard_deviation: 1, correlation_time: §.inf}"}),
+    ("not-a-number", "noise.correlation_time", "write 60", {
+        **STEP, "noise": "{standard_deviation: 1, correlation_time: §1 min}"}),
+    ("out-of-range", "noise.correlation_time", "sample_time of at most 5", {
+        **STEP, "noise": "{standard_deviation: 1, correlation_time: §1}"}),
+    ("out-of-range", "noise.correlation_time", "a drift", {
+        **STEP, "noise": "{standard_deviation: 1, correlation_time: §1e8}"}),
+    ("wrong-shape", "noise.standard_deviation", "number of outputs is 1", {"noise": "{standard_deviation: §[1, 2]}"}),
+    ("wrong-shape", "noise.correlation_time", "number of outputs is 2", {
+        **STEP, "plant": MIMO, "noise": "{standard_deviation: [1, 2], correlation_time: §[30, 40, 50]}"}),
+    ("unsuitable-key", "noise.standard_deviation", "as F in place of A", {
+        **STEP, "plant": "{A: [1, -0.5], B: [0, 1]}", "noise": "{standard_deviation: §1, correlation_time: 30}"}),
+    ("unsuitable-key", "noise.standard_deviation", "sample: zoh", {
+        "plant": CONTINUOUS, "noise": "{standard_deviation: §1}", "limits": "{band: [0, 1]}"}),
+    ("unsuitable-key", "noise.standard_deviation", "remove K", {
+        "plant": "{parameters: {p: 0.5}, state_space: {A: [[p]], B: [[1]], C: [[1]], K: [[0.2]], time: discrete}}",
+        "noise": "{standard_deviation: §1}"}),
+    ("unsuitable-key", "noise.correlation_time", "regression is white", {
+        **STEP, **REGRESSION, "noise": "{standard_deviation: 1, correlation_time: §30}"}),
     # accuracy
     ("nothing-asked", "accuracy", "nothing is asked", {"accuracy": None}),
     ("nothing-asked", "accuracy", "nothing is asked", {"§accuracy": "{}"}),

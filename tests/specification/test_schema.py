@@ -35,7 +35,8 @@ def test_it_is_json_and_closed(schema):
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
     whole, included, estimated = schema["anyOf"]
-    assert whole == {"required": ["plant", "noise"], "properties": {"noise": {"required": ["variance"]}}}
+    size = {"anyOf": [{"required": ["variance"]}, {"required": ["standard_deviation"]}]}
+    assert whole == {"required": ["plant", "noise"], "properties": {"noise": size}}
     assert included == {"required": ["include"]}
     assert estimated["required"] == ["plant"]
     assert schema["additionalProperties"] is False
@@ -55,6 +56,7 @@ def test_it_is_json_and_closed(schema):
         "spectrum: {given: {signal: u.csv}}",
         "accuracy: {information: [[1]]}",
         "title: 3",
+        "sample_time: 10\nsimulation: {noise: {standard_deviation: 1, correlation_time: 60}}",
     ],
 )
 def test_it_accepts_shorthands(extra, schema):

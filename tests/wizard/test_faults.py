@@ -180,6 +180,24 @@ C(z) = 1/(z-1)
 12 bits up to 0
 12 bits up to 10
 2 bits up to 100
+steps of 0
+steps of 1e-12
+steps
+steps of 0.1 up to 100
+""",
+    "hold": """\
+soon
+-5 s
+0 s
+60 parsecs
+1e30 s
+""",
+    "return": "perhaps",
+    "names": """\
+valve
+valve, temperature, pressure
+ , temperature
+valve in %;, temperature
 """,
 }
 # What only two answers together tell is said of the one that is easier to change.
@@ -277,6 +295,7 @@ def test_a_controller_is_asked_for_only_where_there_is_none(loop, key):
 
 
 ANSWERS = GOOD | {"limits": "none", "drift": "no", "loop": "open", "signals": "any", "converter": "no"}
+ANSWERS |= {"hold": "no", "return": "no", "names": "as said"}
 
 
 def answered(talk, until=None):
@@ -301,8 +320,8 @@ def test_every_bad_answer_is_told_by_its_question_which_comes_again(tmp_path):
 
 def test_what_only_all_answers_together_tell_leads_back_to_its_question(tmp_path):
     """The loop of Skogestad's rule has a peak of 1.59 here: 1 dB cannot be asked of it."""
-    talk = answered(Conversation({"wish": "PI loop with 1 dB"}, "x", tmp_path), "converter")
-    assert talk.answer("no").diagnostics[0].code == "admissible-not-positive"
+    talk = answered(Conversation({"wish": "PI loop with 1 dB"}, "x", tmp_path), "names")
+    assert talk.answer("as said").diagnostics[0].code == "admissible-not-positive"
     assert (talk.question.key, talk.draft) == ("wish", None)
     assert talk.answer("PI loop with 6 dB") is None
     assert talk.draft is not None
@@ -327,8 +346,8 @@ def test_a_plant_is_understood_once(tmp_path, monkeypatch):
 def test_of_a_log_the_noise_is_not_asked(tmp_path):
     talk = Conversation({"plant": "log log.csv", "wish": "prediction within 5 % up to 0.1"}, "x", tmp_path)
     assert talk.question.key == "range"
-    known = {key: text for key, text in ANSWERS.items() if key not in ("noise", "drift", "converter")}
-    assert Conversation({**known, "plant": "log log.csv"}, "x", tmp_path).question.key == "converter"
+    known = {key: text for key, text in ANSWERS.items() if key not in ("noise", "drift", "names")}
+    assert Conversation({**known, "plant": "log log.csv"}, "x", tmp_path).question.key == "names"
     assert Conversation(known, "x", tmp_path).question.key == "noise"
 
 

@@ -92,7 +92,14 @@ def test_each_quantity_is_known_as_well_as_is_said(text, shares):
         ("plant", "gain 2, time constant 3 min", "time_constant", 180),
         ("wish", "PI loop with gain margin of 10 dB", "gain_margin", 10**0.5),
         ("noise", "resolution 12 bits up to 100", "variance", (100 / 4096) ** 2 / 12),
-        ("noise", "standard deviation 0.2 and resolution 0.5", "variance", 0.04 + 0.25 / 12),
+        ("noise", "standard deviation 0.2, white, and resolution 0.5", "variance", 0.04 + 0.25 / 12),
+        ("noise", "0.2 degC that fades in half a minute", "correlation_time", 30),
+        ("noise", "0.2 degC, slowly, about a minute", "correlation_time", 60),
+        ("time", "half an hour", "duration", 1800),
+        ("hold", "1 min", "hold", 12),
+        ("hold", "57 s", "hold", 12),
+        ("wish", "PI loop with a safe margin", "max_sensitivity_db", 6),
+        ("range", "the valve may move +-8 around 45 %", "amplitude", 8),
     ],
 )
 def test_units_are_those_that_are_named(key, text, name, value):

@@ -32,13 +32,14 @@ DURATIONS = {"motor": "60 s", "axis": "60 s", "column": "10 h"}
 
 def test_the_sentence_of_the_engineer_is_a_spec():
     spec = compose(ENGINEER, "x", Path()).spec()
-    assert len(QUESTIONS) <= 10
+    assert len(QUESTIONS) <= 13
     assert spec.uncertainty.intervals["gain"] == (1.4, 2.6)
     assert spec.accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
     assert spec.accuracy.loop.tuning.simc is not None
     assert (spec.limits.amplitude.input, spec.signal.offset, spec.experiment.samples) == (5.0, 40.0, 720)
     assert spec.uncertainty.worst_case == 0.95
-    assert spec.noise.variance == pytest.approx(0.04)
+    assert spec.noise.standard_deviation == pytest.approx(0.2)
+    assert spec.noise.correlation_time == 40.0  # a fifth of the time constant, rounded
     assert spec.plant.continuous.time_constant == 180.0
 
 

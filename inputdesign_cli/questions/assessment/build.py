@@ -83,7 +83,7 @@ def _with_noise(spec: Spec, model: Model, more: Sequence[Noise]) -> Spec:
     stated = blocks_of(model)["noise"]
     if "known" in stated:
         raise bad_spec("not-supported", "noise.known fixes the noise", hint="leave it out", key="noise.known")
-    changes: dict[str, object] = {}
+    changes: dict[str, object] = {"noise": stated}
     for letter, factors in zip("CD", zip(*more, strict=True), strict=True):
         own = stated.get(letter, [1.0])
         rows = own if isinstance(own[0], list) else [own] * len(factors)

@@ -52,6 +52,12 @@ class NoiseShape(Section):
         default=False, description="Whether the noise integrates as well; one for all outputs, or a list."
     )
     variance: fields.Variance | None = optional("Variance of e, or its covariance matrix.")
+    standard_deviation: fields.PerChannel[fields.Deviation] | None = optional(
+        "In place of variance, C and D: of the noise itself; a number or one per output."
+    )
+    correlation_time: fields.PerChannel[fields.CorrelationTime] | None = optional(
+        "Beside standard_deviation: the time in which the correlation falls to 37 % (default: white)."
+    )
     known: fields.Names | None = optional("Names of coefficients of C and D that are not estimated.")
 
     def covariance(self, outputs: int) -> np.ndarray:
@@ -94,7 +100,9 @@ class NoiseShape(Section):
 class Noise(NoiseShape):
     """C(q)/D(q) e(t) with white e."""
 
-    variance: fields.Variance = Field(description="Variance of e, or its covariance matrix.")
+    variance: fields.Variance = Field(
+        description="Variance of e, or its covariance matrix; or standard_deviation of the noise instead."
+    )
 
 
 class SimulationNoise(NoiseShape, one_of=(("variance", "relative_std"),)):

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict, WithJsonSchema
 
 from inputdesign_cli.specification.models.section import PathDiagnostic, Wording, by_tag, carry, fail, tag
-from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
+from inputdesign_cli.specification.models.sizes import COEFFICIENT, DEVIATIONS, QUANTITY, SIZES, magnitude
 from inputdesign_cli.specification.models.wording import show
 
 Polynomial = tuple[float, ...]
@@ -250,6 +250,10 @@ _LIST_OR_NOT = by_tag(lambda value: "list" if depth(value) else "one")
 Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0), QUANTITY]
 NonNegative = Annotated[float, Strict(), AllowInfNan(False), Field(ge=0), QUANTITY]
+Deviation = Annotated[
+    float, Strict(), AllowInfNan(False), Field(gt=0), magnitude(*DEVIATIONS), Wording("a number")
+]
+CorrelationTime = Annotated[Positive, Wording("a number", "white noise has none: remove the key")]
 Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
 Fraction = Annotated[Number, Field(ge=1e-9, lt=1)]  # a smaller probability is no requirement
 Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]

@@ -25,7 +25,8 @@ def magnitude(least: float, most: float) -> AfterValidator:
     return AfterValidator(check)
 
 
-QUANTITY = magnitude(1e-40, 1e40)
+QUANTITIES, DEVIATIONS = (1e-40, 1e40), (1e-15, 1e15)
+QUANTITY = magnitude(*QUANTITIES)
 """Powers, variances, errors, times, frequencies."""
 COEFFICIENT = magnitude(0.0, 1e100)
 """Coefficients and entries of matrices: powers of s may be far apart, and rounding leaves small ones."""

@@ -1,0 +1,80 @@
+"""Noise by its standard deviation and correlation time is exactly the sampled Gauss-Markov process."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, questions
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
+from inputdesign_cli.questions.building.system import build_model
+
+LAG = "plant: {continuous: {gain: 1, time_constant: 60}, sample: zoh}\n"
+POLYNOMIAL = "plant: {B: [0, 1], F: [1, -0.5]}\n"
+TWO = "plant: {B: [[[0, 1]], [[0, 1]]], F: [[[1, -0.5]], [[1, -0.7]]]}\n"
+ASKED = "sample_time: 10\naccuracy: {model_error: {relative: 0.1}}\nlimits: {samples: 100}\n"
+FADES = "noise: {standard_deviation: 0.1, correlation_time: 60}\n"
+
+
+def autocovariance(spec, output=0, lags=5):
+    """The first autocovariances of an output without input, from the impulse responses of the model."""
+    h = NoiseSpectrum.of(build_model(spec)).impulses[:, :, output]
+    return [np.sum(h[:, : h.shape[1] - k] * h[:, k:]) for k in range(lags)]
+
+
+@pytest.mark.parametrize("plant", [LAG, POLYNOMIAL])
+@pytest.mark.parametrize("step", [0.5, 10.0, 100.0])
+def test_the_samples_have_the_autocovariance_of_the_process(plant, step):
+    """sigma^2 exp(-k h/T) at k samples, whatever the sample time."""
+    spec = parse_spec(plant + ASKED + FADES, overrides=[f"sample_time={step}"])
+    for found, h in ((spec, step), (spec.with_(sample_time=2.0 * step), 2.0 * step)):
+        closed = 0.01 * np.exp(-np.arange(5) * h / 60.0)
+        np.testing.assert_allclose(autocovariance(found), closed, rtol=1e-9)
+
+
+def test_every_output_has_its_own():
+    noise = "noise: {standard_deviation: [0.1, 0.3], correlation_time: [60, 20]}\n"
+    spec, common = parse_spec(TWO + ASKED + noise), parse_spec(TWO + ASKED + FADES)
+    for output, (deviation, time) in enumerate(((0.1, 60.0), (0.3, 20.0))):
+        closed = np.exp(-10.0 * np.arange(5) / np.array([[time], [60.0]]))
+        np.testing.assert_allclose(autocovariance(spec, output), deviation**2 * closed[0], rtol=1e-9)
+        np.testing.assert_allclose(autocovariance(common, output), 0.01 * closed[1], rtol=1e-9)
+
+
+def test_without_a_correlation_time_it_is_white():
+    noise = parse_spec(LAG + ASKED + "noise: {standard_deviation: 0.2}\n").noise
+    assert (noise.variance, noise.C, noise.D) == (pytest.approx(0.04), (1.0,), (1.0,))
+
+
+def test_the_true_noise_of_a_study_is_stated_alike():
+    study = "simulation: {noise: {standard_deviation: 0.2, correlation_time: 30}}\n"
+    found = parse_spec(LAG + ASKED + FADES + study).simulation.noise
+    same = parse_spec(LAG + ASKED + "noise: {standard_deviation: 0.2, correlation_time: 30}\n").noise
+    assert (found.variance, found.D) == (same.variance, same.D)
+
+
+def test_the_spec_keeps_the_words_and_can_be_read_again():
+    spec = parse_spec(LAG + ASKED + FADES)
+    assert "correlation_time: 60" in spec.to_yaml()
+    assert "variance" not in spec.to_yaml()
+    assert parse_spec(spec.to_yaml()).noise == spec.noise
+    with pytest.raises(SpecError, match="stands beside standard_deviation"):
+        spec.with_(**{"noise.variance": 2.0})
+
+
+def test_data_are_judged_with_such_noise_and_with_more(tmp_path):
+    """Estimates, and noise that is estimated along, start from D as from one that is written out."""
+    rng, a = np.random.default_rng(3), np.exp(-1.0 / 6.0)
+    u, e, y = np.repeat(rng.choice([-1.0, 1.0], 60), 10), rng.standard_normal((2, 600)), np.zeros((3, 600))
+    for t in range(1, 600):
+        y[0, t] = np.exp(-1.0 / 6.0) * y[0, t - 1] + (1 - np.exp(-1.0 / 6.0)) * u[t - 1]
+        y[1, t] = a * y[1, t - 1] + 0.02 * e[0, t]
+        y[2, t] = 0.3 * y[2, t - 1] + 0.05 * e[1, t]
+    file = tmp_path / "log.csv"
+    np.savetxt(file, np.c_[u, y.sum(axis=0)], delimiter=",", header="u,y", comments="")
+    words = parse_spec(LAG + ASKED + FADES)
+    written = {"variance": words.noise.variance, "D": list(words.noise.D)}
+    found, same = (
+        questions.assess(spec, file).results.result["identification"]["theta"]
+        for spec in (words, words.with_(noise=written))
+    )
+    assert found == pytest.approx(same, rel=1e-6)
