@@ -1,7 +1,7 @@
 """The house: imports run one way, the spec becomes objects once, and contracts are complete."""
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -61,6 +61,18 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    return list(ast.walk(tree_of(path)))
+
+
+def calls(path: Path, *functions: str) -> Iterator[ast.Call]:
+    """The calls of functions by these plain names."""
+    for node in nodes(path):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in functions:
+            yield node
+
+
 def room_of(path: Path) -> str:
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
@@ -70,7 +82,7 @@ def imports(path: Path) -> list[tuple[str, str]]:
     """What a file imports, at its top or inside a function: modules, and the names taken from them."""
     package = ["inputdesign_cli", *path.relative_to(ROOT).parts[:-1]]
     found = []
-    for node in ast.walk(tree_of(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found += [(alias.name, "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -123,6 +135,7 @@ def module_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@cache
 def import_graph() -> dict[str, set[str]]:
     """Every module of the package -> those it imports, inside functions and for types alone included."""
     paths = {module_of(path): path for path in ROOT.rglob("*.py")}
@@ -200,10 +213,10 @@ def named_in(annotation: ast.expr | None) -> set[str]:
     return found
 
 
-def uses_of_the_spec(tree: ast.Module) -> list[str]:
+def uses_of_the_spec(nodes: Iterable[ast.AST]) -> list[str]:
     """Functions with a parameter that is a `Spec`, fields that are one, imports of it and of its module."""
     found = []
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             given = node.args
             every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
@@ -217,15 +230,18 @@ def uses_of_the_spec(tree: ast.Module) -> list[str]:
 
 
 def test_uses_of_the_spec_are_found():
-    assert uses_of_the_spec(ast.parse("def f(x: int, *, s: 'Spec | None' = None): ...")) == ["f"]
-    assert uses_of_the_spec(ast.parse("class A:\n    spec: models.Spec")) == ["spec"]
-    assert uses_of_the_spec(ast.parse("from specification import Spec")) == ["import"]
-    assert uses_of_the_spec(ast.parse("def f(specific: Specific) -> Spec: ...")) == []
+    for source, found in (
+        ("def f(x: int, *, s: 'Spec | None' = None): ...", ["f"]),
+        ("class A:\n    spec: models.Spec", ["spec"]),
+        ("from specification import Spec", ["import"]),
+        ("def f(specific: Specific) -> Spec: ...", []),
+    ):
+        assert uses_of_the_spec(ast.walk(ast.parse(source))) == found
 
 
 def test_the_spec_becomes_objects_once():
     """After the builders nothing takes a spec: it holds what they made of it."""
-    assert offenders(lambda path: not knows_the_spec(path) and uses_of_the_spec(tree_of(path))) == {}
+    assert offenders(lambda path: not knows_the_spec(path) and uses_of_the_spec(nodes(path))) == {}
 
 
 # What says that a contract is incomplete, counted over the package. The numbers may fall, never rise.
@@ -236,34 +252,16 @@ MOST_IGNORED = 1
 @cache
 def own_kinds() -> set[str]:
     """The names of all classes of the package."""
-    trees = map(tree_of, FILES)
-    return {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
-
-
-def questions(tree: ast.AST, kinds: set[str]) -> Iterator[str]:
-    """`isinstance` and `issubclass` of our own kinds."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            asks = node.func.id in ("isinstance", "issubclass")
-            if asks and named_in(node.args[1]) & kinds:
-                yield ast.unparse(node)
-
-
-def computed_names(tree: ast.AST) -> Iterator[str]:
-    """`getattr`, `setattr` and `hasattr` of a name that is not written out."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            by_name = node.func.id in ("getattr", "setattr", "hasattr")
-            if by_name and not isinstance(node.args[1], ast.Constant):
-                yield ast.unparse(node)
+    return {node.name for path in FILES for node in nodes(path) if isinstance(node, ast.ClassDef)}
 
 
 def test_kinds_are_hardly_asked_for():
-    kinds = own_kinds()
+    """`isinstance` and `issubclass` of our own kinds."""
     found = [
-        f"{path.relative_to(ROOT)}: {question}"
+        f"{path.relative_to(ROOT)}: {ast.unparse(call)}"
         for path in FILES
-        for question in questions(tree_of(path), kinds)
+        for call in calls(path, "isinstance", "issubclass")
+        if named_in(call.args[1]) & own_kinds()
     ]
     assert len(found) <= MOST_QUESTIONS, "\n".join(found)
 
@@ -272,7 +270,7 @@ def test_only_builders_match_kinds():
     """`case Kind():` belongs where a section of the spec becomes an object, and nowhere after."""
 
     def matched(path: Path) -> list[str]:
-        patterns = (n for n in ast.walk(tree_of(path)) if isinstance(n, ast.MatchClass))
+        patterns = (n for n in nodes(path) if isinstance(n, ast.MatchClass))
         return [ast.unparse(pattern) for pattern in patterns if named_in(pattern.cls) & own_kinds()]
 
     assert [name for name in offenders(matched) if not builds(ROOT / name)] == []
@@ -280,8 +278,14 @@ def test_only_builders_match_kinds():
 
 def test_no_attribute_goes_by_a_computed_name():
     """But for the command line and the models of the spec (and the package itself, which imports lazily)."""
-    found = offenders(lambda path: list(computed_names(tree_of(path))))
-    assert [name for name in found if not name.startswith(("cli/", "specification/models/"))] == []
+
+    def computed(path: Path) -> list[str]:
+        by_name = calls(path, "getattr", "setattr", "hasattr")
+        return [ast.unparse(call) for call in by_name if not isinstance(call.args[1], ast.Constant)]
+
+    assert [
+        name for name in offenders(computed) if not name.startswith(("cli/", "specification/models/"))
+    ] == []
 
 
 def test_types_are_hardly_ignored():
@@ -307,11 +311,8 @@ def test_only_one_file_calls_the_solver():
 
 
 def test_only_the_command_line_prints():
-    def prints(path: Path) -> bool:
-        calls = (node.func for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call))
-        return any(isinstance(func, ast.Name) and func.id == "print" for func in calls)
-
-    assert [name for name in offenders(prints) if not name.startswith("cli/")] == []
+    found = offenders(lambda path: list(calls(path, "print")))
+    assert [name for name in found if not name.startswith("cli/")] == []
 
 
 def test_nobody_uses_pyplot():

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
+from collections.abc import Iterable
 
 import pytest
 
-import inputdesign_cli
 from inputdesign_cli.error_codes import explanation, explanations
 from inputdesign_cli.errors import SpecError
 from tests.support.wording import long_sentences, unclear_words
+from tests.test_architecture import FILES, ROOT, nodes, offenders, room_of
 
-PACKAGE = Path(inputdesign_cli.__file__).parent
 MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "PathDiagnostic", "stop", "_error", "because"}
 CODE = re.compile(r"[a-z]+(-[a-z]+)*")
 
 
-def codes_in(source: str) -> set[str]:
+def codes_in(nodes: Iterable[ast.AST]) -> set[str]:
     """The string literals that stand for a code: in calls that make diagnostics, and first of the three
     texts that a function returns as code, message and hint."""
     found = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes:
         if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and len(node.value.elts) == 3:
             first = node.value.elts[0]
             found |= {first.value} if isinstance(first, ast.Constant) and "-" in str(first.value) else set()
@@ -40,31 +39,19 @@ def codes_in(source: str) -> set[str]:
 
 
 def test_the_scan_finds_codes():
-    assert codes_in(
-        "raise bad_spec('a-b', 'm')\nx.complain('c', 'm')\nDiagnostic(code='d-e', message='')"
-    ) == {"a-b", "c", "d-e"}
-    everything = set().union(*(codes_in(p.read_text()) for p in (PACKAGE / "specification").rglob("*.py")))
-    assert {
-        "unknown-key",
-        "unstable-polynomial",
-        "duplicate-key",
-        "file-missing",
-        "needs-limits",
-    } <= everything
+    source = "raise bad_spec('a-b', 'm')\nx.complain('c', 'm')\nDiagnostic(code='d-e', message='')"
+    assert codes_in(ast.walk(ast.parse(source))) == {"a-b", "c", "d-e"}
+    everything = set().union(*(codes_in(nodes(p)) for p in FILES if room_of(p) == "specification"))
+    known = {"unknown-key", "unstable-polynomial", "duplicate-key", "file-missing", "needs-limits"}
+    assert known <= everything
 
 
 def test_every_code_is_explained():
-    missing = {
-        (code, path.relative_to(PACKAGE).as_posix())
-        for path in PACKAGE.rglob("*.py")
-        for code in codes_in(path.read_text(encoding="utf-8"))
-        if code not in explanations()
-    }
-    assert not missing
+    assert offenders(lambda path: codes_in(nodes(path)) - explanations().keys()) == {}
 
 
 def test_no_code_is_explained_in_vain():
-    source = "\n".join(p.read_text() for p in PACKAGE.rglob("*.py"))
+    source = "\n".join(p.read_text() for p in FILES)
     source += 'unknown-code"'
     assert [code for code in explanations() if f'{code}"' not in source] == []
 
@@ -82,7 +69,7 @@ def test_explanations_are_complete():
 
 def test_no_code_is_explained_twice():
     # A YAML reader keeps the last of two equal keys and says nothing.
-    lines = (PACKAGE / "error_codes.yaml").read_text(encoding="utf-8").splitlines()
+    lines = (ROOT / "error_codes.yaml").read_text(encoding="utf-8").splitlines()
     stated = [line.removesuffix(":") for line in lines if CODE.match(line)]
     assert stated == list(explanations())
 

@@ -24,9 +24,9 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 from inputdesign_cli.spectrum import FirBasis, FlatBasis, LinesBasis
+from tests.support.convex_designs import around, moved
 from tests.support.plants import arrays, arx, box_jenkins, paper_experiment, two_by_two
 from tests.support.random_plants import random_case
-from tests.support.scenarios import around, moved
 
 W = np.array([0.1, 0.9, 2.2])
 

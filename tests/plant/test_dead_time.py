@@ -1,15 +1,12 @@
 """Plants in s behind a hold: dead times, gradients, integrators, loops."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.identification import identify
-from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import (
     ContinuousModel,
     Loop,
@@ -22,28 +19,16 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.plant.held import HeldEntry, Intersample
 from inputdesign_cli.spectrum import FirBasis
-from tests.support.plants import arrays, descending
+from tests.support.plants import descending, known, lag_of, late_entries
+from tests.support.records import check_estimate, check_record
 
 W = np.array([0.05, 0.4, 1.3, 2.9])
 STEP = 0.5
 DELAYS = [0.0, 0.1, 0.37, 0.5, 1.0, 2.24]
 
 
-def late(tau, numerator=(2.0, 1.0), denominator=(1.0, 0.7, 1.3)) -> ContinuousModel:
-    entries = (descending([[list(numerator)]]), descending([[list(denominator)]]))
-    return ContinuousModel.monic(*entries, np.eye(1), delay=((np.array([tau]),),))
-
-
-def matrix(common=False) -> ContinuousModel:
-    """Two by two, one entry without dead time, one of higher order, one biproper."""
-    delays = [[[0.8], [0.8]]] * 2 if common else [[[0.8], [1.3]], [[], [1.0]]]
-    return ContinuousModel.monic(
-        descending([[[1.0], [2.0, 0.5]], [[-0.7, 0.2], [1.2]]]),
-        descending([[[1.0, 0.5], [1.0, 0.4]], [[1.0, 0.7, 1.3], [1.0, 0.9]]]),
-        np.eye(2),
-        delay=arrays(delays),
-        common_delay=common,
-    )
+def late(tau, numerator=(2.0, 1.0), denominator=(1.0, 0.7, 1.3)):
+    return lag_of(numerator, denominator, tau)
 
 
 def fine_step(model, u, steps=1000):
@@ -63,7 +48,7 @@ def test_the_sampled_plant_is_that_of_a_fine_step_simulation(tau):
     np.testing.assert_allclose(y[:, 0], fine_step(model, u[:, 0]), atol=1e-8)
 
 
-@pytest.mark.parametrize("model", [late(0.37), late(1.0), matrix(), matrix(common=True)])
+@pytest.mark.parametrize("model", [late(0.37), late(1.0), late_entries(), late_entries(common=True)])
 def test_realisation_and_response_are_one_plant(model):
     sampled, z = SampledModel(model, STEP), np.exp(1j * W)
     A, B, C, D = sampled.realisation
@@ -78,27 +63,6 @@ def test_numerator_and_denominator_in_q_are_those_of_the_response(tau):
     np.testing.assert_allclose(SampledModel(late(tau), STEP).plant_at(W)[:, 0, 0], expected, atol=1e-12)
 
 
-def extrapolated(f, x, step):
-    """f'(x) from values on the right alone, by Richardson's extrapolation to fourth order."""
-    once = [(f(x + step / 2**i) - f(x)) / (step / 2**i) for i in range(4)]
-    for order in range(1, 4):
-        once = [(2**order * b - a) / (2**order - 1) for a, b in pairwise(once)]
-    return once[0]
-
-
-@pytest.mark.parametrize(
-    "model",
-    [*(SampledModel(late(tau), STEP) for tau in DELAYS), SampledModel(matrix(), STEP), late(0.37), matrix()],
-)
-def test_gradients_are_differences(model):
-    """Towards longer dead times, which at the boundary of a sample is the side that is promised."""
-    theta, exact = model.theta, model.plant_gradient(W)
-    for k in range(theta.size):
-        unit = np.eye(theta.size)[k]
-        slope = extrapolated(lambda x, unit=unit: model.at(theta + x * unit).plant_at(W), 0.0, 2e-3)
-        np.testing.assert_allclose(exact[:, k], slope, atol=1e-8 * max(1.0, np.abs(exact[:, k]).max()))
-
-
 def test_the_gradient_has_two_sides_at_a_boundary():
     """Relative degree one: b e^(-at) jumps at t = 0, so that the sides differ by the first sample."""
     first = lambda tau: SampledModel(late(tau, (2.0,), (1.0, 0.7)), STEP)  # noqa: E731
@@ -106,12 +70,6 @@ def test_the_gradient_has_two_sides_at_a_boundary():
     left = first(1.0 - 1e-7).plant_gradient(W)[:, -1, 0, 0]
     q = np.exp(-1j * W)
     np.testing.assert_allclose(left - right, 2.0 * (q - 1.0) * q**2, atol=1e-6)
-
-
-def test_names_are_those_of_entries():
-    assert matrix().names[-3:] == ("delay[1,1]", "delay[1,2]", "delay[2,2]")
-    assert matrix(common=True).names[-1] == "delay"
-    assert late(0.3).names == ("b0", "b1", "a0", "a1", "delay")
 
 
 @pytest.mark.parametrize("hold", [True, False])
@@ -148,11 +106,8 @@ H = 0.5
 DOWN = np.concatenate([np.geomspace(1e-6, 0.1, 30), np.linspace(0.1, np.pi, 40)])
 
 
-def plant_of(numerator, denominator, delay=()):
-    plant = ContinuousModel.monic(
-        descending([[numerator]]), descending([[denominator]]), np.eye(1), delay=delay
-    )
-    return SampledModel(plant, H)
+def plant_of(numerator, denominator, *delay, variance=1.0):
+    return SampledModel(lag_of(numerator, denominator, *delay, variance=variance), H)
 
 
 def lagging_tank(b, a, z):
@@ -197,23 +152,19 @@ def test_double_integrator_and_dead_time():
     np.testing.assert_allclose(
         plant_of([1.0], [1, 0, 0]).plant_at(DOWN)[:, 0, 0], H**2 / 2 * (z + 1) / (z - 1) ** 2, rtol=1e-9
     )
-    late = plant_of([1.0], [1, 0], ((np.array([0.7]),),))  # one sample and 0.2
+    late = plant_of([1.0], [1, 0], 0.7)  # one sample and 0.2
     np.testing.assert_allclose(late.plant_at(DOWN)[:, 0, 0], (0.3 / z + 0.2 / z**2) / (z - 1), rtol=1e-9)
     np.testing.assert_allclose(
         late.plant_gradient(DOWN)[:, -1, 0, 0], (1 / z**2 - 1 / z) / (z - 1), rtol=1e-9
     )
 
 
-def known_pole(model, name):
-    return Reparametrised(model, Parametrisation.identity(model.names, model.theta, [name]))
-
-
 def pair(controller, below):
     """b / s and b1 q^-1 / (1 - q^-1) with b1 = b H, in one loop; the poles are known."""
     C = TransferMatrix.build([[controller]], [[below]])
     models = (
-        known_pole(plant_of([0.4], [1, 0]), "a0"),
-        known_pole(PolynomialModel.single([0, 0.4 * H], F=[1, -1]), "f1"),
+        known(plant_of([0.4], [1, 0]), "a0"),
+        known(PolynomialModel.single([0, 0.4 * H], F=[1, -1]), "f1"),
     )
     return [Experiment(model, 7, loop=close_loop(model, C)) for model in models]
 
@@ -278,36 +229,19 @@ def test_samples_drive_an_integrator_as_a_sum(hold):
 
 
 def test_the_gradient_of_a_record_is_that_of_differences():
-    model, record = plant_of([0.3], [1, 0.8, 0]), np.random.default_rng(2).standard_normal((300, 1))
-    e = np.zeros((300, 1))
-
-    def caused(moved):
-        return model.at(moved).simulate(record, e, 1.0)[0]
-
-    step = 1e-6 * np.eye(3)[[0, 2]]
-    expected = [(caused(model.theta + d) - caused(model.theta - d)) / 2e-6 for d in step]
-    psi = FiniteRecord(Experiment(model, 300), 300).gradient(record)[:, [0, 2], 0]
-    np.testing.assert_allclose(psi, np.concatenate(expected, axis=1), atol=1e-6 * np.abs(psi).max())
+    check_record(known(plant_of([0.3], [1, 0.8, 0]), "a0"), 300)
 
 
 def test_estimates_hold_the_integrator():
-    """Within four standard deviations; the pole stays where it is known to be."""
-    plant = ContinuousModel.monic(descending([[[0.3]]]), descending([[[1, 0.8, 0]]]), 0.01 * np.eye(1))
-    rng = np.random.default_rng(3)
-    for truth in (SampledModel(plant, H), PolynomialModel.single([0, 0.2], F=[1, -1.6, 0.6], variance=0.01)):
-        model = known(truth)
-        u = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
-        y = sum(truth.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
-        found = identify(model, u, y, start=0.8 * model.theta)
-        assert found.search.converged
-        assert np.all(np.abs(found.theta - model.theta) < 4 * np.sqrt(np.diag(found.covariance)))
-
-
-def known(model) -> Reparametrised:
     """a0 of a plant in s is known, and f1 + f2 = -1 of one in q^-1."""
-    if model.names == ("b0", "a0", "a1"):
-        return known_pole(model, "a0")
-    terms = tuple(map(Expression, ("b", "-1 - p", "p")))
-    return Reparametrised(
-        model, Parametrisation(("b", "p"), ("b", "p"), model.theta[[0, 2]], np.ones(2, dtype=bool), terms)
-    )
+    polynomial = PolynomialModel.single([0, 0.2], F=[1, -1.6, 0.6], variance=0.01)
+    terms, b_and_p = tuple(map(Expression, ("b", "-1 - p", "p"))), polynomial.theta[[0, 2]]
+    summed = Parametrisation(("b", "p"), ("b", "p"), b_and_p, np.ones(2, dtype=bool), terms)
+    rng = np.random.default_rng(3)
+    for model in (
+        known(plant_of([0.3], [1, 0.8, 0], variance=0.01), "a0"),
+        Reparametrised(polynomial, summed),
+    ):
+        u = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
+        y = sum(model.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
+        check_estimate(model, u, y, 0.8 * model.theta)

@@ -6,11 +6,9 @@ import scipy.linalg
 import scipy.signal
 
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import (
-    ContinuousModel,
     Matrices,
     Parametrisation,
     Reparametrised,
@@ -21,7 +19,8 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
-from tests.support.plants import descending
+from tests.support.plants import lag_of
+from tests.support.records import check_estimate, check_record
 
 H = 0.3
 W = np.linspace(0.05, 3.1, 25)
@@ -121,18 +120,19 @@ def simulated(found, r, e):
     return y, u
 
 
-def predicted(found, y, u):
-    """The one-step prediction, sample by sample."""
-    Ad, early, late = found.held
-    m, x, out = found.matrices, np.zeros(2), np.zeros_like(y)
+def predicted(models, y, u):
+    """(t, m, p): the one-step predictions of models with the same lags, sample by sample."""
+    Ad, early, late = (np.stack(parts) for parts in zip(*(one.held for one in models), strict=True))
+    C, D, K = (np.stack([getattr(one.matrices, letter) for one in models]) for letter in "CDK")
+    lag, direct_lag = models[0].lag, models[0].direct_lag
+    x, out = np.zeros((len(models), 2)), np.zeros((len(y), len(models), 2))
     for t in range(len(y)):
-        out[t] = m.C @ x + m.D @ past(u, t, found.direct_lag)
-        held = early @ past(u, t, found.lag) + late @ past(u, t, found.lag + 1)
-        x = Ad @ x + held + m.K @ (y[t] - out[t])
+        out[t] = np.einsum("mij,mj->mi", C, x) + D @ past(u, t, direct_lag)
+        held = early @ past(u, t, lag) + late @ past(u, t, lag + 1)
+        x = np.einsum("mij,mj->mi", Ad, x) + held + np.einsum("mij,mj->mi", K, y[t] - out[t])
     return out
 
 
-@pytest.mark.first(1)
 @pytest.mark.parametrize("unstable", [False, True])
 def test_the_loop_is_that_of_the_equations(unstable):
     """Information by impulses and differences of the predictor; with an unstable plant, too."""
@@ -144,7 +144,8 @@ def test_the_loop_is_that_of_the_equations(unstable):
     loop = close_loop(found, CONTROLLER)
     loop.check_stability()
     check_signals(loop, simulated)
-    parts = []
+    parts, steps = [], 1e-6 * np.eye(found.theta.size)
+    moved = [found.at(found.theta + sign * step) for sign in (1, -1) for step in steps]
     for source in "re":
         columns = []
         for k in (0, 1):
@@ -152,13 +153,8 @@ def test_the_loop_is_that_of_the_equations(unstable):
             (r if source == "r" else e)[0, k] = 1.0
             y, u = simulated(found, r, e)
             assert np.abs(y[-5:]).max() < 1e-7
-            step = 1e-6
-            moved = [
-                (predicted(found.at(found.theta + d), y, u) - predicted(found.at(found.theta - d), y, u))
-                / (2 * step)
-                for d in step * np.eye(found.theta.size)
-            ]
-            columns.append(np.stack(moved, axis=1))
+            up, down = np.split(predicted(moved, y, u), 2, axis=1)
+            columns.append((up - down) / 2e-6)
         parts.append(np.stack(columns, axis=-1))
     check_information(Experiment(found, 7, loop=loop), *parts)
 
@@ -166,14 +162,9 @@ def test_the_loop_is_that_of_the_equations(unstable):
 def test_records():
     """psi by differences of the prediction errors, which at the truth are the noise; by frequency as well."""
     found, rng = model(), np.random.default_rng(0)
+    check_record(found, 150)
     u, e = rng.standard_normal((2, 150, 2))
-    y = sum(found.simulate(u, e, 1.0))
     kind = estimator(found, 1.0)
-    errors, psi = kind.errors_and_gradient(found.theta, u, y)
-    np.testing.assert_allclose(errors, e, atol=1e-10)
-    for k, step in enumerate(1e-6 * np.eye(found.theta.size)):
-        up, down = (kind.errors_and_gradient(found.theta + s * step, u, y)[0] for s in (1, -1))
-        np.testing.assert_allclose(psi[k], (down - up) / 2e-6, atol=1e-6 * max(np.abs(psi[k]).max(), 1.0))
     calm = found.simulate(u, 0 * e, 1.0)[0]
     whitener = np.linalg.inv(np.linalg.cholesky(COVARIANCE))
     by_frequency = FiniteRecord(Experiment(found, 150), 150).gradient(u)
@@ -200,7 +191,7 @@ def test_a_motor_is_its_transfer_function():
     """The same position by states and by k / (s (s + a)): one information, in J and K, in a loop."""
     states = motor(known=("R",))
     b, a = 0.3 / (1.5 * 0.02), (0.01 + 0.3**2 / 1.5) / 0.02
-    plant = ContinuousModel.monic(descending([[[b]]]), descending([[[1, a, 0]]]), 1e-4 * np.eye(1))
+    plant = lag_of([b], [1, a, 0], variance=1e-4)
     terms = (Expression("K/(1.5*J)"), Expression("0*J"), Expression("(0.01 + K**2/1.5)/J"))
     transfer = Reparametrised(
         SampledModel(plant, 0.05),
@@ -221,10 +212,7 @@ def test_estimates_of_physical_parameters():
     truth, rng = motor(known=("J",)), np.random.default_rng(4)
     u = np.repeat(rng.choice([-1.0, 1.0], (150, 1)), 4, axis=0)
     y = sum(truth.simulate(u, 0.01 * rng.standard_normal((600, 1)), 1.0))
-    found = identify(truth.at(1.4 * truth.theta), u, y)
-    assert found.names == ("R", "K")
-    assert found.search.converged
-    assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+    assert check_estimate(truth, u, y, 1.4 * truth.theta).names == ("R", "K")
 
 
 @pytest.mark.slow
@@ -239,7 +227,4 @@ def test_an_estimate_with_a_gain_is_as_good_as_its_covariance():
     u = np.repeat(rng.choice([-1.0, 1.0], (300, 2)), 3, axis=0)
     e = rng.standard_normal((900, 2)) @ np.linalg.cholesky(0.01 * COVARIANCE).T
     y = sum(truth.simulate(u, e, 1.0))
-    found = identify(truth.at(0.7 * truth.theta), u, y + 3.0)
-    assert found.search.converged
-    assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
-    assert found.tests.failed == ()
+    assert check_estimate(truth, u, y + 3.0, 0.7 * truth.theta).tests.failed == ()

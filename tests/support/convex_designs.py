@@ -1,4 +1,4 @@
-"""Convex designs for tests, and what holds of every one of them."""
+"""Convex designs for tests, also for several plants, and what holds of every one of them."""
 
 import dataclasses
 
@@ -6,56 +6,107 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, ModelError, Relative
 from inputdesign_cli.design.convex.designs import solve_design
-from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant import PolynomialModel, close_loop
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
-GRID = np.unique(np.concatenate([np.linspace(0.0, np.pi, 4001), np.geomspace(1e-4, np.pi, 4001)]))
+BAND = (0.0, np.pi)
+DENSE = np.unique(np.concatenate([np.linspace(*BAND, 8001), np.geomspace(1e-5, np.pi, 8001)]))
 ORDER = 8
 
 
-def solve(experiment, goal="cost", requirements=(), order=ORDER, **more):
+def asked(experiment, goal="cost", requirements=(), order=ORDER, **more):
+    """A question about FIR spectra of one input; without another cost the power of the input is paid."""
     basis = more.pop("basis", FirBasis(1, order))
     if goal == "cost":
         more.setdefault("cost", {"input": 1.0})
-    question = Question(experiment, basis, goal, list(requirements), **more)
-    return solve_design(question, tolerance=1e-7)
+    return Question(experiment, basis, goal, list(requirements), **more)
 
 
-def model_error(experiment, fraction, alpha, kind=ModelError):
-    """The error of G of one input and output, relative to |G|, at every frequency."""
-    admissible = Relative(experiment.model, fraction, (0, 0))
-    return kind(experiment=experiment, band=(0.0, np.pi), entry=(0, 0), admissible=admissible, alpha=alpha)
+def solve(*args, tolerance=1e-7, **more):
+    return solve_design(asked(*args, **more), tolerance=tolerance)
 
 
-def relative(fraction=0.01, alpha=2.45):
-    return [lambda e: model_error(e, fraction, alpha)]
+def relative(fraction=0.01, alpha=2.45, band=BAND, kind=ModelError):
+    """The maker of a bound on the error of G, relative to the |G| of the plant that it is made for."""
+
+    def make(experiment):
+        admissible = Relative(experiment.model, fraction, (0, 0))
+        return kind(experiment=experiment, band=band, entry=(0, 0), admissible=admissible, alpha=alpha)
+
+    return [make]
 
 
 def anywhere():
-    return LinesBasis.anywhere(0.0, np.pi, 1)
+    return LinesBasis.anywhere(*BAND, 1)
 
 
 def criterion(letter):
     return [lambda e: Criterion(letter, e.factor)]
 
 
+def moved(experiment, theta):
+    """The same experiment on another plant of the structure, its loop closed by the same controller."""
+    model, loop = experiment.model.at(theta), experiment.loop
+    return dataclasses.replace(experiment, model=model, loop=loop and close_loop(model, loop.controller))
+
+
+def alternatives(experiment, thetas, fraction):
+    """One scenario for each theta (k,), the accuracy relative to its own G."""
+    return [Alternative(moved(experiment, theta), relative(fraction)) for theta in thetas]
+
+
+def around(experiment, number, spread, seed=0):
+    """Parameters scattered around the nominal ones, by this share of each."""
+    theta = experiment.model.theta
+    rng = np.random.default_rng(seed)
+    return [theta * (1.0 + spread * rng.standard_normal(theta.size)) for _ in range(number)]
+
+
+def random_spectra(rng, order, number):
+    """Coefficients of the spectra of random moving averages."""
+    for _ in range(number):
+        taps = rng.normal(size=order + 1)
+        yield np.correlate(taps, taps, mode="full")[order:]
+
+
+def meets(requirements, information, most=1.0):
+    """Whether all hold at every frequency of a dense grid."""
+    for requirement in requirements:
+        low, high = getattr(requirement, "band", BAND)
+        w = DENSE[(low <= DENSE) & (high >= DENSE)]
+        assert requirement.ratios(information, w).max() <= most * (1 + 1e-6), requirement.name
+
+
 def check(design, tolerance=1e-6):
-    """Proof, limits and requirements of a design, recomputed on a dense grid."""
-    result, problem = design.result, design.problem
+    """Proof, limits and requirements of a design of one input, recomputed on a dense grid."""
+    result, problem, anything = design.result, design.problem, design.any_spectrum
+    if design.white_power == 0.0:
+        assert problem.demands.worst_ratio(problem.baselines).ratio <= 1.0
+        return
     assert result.certificate.bound <= result.objective * (1 + 1e-9)
     assert result.gap <= tolerance
-    assert design.any_spectrum.certificate.bound <= result.objective * (1 + 1e-9)
+    assert anything.certificate.bound <= result.objective * (1 + 1e-9)
     basis, x = result.basis, result.x
     for limit in problem.limits:
         power = dataclasses.replace(problem, basis=basis, finer=None).power(limit.kind).at(x)
         assert power <= limit.bound * (1 + 1e-9) if limit.upper else power >= limit.bound * (1 - 1e-9)
+    if problem.goal == "cost":
+        assert result.objective <= problem.price.at(design.white_power * problem.basis.even) * (1 + 1e-9)
+        # The bound over every spectrum against the cost of a spectrum of sinusoids that meets the accuracy.
+        assert anything.certificate.bound >= anything.objective * (1 - 1e-4)
+        for scenario, *told in zip(
+            problem.scenarios, result.informations, anything.informations, strict=True
+        ):
+            for information in told:
+                meets(scenario.requirements, information)
+    meets(problem.side, result.information)
     if isinstance(basis, FirBasis) and basis.inputs == 1:
-        phi = basis.density(x, GRID)
-        assert phi.min() >= -1e-9 * phi.max()
+        phi = basis.density(x, DENSE)
+        assert phi.min() >= -1e-6 * phi.max()
         for density in problem.densities:
-            level = density.level(GRID)
+            level = density.level(DENSE)
             assert np.all(phi <= level * (1 + 1e-6)) if density.upper else np.all(phi >= level * (1 - 1e-6))
 
 

@@ -1,18 +1,11 @@
 """Models of one channel of every kind with parameters, and data from them."""
 
-import numpy as np
-import scipy.signal
+from functools import partial
 
 from inputdesign_cli.plant import PolynomialModel
-from tests.support.plants import arrays
+from tests.support.records import simulated
 
-
-def one_channel(B, A=(1,), C=(1,), D=(1,), F=(1,), variance=0.5):
-    """A model with one input and one output."""
-    (A, C, D), covariance = arrays([[A, C, D]])[0], np.array([[variance]])
-    return PolynomialModel(arrays([[B]]), (A,), arrays([[F]]), (C,), (D,), covariance)
-
-
+one_channel = partial(PolynomialModel.single, variance=0.5)
 SYSTEMS = {
     "arx": one_channel([0, 1.0, 0.5], A=[1, -1.5, 0.7]),
     "armax": one_channel([0, 1.0, 0.5], A=[1, -1.5, 0.7], C=[1, 0.6]),
@@ -24,11 +17,5 @@ SYSTEMS = {
 
 
 def data(name, samples, rng, runs=1):
-    """u, y (runs, samples, 1) with unit white input and noise of variance 0.5."""
-    model = SYSTEMS[name]
-    A, C, D = model.A[0], model.C[0], model.D[0]
-    u = rng.standard_normal((runs, samples))
-    e = np.sqrt(0.5) * rng.standard_normal((runs, samples))
-    y = scipy.signal.lfilter(model.B[0][0], np.convolve(A, model.F[0][0]), u)
-    y += scipy.signal.lfilter(C, np.convolve(A, D), e)
-    return u[..., None], y[..., None]
+    """u, y (runs, samples, 1) with unit white input."""
+    return simulated(SYSTEMS[name], samples, rng, runs)

@@ -32,6 +32,18 @@ def matrix_plant(*, B, covariance, A=((1.0,),), F=None, C=((1.0,),), D=((1.0,),)
     return MatrixPlant(B=B, A=A, F=F, C=C, D=D, covariance=np.asarray(covariance, dtype=float))
 
 
+def full_plant():
+    """Every polynomial has parameters; two outputs, two inputs."""
+    return matrix_plant(
+        A=[[1, -0.5], [1, 0.3, 0.1]],
+        B=[[[0, 1.0, 0.2], [0, 0.1]], [[0, 0, 0.3], [0, 1.5]]],
+        F=[[[1, -0.2], [1]], [[1, 0.1, 0.2], [1, 0.4]]],
+        C=[[1, 0.3], [1]],
+        D=[[1], [1, -0.6]],
+        covariance=[[1.0, 0.2], [0.2, 0.5]],
+    )
+
+
 def random_complex(rng, *shape):
     return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
 

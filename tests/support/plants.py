@@ -1,9 +1,10 @@
-"""Plants with several channels that the tests share."""
+"""Plants that the tests share."""
 
 import numpy as np
 
+from inputdesign_cli.expressions import Expression
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import ContinuousModel, PolynomialModel
+from inputdesign_cli.plant import ContinuousModel, Parametrisation, PolynomialModel, Reparametrised
 
 
 def arrays(rows):
@@ -12,6 +13,42 @@ def arrays(rows):
 
 def descending(rows):
     return arrays([[entry[::-1] for entry in row] for row in rows])
+
+
+def lag_of(numerator, denominator, *delay, variance=1.0) -> ContinuousModel:
+    """A plant of one channel from descending powers of s, perhaps with a dead time."""
+    entries = descending([[list(numerator)]]), descending([[list(denominator)]])
+    late = ((np.array(delay),),) if delay else ()
+    return ContinuousModel.monic(*entries, variance * np.eye(1), delay=late)
+
+
+def late_entries(common=False) -> ContinuousModel:
+    """Two by two, one entry without dead time (unless they are common), one of higher order, one biproper."""
+    delays = [[[0.8], [0.8]]] * 2 if common else [[[0.8], [1.3]], [[], [1.0]]]
+    return ContinuousModel.monic(
+        descending([[[1.0], [2.0, 0.5]], [[-0.7, 0.2], [1.2]]]),
+        descending([[[1.0, 0.5], [1.0, 0.4]], [[1.0, 0.7, 1.3], [1.0, 0.9]]]),
+        np.eye(2),
+        delay=arrays(delays),
+        common_delay=common,
+    )
+
+
+def known(model, *names) -> Reparametrised:
+    """The model with these parameters known."""
+    return Reparametrised(model, Parametrisation.identity(model.names, model.theta, names))
+
+
+def process() -> ContinuousModel:
+    """K e^(-Ls) / (Ts + 1) with L one fifth of T."""
+    return lag_of([2.0], [3.3, 1.0], 3.3 / 5)
+
+
+def in_words(model) -> Reparametrised:
+    """It in K and T."""
+    terms = tuple(map(Expression.of, ("K/T", "1/T", "T/5")))
+    at = Parametrisation(("K", "T"), ("K", "T"), np.array([2.0, 3.3]), np.ones(2, dtype=bool), terms)
+    return Reparametrised(model, at)
 
 
 def two_by_two() -> ContinuousModel:

@@ -1,7 +1,10 @@
-"""Simulated records of plants with several channels."""
+"""Simulated records, and what estimates from them must be."""
 
 import numpy as np
 import scipy.signal
+
+from inputdesign_cli.identification import identify
+from inputdesign_cli.identification.estimators import estimator
 
 
 def simulated(model, samples, rng, runs=1, power=1.0):
@@ -21,3 +24,23 @@ def simulated(model, samples, rng, runs=1, power=1.0):
 def shifted(x, lag):
     """x(t - lag), zero before the record."""
     return np.concatenate([np.zeros(lag), x[: x.size - lag]])
+
+
+def check_record(model, samples):
+    """psi of a record with noise by differences of its errors, which at the truth are the noise itself."""
+    rng = np.random.default_rng(3)
+    u, e = rng.standard_normal((samples, model.inputs)), rng.standard_normal((samples, model.outputs))
+    kind, y = estimator(model, 1.0), sum(model.simulate(u, e, 1.0))
+    errors, psi = kind.errors_and_gradient(model.theta, u, y)
+    np.testing.assert_allclose(errors, e, atol=1e-9)
+    for k, step in enumerate(1e-6 * np.eye(model.theta.size)):
+        up, down = (kind.errors_and_gradient(model.theta + s * step, u, y)[0] for s in (1, -1))
+        np.testing.assert_allclose(psi[k], (down - up) / 2e-6, atol=1e-6 * max(np.abs(psi[k]).max(), 1.0))
+
+
+def check_estimate(model, u, y, start, **options):
+    """The estimate of a model from u (n, r) and y (n, p), within four standard deviations of the truth."""
+    found = identify(model, u, y, start=start, **options)
+    assert found.search.converged
+    assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+    return found

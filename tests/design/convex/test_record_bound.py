@@ -63,7 +63,7 @@ PLANTS = [
 
 @pytest.mark.parametrize(("plant", "accuracy"), PLANTS)
 def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
-    samples = 10
+    samples = 8
     design = designed(plant, samples, accuracy)
     bound = bound_over_records(design.problem, design.any_spectrum, samples, windows=8)
     goal = worst_of(design, samples)

@@ -12,42 +12,11 @@ from tests.support.loop_error import column, matrix_plant, random_hermitian, ran
 W = np.array([0.05, 0.4, 1.3, 2.8])
 
 
-def full_plant():
-    """Every polynomial has parameters; two outputs, two inputs."""
-    return matrix_plant(
-        A=[[1, -0.5], [1, 0.3, 0.1]],
-        B=[[[0, 1.0, 0.2], [0, 0.1]], [[0, 0, 0.3], [0, 1.5]]],
-        F=[[[1, -0.2], [1]], [[1, 0.1, 0.2], [1, 0.4]]],
-        C=[[1, 0.3], [1]],
-        D=[[1], [1, -0.6]],
-        covariance=[[1.0, 0.2], [0.2, 0.5]],
-    )
-
-
 def moved(plant, index, step):
     """The plant with one parameter changed."""
     theta = plant.theta.copy()
     theta[index] += step
     return plant.at(theta)
-
-
-@pytest.mark.parametrize("plant", [full_plant(), column().plant], ids=["all polynomials", "column"])
-def test_gradients_are_those_of_finite_differences(plant):
-    dG, dH = plant.plant_gradient(W), plant.noise_at(W)[:, None] @ plant.noise_gradient(W)
-    step = 1e-6
-    for k in range(plant.theta.size):
-        up, down = moved(plant, k, step), moved(plant, k, -step)
-        np.testing.assert_allclose(
-            dG[:, k], (up.plant_at(W) - down.plant_at(W)) / (2 * step), rtol=1e-7, atol=1e-8
-        )
-        np.testing.assert_allclose(
-            dH[:, k], (up.noise_at(W) - down.noise_at(W)) / (2 * step), rtol=1e-7, atol=1e-8
-        )
-
-
-def test_parameters_are_named_by_output_and_input():
-    assert column().plant.names == ("a1", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]")
-    assert full_plant().names[:4] == ("a1[1]", "a1[2]", "a2[2]", "b1[1,1]")
 
 
 def test_the_information_of_an_arx_model_is_that_of_its_regressors():
