@@ -38,8 +38,8 @@ estimated from, or on another file. The records come from [others](data/README.m
 
 A simulation error of {converter_left} is not noise. The converter responds differently to steps up and
 down. After a step up the output rings with a decay of 0.0154 +- 0.0004 and a frequency of 0.0503 +- 0.0004
-per sample. After a step down these are 0.0204 +- 0.0008 and 0.0414 +- 0.0010. The linear model is a compromise, good for a first design. (ARX models of orders and delays to 8 explain at
-most 61.6 %.)
+per sample. After a step down these are 0.0204 +- 0.0008 and 0.0414 +- 0.0010. The linear model is a
+compromise, good for a first design. (ARX models of orders and delays to 8 explain at most 61.6 %.)
 
 ## A column: a model in s, and the one that made the record
 

@@ -31,7 +31,8 @@ The paper prints 0.25, and 1.7 for white noise ([papers.md](papers.md)).
 ## 2. What the proof says
 
 The first line bounds every FIR spectrum of order 20 by the dual problem. The second bounds every spectrum:
-{over} % of the cost at most could be saved by another family. The certificate, the accuracy that a unit of power gives at each frequency, is nowhere above one.
+{over} % of the cost at most could be saved by another family. The certificate, the accuracy that a unit of
+power gives at each frequency, is nowhere above one.
 
 ![the certificate](images/research_optimality.png)
 
@@ -62,10 +63,12 @@ r_u is asymptotic. Two hundred simulated experiments with the designed spectrum,
 {simulated}
 
 With 95 % probability (chi-squared, two degrees of freedom) the estimate lies in an ellipse, and r_u is the
-largest |G_hat - G| in it. So to first order at least 95 % of the runs stay within r_u at all frequencies together.
+largest |G_hat - G| in it. So to first order at least 95 % of the runs stay within r_u at all frequencies
+together.
 
 Further: [python.md](python.md), [method.md](method.md), [errata.md](errata.md).
 """
+
 
 def research(folder: Path, images: Path) -> str:
     """The page; its runs go into `folder`, its figures into `images`."""
@@ -98,6 +101,7 @@ def research(folder: Path, images: Path) -> str:
     keep(folder / "least_costly", images, "research", bound="bound", optimality="optimality")
     keep(folder / "orders", images, "research", curves="curves")
     return filled(TEXT, found)
+
 
 if __name__ == "__main__":
     write("research", research)

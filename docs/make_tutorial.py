@@ -37,8 +37,8 @@ A log of a small board with two heaters and two temperature sensors leads to an 
 its data.
 
 The log is [real](data/README.md): run the commands in a folder with a copy of
-`docs/data/tclab/two_heaters.txt`. The experiments are simulated by an energy balance that is fitted to the log
-(`python docs/make_tutorial.py`).
+`docs/data/tclab/two_heaters.txt`. The experiments are simulated by an energy balance that is fitted to the
+log (`python docs/make_tutorial.py`).
 
 ## 1. What is in the log
 

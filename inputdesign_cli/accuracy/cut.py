@@ -1,4 +1,4 @@
-"""What a requirement is to a solver: cones, and the linear inequalities that they prove.
+"""Requirements as a solver takes them: cones, and the linear inequalities that they prove.
 
 Every cone here holds for M whenever it holds for a smaller M, and has the form h * constant + linear
 map of (M, auxiliary unknowns), with h = 1 for a plain requirement. A design that scales M by an

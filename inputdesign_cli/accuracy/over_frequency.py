@@ -1,4 +1,4 @@
-"""What requirements at every frequency of a band have in common: a grid that sees everything, and peaks."""
+"""Requirements at every frequency of a band: a grid that resolves all resonances, and the peaks on it."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class OverFrequency(Requirement):
 
     @cached_property
     def grid(self) -> Array:
-        """Return frequencies of the band that see every resonance of G, the requirement and the loop."""
+        """Return a grid on the band that resolves all resonances of G, the requirement and the loop."""
         grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
         # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
         if self.poles_on_the_circle.size == 0:

@@ -1,4 +1,4 @@
-"""What one input and one output in q^-1 answer to a finite record, by their difference equations.
+"""The response of a plant in q^-1 with one channel to a finite record, by difference equations.
 
 The same answers as `RecordTransforms` in a tenth of the time.
 """

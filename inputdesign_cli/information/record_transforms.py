@@ -1,4 +1,4 @@
-"""What any model or loop answers to a finite record from rest, by Fourier transforms."""
+"""The response of any model or loop to a finite record from rest, by Fourier transforms."""
 
 from __future__ import annotations
 

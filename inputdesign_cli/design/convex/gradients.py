@@ -1,4 +1,4 @@
-"""What weights of the information are worth at each frequency, by the gradients of the scenarios' plants."""
+"""The density over frequency of weighted information, from the gradients of all scenarios' plants."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Gradients:
 
     @cached_property
     def grid(self) -> Array:
-        """Return frequencies that see every resonance of the nominal plant's densities, over the band."""
+        """Return a grid on the band that resolves every resonance of the nominal plant's densities."""
         nominal = self.experiments[0]
         return graded_grid(nominal.singularities, *nominal.band)
 
