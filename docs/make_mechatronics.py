@@ -37,14 +37,13 @@ TEXT = (
 A motor is to get a PI loop for its speed. The data sheet states gain and time constant within 20 %, and the
 drive takes 0 to 24 V through 12 bits. The experiment takes twenty seconds.
 
-`python docs/make_mechatronics.py` runs the commands and writes this page; a test runs it. The motor is
-simulated, with a gain 20 % below the data sheet and a time constant 15 % above. The tool sees the data
-only.
+The motor is simulated (`python docs/make_mechatronics.py`), with a gain 20 % below the data sheet and a time
+constant 15 % above.
 
 ## 1. What you know, in your words
 
-`rest.csv` is half a minute of speed at a constant 10 V, which contains the noise. Six answers are given in
-the terminal or in a file, `answers.yaml`:
+`rest.csv` is half a minute of speed at a constant 10 V, which contains the noise. Six answers stand in
+`answers.yaml`:
 
 ```yaml
 """
@@ -57,8 +56,8 @@ the terminal or in a file, `answers.yaml`:
 
 {deduced}
 
-The controller is tuned anew at each of thirty motors within 20 %. At each the margin must hold for every
-motor within r_u.
+The controller is tuned anew at each of thirty motors. At each the margin must hold for every motor within
+r_u.
 
 ## 2. The signal
 
@@ -69,7 +68,7 @@ expected speed:
 
 ![the loop with the discs that the data leave, and the circle to keep off](images/mechatronics_nyquist.png)
 
-The discs show the uncertainty of the loop after the experiment. They stay out of the 6 dB circle about -1.
+The discs of uncertainty stay out of the 6 dB circle about -1.
 
 ## 3. The experiment and its verdict
 
@@ -78,8 +77,7 @@ and 80 rad/s:
 
 {assess}
 
-Met: exit code 0. Gain and time constant belong to this motor, and the controller settings follow from
-them. `assessed/model.yaml` keeps the model with its covariance.
+Met: exit code 0. The controller settings follow from the gain and time constant of this motor.
 
 ![what the model explains of the record](images/mechatronics_fit.png)
 

@@ -24,10 +24,9 @@ JUDGED = ("validated",)
 TEXT = """\
 # Raw logs to judged models: a converter and a column
 
-One command finds a model and judges its structure on a part of the record that it was not estimated from. A
-second command judges the model by another file. `python docs/make_records_page.py` runs the commands and
-writes this page; a test runs it. Notes are not shown. The records come from [others](data/README.md); the
-command is described in [explore.md](explore.md).
+[explore](explore.md) finds a model and judges its structure on a part of the record that it was not
+estimated from, or on another file. The records come from [others](data/README.md); notes are not shown
+(`python docs/make_records_page.py`).
 
 ## A converter: a file to learn from and one to judge by
 
@@ -40,10 +39,7 @@ command is described in [explore.md](explore.md).
 A simulation error of {converter_left} is not noise. The converter responds differently to steps up and
 down. After a step up the output rings with a decay of 0.0154 +- 0.0004 and a frequency of 0.0503 +- 0.0004
 per sample. After a step down these are 0.0204 +- 0.0008 and 0.0414 +- 0.0010. The linear model is a
-compromise, good for a first design. An experiment with small steps about one level would give the model of
-that level.
-
-ARX models of orders and delays to 8, estimated from the first file, explain at most 61.6 % of the second.
+compromise, good for a first design. (ARX models of orders and delays to 8 explain at most 61.6 %.)
 
 ## A column: a model in s, and the one that made the record
 

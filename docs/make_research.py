@@ -13,8 +13,7 @@ from pages import Terminal, filled, keep, write
 TEXT = """\
 # Research: published designs side by side
 
-Least-costly and D-optimal designs, compared on a published example in ten minutes. `python
-docs/make_research.py` runs the commands and writes this page; a test runs it.
+Least-costly and D-optimal designs, compared on a published example (`python docs/make_research.py`).
 
 ## 1. A design from a paper
 
@@ -25,16 +24,15 @@ The first illustration of [Bombois and Scorletti](references.md#bombois-least-co
 
 {least}
 
-The paper prints 0.25, and 1.7 for white noise, at an initial estimate that it does not print. All figures
-are compared in [papers.md](papers.md).
+The paper prints 0.25, and 1.7 for white noise ([papers.md](papers.md)).
 
 ![r_u against r_adm](images/research_bound.png)
 
 ## 2. What the proof says
 
 The first line bounds every FIR spectrum of order 20 by the dual problem. The second bounds every spectrum:
-{over} % of the cost at most could be saved by another family. The certificate is the accuracy that a unit
-of power gives at each frequency, relative to the best. It is nowhere above one.
+{over} % of the cost at most could be saved by another family. The certificate, the accuracy that a unit of
+power gives at each frequency, is nowhere above one.
 
 ![the certificate](images/research_optimality.png)
 
@@ -64,9 +62,9 @@ r_u is asymptotic. Two hundred simulated experiments with the designed spectrum,
 
 {simulated}
 
-G has two free parameters. With 95 % probability (chi-squared, two degrees of freedom) the estimate lies in
-an ellipse, and r_u is the largest |G_hat - G| in it. To first order 95.1 % of the runs stay below r_u at
-all frequencies together. These are the runs counted here.
+With 95 % probability (chi-squared, two degrees of freedom) the estimate lies in an ellipse, and r_u is the
+largest |G_hat - G| in it. So to first order at least 95 % of the runs stay within r_u at all frequencies
+together.
 
 Further: [python.md](python.md), [method.md](method.md), [errata.md](errata.md).
 """

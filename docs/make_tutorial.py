@@ -34,16 +34,16 @@ TEXT = """\
 # From a log to an assessed experiment
 
 A log of a small board with two heaters and two temperature sensors leads to an experiment and a verdict on
-its data. Computing takes less than a minute.
+its data.
 
-`python docs/make_tutorial.py` runs the commands and writes this page; a test runs it. The log is real ([its
-origin](data/README.md)): run the commands in a folder with a copy of `docs/data/tclab/two_heaters.txt`. The
-two experiments are simulated by an energy balance that is fitted to the log, with the noise of the log.
+The log is [real](data/README.md): run the commands in a folder with a copy of
+`docs/data/tclab/two_heaters.txt`. The experiments are simulated by an energy balance that is fitted to the
+log (`python docs/make_tutorial.py`).
 
 ## 1. What is in the log
 
-Ten minutes, a row about every three seconds, with jitter; both heaters were switched. We want a model from
-heater 1 to temperature 1:
+Ten minutes, a row about every three seconds; both heaters were switched. We want a model from heater 1 to
+temperature 1:
 
 {explore}
 
@@ -53,8 +53,8 @@ other:
 ![fit of the model to the log](images/tutorial_log_fit.png)
 
 Estimated from the first part alone, this structure explains {validated} of the temperatures of the other;
-the parameters above use the whole log. The command also writes `found/spec.yaml`, ready for a design. The
-shaded discs show the frequency response of the data alone, the line that of the model:
+the parameters above use the whole log. The shaded discs show the frequency response of the data alone, the
+line that of the model:
 
 ![frequency response of the log, without a model and by the model](images/tutorial_log_frequency_response.png)
 
@@ -76,21 +76,20 @@ within 20 and 80 % {record}. It has two levels:
 
 ## 3. The experiment
 
-The board settles at 50 %, `design/signal.csv` is applied, and the temperature is recorded in `first.csv`.
-Do these data meet the target?
+The board settles at 50 %, `design/signal.csv` is applied, and `first.csv` is recorded. Do these data meet
+the target?
 
 {first}
 
-They miss it: exit code 1. The model from the log was wrong at high frequencies. At the new estimate the
+They miss it: exit code 1. The model from the log was wrong at high frequencies; at the new estimate the
 error is {ratio} times the admissible one. The same command has designed the top-up: the shortest record
-that, with these data, meets the target if the model structure is right.
+that, with these data, meets the target.
 
 ![the error that the first experiment leaves](images/tutorial_first_data_bound.png)
 
 ## 4. The top-up
 
-That record is just enough if its model is right, and the first one was not. So we leave a reserve and ask
-for 12 % where 15 % are wanted:
+That record is just enough if its model is right, so we leave a reserve and ask for 12 % instead of 15 %:
 
 {reserve}
 

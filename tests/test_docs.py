@@ -41,6 +41,14 @@ def test_every_source_cited_by_key_has_an_entry():
     assert cited <= anchors(REFERENCES)
 
 
+def test_every_source_is_cited():
+    pages = [page for page in PAGES if page != REFERENCES]
+    specs = sorted((ROOT / "specs").glob("*.yaml"))
+    text = "\n".join(file.read_text(encoding="utf-8") for file in [*FILES, *pages, *specs])
+    keys = re.findall(r"^### (.*)$", REFERENCES.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert [key for key in keys if key not in text] == []
+
+
 def test_the_spec_of_the_readme_is_the_shipped_one():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)

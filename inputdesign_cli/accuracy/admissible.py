@@ -131,7 +131,7 @@ class Sensitivity:
 
     @property
     def kept(self) -> Sensitivity:
-        """Return this requirement itself, since it concerns a loop."""
+        """Return this bound itself, since it preserves the margins of a loop."""
         return self
 
     def nominal(self, w: ArrayLike) -> Array:
@@ -178,7 +178,7 @@ class Weighted:
 
     @property
     def floored(self) -> Floored | None:
-        """Return the floored bound of the error without the weight, which is positive."""
+        """Return the replacement of r_adm without the weight, if any."""
         return self.inner.floored
 
     @property

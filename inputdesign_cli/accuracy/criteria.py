@@ -115,6 +115,6 @@ class Criterion(OneCondition):
 
 
 def criterion_of(requirements: Sequence[Requirement]) -> Criterion | None:
-    """Return the criterion that is to be maximised, which then stands alone."""
+    """Return the criterion to be maximised, which is then the only requirement, or None."""
     first = requirements[0] if requirements else None
     return first if isinstance(first, Criterion) else None

@@ -34,7 +34,7 @@ _KEPT = 8  # sets of frequencies whose rows are remembered at a time
 
 @dataclass(frozen=True)
 class Violation:
-    """A violation of a requirement: `ratio` > 1 misses, at a frequency where there is one."""
+    """Holds a local maximum of the ratio of a requirement (above 1: missed), and its frequency, if any."""
 
     ratio: float
     frequency: float | None = None
@@ -45,7 +45,7 @@ class Requirement(ABC):
 
     Its `ratio` is measured as an error is, in standard deviations: with ratio r, the matrix r^2 M just
     meets the requirement (and no smaller multiple does). A new requirement is one file with a subclass that
-    answers `name`, `violations`, `ratios` and `cut`; the rest has answers that fit most.
+    defines `name`, `violations`, `ratios` and `cut`; the other methods have defaults.
     """
 
     @property
@@ -94,19 +94,19 @@ class Requirement(ABC):
 
 
 class OneCondition(Requirement):
-    """A requirement without a frequency: its single ratio stands for all."""
+    """A requirement that does not depend on frequency and has a single ratio."""
 
     @abstractmethod
     def ratio(self, information: Array) -> float:
         """Return the ratio, see `Requirement`."""
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
-        """Return the one ratio, if above `above`."""
+        """Return the single ratio as a violation, if it exceeds `above`."""
         ratio = self.ratio(information)
         return [Violation(ratio)] if ratio > above else []
 
     def ratios(self, information: Array, frequencies: Array) -> Array:
-        """Return the one ratio, repeated for every frequency."""
+        """Return the single ratio, repeated for every frequency."""
         return np.full(np.shape(frequencies), self.ratio(information))
 
 

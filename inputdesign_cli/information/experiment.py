@@ -115,7 +115,7 @@ class Experiment:
 
     @property
     def memory(self) -> float:
-        """Return the time, in samples or time units, that signals matter beyond what poles remember."""
+        """Return how long signals act beyond the memory of the poles, in samples or time units."""
         return self._source.memory
 
     @property
@@ -202,7 +202,7 @@ class Experiment:
         return self.squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
 
     def depends_on_plant(self, kind: PowerKind) -> bool:
-        """Return whether a power depends on the plant, so that it is not the power of x itself."""
+        """Return whether a power depends on the plant, and so differs from the power of x."""
         return kind == "output" or (kind in ("input", "moves") and self.loop is not None)
 
     def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
@@ -226,7 +226,7 @@ class Experiment:
 
     @cached_property
     def noise_information(self) -> Array:
-        """Return the information (k, k) of N samples by the noise alone (in the loop), without excitation."""
+        """Return the information (k, k) in N samples of noise alone, without excitation."""
         if not self.told_by_noise:
             return np.zeros((self.size, self.size))
         told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities)

@@ -213,7 +213,7 @@ class FiniteRecord:
         return self.known + self._excited(record)
 
     def information_of_experiment(self, record: Array) -> Array:
-        """Return the information (k, k) of a full-length experiment that goes on as the record does."""
+        """Return the information (k, k) of an experiment of full length, extrapolated from the record."""
         share = self.experiment.samples / self.samples
         return self.experiment.baseline_information + share * self._excited(record)
 

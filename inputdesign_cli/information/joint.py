@@ -80,7 +80,7 @@ def mean_cost(
     """Return the mean over plants of the density of a weighted sum of powers, (n,) or (n, r, r).
 
     Args:
-        weights: each of a kind and of a channel or all.
+        weights: for each kind of power and each channel (or all together).
     """
     number = max(_AT_ONCE // max(w.size, 1), 1)
     parts = [experiments[start : start + number] for start in range(0, len(experiments), number)]

@@ -56,7 +56,7 @@ class Coloured(Around, Parametrised):
 
     @property
     def inner(self) -> SampledPlant:
-        """Return the plant with its own noise."""
+        """Return the wrapped plant, whose noise this noise replaces."""
         return cast(SampledPlant, self.plant)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Frequency grids that see every resonance, and the peaks of functions on them."""
+"""Frequency grids that resolve every resonance, and the peaks of functions on them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def graded_grid(
 
     Linear and logarithmic spacing are joined. Around each of the `singularities` (complex points of the
     frequency plane, see `logarithmic_distance`) come even steps of a fortieth of its distance to the axis.
-    Beyond these offsets grow geometrically. `knots` (breakpoints of tables) are included as they are.
+    Beyond these offsets grow geometrically. `knots` (breakpoints of tables) are grid points too.
     """
     span = hi - lo
     parts = [_spaced(float(lo), float(hi), points), np.asarray(knots, dtype=float)]

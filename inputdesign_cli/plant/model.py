@@ -62,7 +62,7 @@ class Model(Protocol):
 
     @property
     def flaw(self) -> str | None:
-        """Return why the parameters are not valid, as a negative dead time, or None if they are."""
+        """Return why the parameters are invalid (a negative dead time, for example), or None."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
@@ -227,14 +227,14 @@ def tables_at(
 def input_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
     """Return `input_gradient` of models of one structure, `model` the first of them, (S, n, k, p, r).
 
-    A kind of plant for which all at once is faster registers its own.
+    A kind of plant that computes all at once faster registers its own function.
     """
     return np.stack([each.input_gradient(w) for each in models])
 
 
 @singledispatch
 def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return `noise_gradient`, in the same way (S, n, k, p, p)."""
+    """Return `noise_gradient` of models of one structure, (S, n, k, p, p)."""
     return np.stack([each.noise_gradient(w) for each in models])
 
 
@@ -242,7 +242,7 @@ def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> Comp
 def prediction_gradients(
     model: Model, models: Sequence[Model], w: ArrayLike, y: NDArray, u: NDArray, e: NDArray
 ) -> ComplexArray:
-    """Return `prediction_gradient`, in the same way, for y, u and e (S, n, p or r, m), (S, n, k, p, m)."""
+    """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, for y, u, e (S, n, ., m)."""
     each = zip(models, y, u, e, strict=True)
     return np.stack([one.prediction_gradient(w, *signals) for one, *signals in each])
 
@@ -251,14 +251,14 @@ def prediction_gradients(
 def lefts_at(
     model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return R (S, n, p, p) and N (S, n, p, r): `left_at`, in the same way."""
+    """Return R (S, n, p, p) and N (S, n, p, r) of models of one structure, see `left_at`."""
     R, N = zip(*(each.left_at(w) for each in models), strict=True)
     return np.stack(R), np.stack(N)
 
 
 @singledispatch
 def forcings_at(model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike) -> ComplexArray:
-    """Return `forcing_at` as (S, n, p, p), in the same way."""
+    """Return `forcing_at` of models of one structure, (S, n, p, p)."""
     return np.stack([each.forcing_at(w) for each in models])
 
 

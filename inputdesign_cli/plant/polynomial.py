@@ -124,7 +124,7 @@ def stack(entries: Sequence[Sequence[Sequence[float] | Array]]) -> Array:
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
     """Return the values (.., K, rows, columns) of (.., rows, columns, l) at `q` (K,), which stands for q^-1.
 
-    In memory the values of an entry stand side by side.
+    The values of an entry are contiguous in memory.
     """
     value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
     value[:] = matrix[..., -1:]

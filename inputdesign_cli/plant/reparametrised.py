@@ -110,7 +110,7 @@ Place = Sequence[str | int]
 
 @dataclass(frozen=True)
 class Words:
-    """Holds parameters with names of their own as a spec states them, to be repeated with other values.
+    """Holds a plant section with named parameters as written, so that it can be repeated with other values.
 
     Attributes:
         plant: the section as it was written; None if it lists the coefficients of the model.

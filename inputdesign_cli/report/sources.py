@@ -54,6 +54,7 @@ def citations(question: Question, outcome: Outcome) -> list[Source]:
         "campi-garatti-2018": outcome.robust is not None and outcome.robust.risk is not None,
         "kiefer-wolfowitz-1960": outcome.objective is not None
         and outcome.objective.any_spectrum_bound is not None,
+        "howard-1960": outcome.objective is not None and outcome.objective.any_record_bound is not None,
         "ljung-1999": not (linear or lines),
     }
     return [_known()[key] for key, is_used in used.items() if is_used]

@@ -1,4 +1,4 @@
-"""What the design asks of a family of spectra, and linear functionals on it."""
+"""The protocol of families of spectra, and linear functionals on them."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ class Basis(Protocol):
     ) -> NDArray[np.float64]:
         """Return (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function, (size, ...).
 
-        Where the density has a `factor`, families of several inputs need not form it.
+        If the density has a `factor`, families of several inputs need not form the density.
         """
 
     def beyond(self, number: int) -> Basis:

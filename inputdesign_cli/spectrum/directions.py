@@ -105,8 +105,8 @@ def directed_scale(price: Functional, value: Functional, grid: Array) -> tuple[f
     """Return the largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
 
     It is valid for every spectrum on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of some
-    direction across the channels. A price that is concentrated at single frequencies only adds to it and is
-    ignored; such a value proves nothing (s = 0).
+    direction across the channels. The part of a price at single frequencies only adds to it and is ignored; a
+    value concentrated at single frequencies proves nothing (s = 0).
 
     Returns:
         s, and the frequencies of the local maxima of the largest generalised eigenvalue.

@@ -1,4 +1,4 @@
-"""Spectra of values that are each held for several samples: a sinusoid of values has images there."""
+"""Spectra of signals whose values are held for several samples, which gives every sinusoid images."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ class HeldLines(LinesBasis):
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """Return what an atom of power one picks up at all of its images, (L, ...)."""
+        """Return the functional of each line of unit power, summed over its images, (L, ...)."""
         return super().integrals(self.folded(density), singularities)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """Return the ratio over the frequencies of values, see `LinesBasis.price`."""
+        """Return `LinesBasis.price`, with densities folded to the frequencies of values."""
         folded = [replace(one, density=self.folded(one.density)) for one in (price, value)]
         turned = np.mod(grid * self.hold, 2.0 * np.pi)
         over = np.unique(
@@ -63,5 +63,5 @@ class HeldLines(LinesBasis):
         return super().price(folded[0], folded[1], over)
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
-        """Return the lines and the new ones, see `LinesBasis.enlarge`."""
+        """Return `LinesBasis.enlarge` with the price folded to the frequencies of values."""
         return super().enlarge(face, y, directions, replace(price, density=self.folded(price.density)))

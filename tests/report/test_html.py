@@ -170,6 +170,14 @@ def test_the_sources_of_a_run_are_those_of_the_bibliography(runs):
     assert all(f"### {key}\n" in listed for key in re.findall(r"^@\w+\{(.*),$", known, re.MULTILINE))
 
 
+def test_a_bound_over_all_records_cites_value_iteration(copied):
+    file = copied / "result.json"
+    result = json.loads(file.read_text())
+    assert "howard-1960" not in bibtex_text(copied)
+    file.write_text(json.dumps({**result, "objective": {**result["objective"], "any_record_bound": 0.1}}))
+    assert "howard-1960" in bibtex_text(copied)
+
+
 def test_the_page_of_a_sweep(runs, tmp_path):
     out = tmp_path / "out"
     run_sweep(runs / "open.yaml", ["experiment.samples=50,100,-1", "spectrum.order=1,2"], directory=out)

@@ -1,7 +1,7 @@
-"""The blocks of `interior`: what each keeps of its slack S and multiplier Z, and what it adds to a step.
+"""The cone constraints of `interior`: their slacks S, multipliers Z, and contributions to a step.
 
-Every block states S(a) in its cone, a being the unknowns v or what M-blocks see of them: the entries of
-svec(M), and s. A step solves, linearised, S + dS = S(a + da) and
+Every block states S(a) in its cone. Its argument a is the unknowns v or, for blocks of M, the entries of
+svec(M) and s. A step solves, linearised, S + dS = S(a + da) and
 Z + dZ = target S^-1 - (Z dS S^-1) - corrector, products of matrices made symmetric.
 """
 
@@ -23,7 +23,7 @@ _TOGETHER, _MOST_PAIRS = 4, 1 << 23
 
 
 class Entries:
-    """Holds the entries of symmetric matrices (k, k) that are not zero throughout, scaled as in svec, then s.
+    """Selects the entries of symmetric matrices (k, k) that may differ from zero, scaled as in svec, then s.
 
     Matrices that fall into blocks keep few: products of all pairs of entries, which is what the linear system
     costs, then concern the blocks alone.
@@ -36,7 +36,7 @@ class Entries:
 
     @property
     def size(self) -> int:
-        """Return the number of unknowns that M-blocks see."""
+        """Return the number of unknowns of the blocks of M."""
         return self.kept.size + int(self.with_s)
 
     def matrix(self, at: Array) -> Array:
@@ -229,7 +229,7 @@ class Atoms(Orthant):
 
 
 class Semidefinite(Cone):
-    """Matrices S_b >= 0 of one order d, with what all their kinds share; `S` and `Z` are (number, d, d)."""
+    """Holds constraints S_b >= 0 on matrices of one order d; `S` and `Z` are (number, d, d)."""
 
     def __init__(self, number: int, order: int, slack: float, weight: float) -> None:
         self.degree = number * order

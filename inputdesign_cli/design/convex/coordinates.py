@@ -206,7 +206,7 @@ class _Trial:
         return cls(experiment, factories, at, flat)
 
     def near(self, at: float) -> _Trial:
-        """Return this trial, or one in coordinates for the power `at` if that is far from its own."""
+        """Return this trial, or one in coordinates for the power `at` if this one's power is far from it."""
         return self if abs(at - self.at) <= _SUITED else _Trial.of(self.experiment, self.factories, at)
 
     def excess(self, log_power: float) -> float:

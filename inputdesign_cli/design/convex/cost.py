@@ -1,4 +1,4 @@
-"""What a cost is made of: weights of the powers of input, output and excitation."""
+"""The cost of an experiment: weights of the powers of input, output and excitation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The blocks that cuts make: they see of the unknowns a = (entries of svec M, s) alone."""
+"""The cone constraints of cuts, whose unknowns are a = (entries of svec M, s) alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is required at the scenarios, and which of their requirements an information matrix misses."""
+"""The requirements of all scenarios, and which of them an information matrix misses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NEARLY = 0.99
 
 @dataclass(frozen=True)
 class Scenario:
-    """A plant that the design must serve, in coordinates of its own, with its requirements."""
+    """Holds a plant for which the design must hold, in its own coordinates, with its requirements."""
 
     experiment: Experiment
     requirements: tuple[Requirement, ...]
@@ -33,7 +33,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Asked:
-    """A requirement with the number of its scenario; `side` as in `Problem`."""
+    """Holds a requirement with the number of its scenario; `side` as in `Problem`."""
 
     scenario: int
     requirement: Requirement
@@ -42,11 +42,11 @@ class Asked:
 
 @dataclass
 class _Seen:
-    """Holds the largest ratios (S,) seen of the scenarios, and the information (S, k, k) they belong to.
+    """Holds the largest ratio (S,) found so far for each scenario, and its information (S, k, k).
 
-    Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
-    what it was. Most of many scenarios need not be looked at again. `looked` are bounds by a look at each
-    scenario, `searched` nearer ones where its maxima have been searched too.
+    Ratios fall as information grows: if M_s is at least c times the earlier one, the ratio is at most
+    1 / sqrt(c) times the earlier one. So most scenarios need no new evaluation. `looked` are bounds from a
+    grid, `searched` tighter ones from a search of the maxima.
     """
 
     looked: Array
@@ -59,7 +59,7 @@ class _Seen:
         return cls(np.full(number, np.inf), np.full(number, np.inf))
 
     def most(self, informations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest possible ratios (2, S) with these M_s (S, k, k), looked and searched."""
+        """Return bounds (2, S) on the ratios with these M_s (S, k, k), from `looked` and `searched`."""
         ratios = np.stack([self.looked, self.searched])
         if self.informations is None:
             self.informations = np.broadcast_to(np.eye(informations.shape[1]), informations.shape).copy()
@@ -105,7 +105,7 @@ class Demands:
         return joint_noise([scenario.experiment for scenario in self.scenarios])
 
     def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
-        """Return whether the nominal plant, its requirements and the other plants are the same as these."""
+        """Return whether the nominal plant, its requirements and the other plants are the given ones."""
         nominal, *known = self.scenarios
         same = len(known) == len(others) and all(map(operator.is_, known, others))
         alike = nominal.requirements is asked.requirements and nominal.side is asked.side

@@ -48,7 +48,7 @@ class Design:
 
 
 class UnfinishedDesignError(OutOfTimeError):
-    """Raised when the time limit has passed; `design` is the best so far, with what is proved of it."""
+    """Raised when the time limit has passed; `design` is the best so far, with its proved bound."""
 
     design: Design
 

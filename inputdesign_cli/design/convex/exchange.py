@@ -37,7 +37,7 @@ Enough = Callable[[float, float], bool]
 
 
 class UnfinishedError(OutOfTimeError):
-    """Raised when the time limit has passed; `found` is the best so far, with what is proved of it."""
+    """Raised when the time limit has passed; `found` is the best design so far, with its proved bound."""
 
     found: ExchangeResult
 

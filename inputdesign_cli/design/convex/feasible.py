@@ -126,7 +126,7 @@ KEEPS = 1e-9
 def solve_limited(
     problem: Problem, start: Array, tolerance: float, known: Sequence[Place] = ()
 ) -> ExchangeResult:
-    """Solve the limited problem by the exchange, begun with what suits the limits; arguments as there.
+    """Solve the limited problem by the exchange, from a start within the limits; arguments as there.
 
     Raises:
         UnreachableError: the requirements cannot be met within the limits.

@@ -1,4 +1,4 @@
-"""The finite program in scaled numbers, and who solves it: Clarabel while it is small, else `interior`.
+"""The finite program in scaled numbers. Clarabel solves small ones, `interior` large ones.
 
 Clarabel takes each matrix inequality with all unknowns, and factors what comes of it anew in every iteration;
 the dense method sums the inequalities first. Below a certain size the first is faster, and it is what the

@@ -1,4 +1,4 @@
-"""What an experiment may not exceed, or fall below: linear conditions on the spectrum."""
+"""Upper and lower limits of an experiment: linear conditions on the spectrum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one sentence that every convex design here is an instance of.
+"""The general convex design problem, of which every design here is an instance.
 
 minimise an objective of the spectrum x, subject to x in the cone of spectra, M_s(x) = M0_s + sum_i x_i M_si
 meeting every requirement of every scenario s, and the powers and the density of x within their limits.
@@ -229,7 +229,7 @@ class Problem:
 
     @cached_property
     def baselines(self) -> NDArray[np.float64]:
-        """Return M0_s, what is known of each scenario without excitation, (S, k, k)."""
+        """Return the information M0_s of each scenario without excitation, (S, k, k)."""
         return self.demands.noise_informations + self._priors
 
     @property

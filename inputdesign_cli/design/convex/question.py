@@ -1,4 +1,4 @@
-"""What is asked of a design, in raw parameters: requirements are made for the coordinates of the design."""
+"""The question of a design in raw parameters; requirements are made for the coordinates of the design."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from inputdesign_cli.spectrum import Basis
 
 @dataclass(frozen=True)
 class Alternative:
-    """A plant besides the nominal one that the design must serve, in raw parameters; see `Question`."""
+    """Holds a further plant for which the design must hold, in raw parameters; see `Question`."""
 
     experiment: Experiment
     requirements: Sequence[RequirementFactory]
@@ -52,7 +52,7 @@ class Question:
 
     @property
     def plants(self) -> list[Alternative]:
-        """Return all plants that must be served, the nominal plant first."""
+        """Return all plants for which the design must hold, the nominal one first."""
         return [Alternative(self.experiment, self.requirements, self.side), *self.others]
 
     def at_alpha(self, alpha: float) -> Question:

@@ -1,4 +1,4 @@
-"""What a design for drawn scenarios says of plants that were not drawn.
+"""Bounds on the share of plants, not drawn, at which a design for drawn scenarios fails.
 
 A convex program in d unknowns with N constraints drawn independently has at most d of support: those without
 which the optimum would be another. Its solution violates a fresh constraint with a probability that itself

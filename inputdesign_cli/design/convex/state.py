@@ -1,4 +1,4 @@
-"""One round of the exchange: what the method knows, and how a finite program adds to it."""
+"""The state of the exchange method, and how the solution of a finite program updates it."""
 
 from __future__ import annotations
 
@@ -323,7 +323,7 @@ def on_basis(problem: Problem, row: Row) -> Row:
 
 
 def alike(problem: Problem, row: Row, place: DensityPlace) -> bool:
-    """Return whether the row stands for the same limit at nearly the same place."""
+    """Return whether the row is the same limit at nearly the same frequency."""
     if row.density is None or row.density.limit != place.limit:
         return False
     lo, hi = problem.experiment.band

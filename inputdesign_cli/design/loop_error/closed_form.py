@@ -1,4 +1,4 @@
-"""The spectrum that is best at each frequency, given what a unit of power costs there.
+"""The best spectrum at each frequency, given the price of a unit of power there.
 
 Minimising tr(A Phi^-1) + tr(M Phi) over Phi gives A = Phi M Phi, hence
 Phi = M^-1/2 (M^1/2 A M^1/2)^1/2 M^-1/2; with M = I it is A^1/2 = Z^{T/2} ([rojas-asymptotic], Section VI).

@@ -1,4 +1,4 @@
-"""The design for the closed-loop error: the spectrum, its proof, and what the model structure makes of it."""
+"""The design for the closed-loop error: the spectrum, its proof, and its loss by the model structure."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
 
 class ControlLaw(Protocol):
-    """Holds what the design needs to know of a control law."""
+    """The protocol of control laws: the desired loop, its controller and their derivatives."""
 
     @property
     def desired(self) -> DesiredLoop | None:

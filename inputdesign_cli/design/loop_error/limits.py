@@ -23,7 +23,7 @@ _SUFFICIENT = 1e-4
 
 @dataclass(frozen=True)
 class LimitedDesign:
-    """A spectrum within its limits and the proof of how good it is.
+    """Holds a spectrum within its limits, and the proof of its gap.
 
     Attributes:
         spectrum: Phi (K, n, n) at the given frequencies.

@@ -22,7 +22,7 @@ from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
 @dataclass(order=True)
 class Node:
-    """A box with what is known of it; `assumed`: the bound rests on `limits.SMALLEST_EIGENVALUE`."""
+    """Holds a box and its bound; `assumed`: the bound rests on `limits.SMALLEST_EIGENVALUE`."""
 
     bound: float
     number: int

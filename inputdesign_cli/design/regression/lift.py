@@ -148,7 +148,7 @@ class Lift:
         return NodeBound(value, rho, spread)
 
     def cost(self, kappa: float, D: Array) -> tuple[Array, float]:
-        """Return |b|^2 + kappa L1^T D w, divided by the second value returned."""
+        """Return the coefficients of |b|^2 + kappa L1^T D w over a scale, and this scale."""
         Y, B = self._unknowns
         scale = max(1.0, kappa)
         variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ D))

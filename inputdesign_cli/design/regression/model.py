@@ -1,4 +1,4 @@
-"""A linear regression of which some regressors are neglected, and the error that its moments buy.
+"""A linear regression with neglected regressors, and its mean-squared error for given moments.
 
 y = phi_1^T theta_1 + phi_2^T theta_2 + v; only theta_1 is estimated, by least squares on phi_1. The
 quantity of interest is L1^T theta_1 + L2^T theta_2 ([eckhard-mse], Section 2).
@@ -33,7 +33,7 @@ class ErrorSplit:
 
 @dataclass(frozen=True)
 class Regression:
-    """Holds the weights of the quantity of interest and what is known of the system.
+    """Holds the quantity of interest, the noise variance, and the bound on neglected parameters.
 
     Attributes:
         estimated: (m,) L1, weights of the estimated parameters.

@@ -162,7 +162,7 @@ def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorr
 
 
 def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Autocorrelations:
-    """Return the design on lines at multiples of 15 degrees, if it is no worse for it.
+    """Return the design moved to lines at multiples of 15 degrees, if that does not make it worse.
 
     An optimum is flat, so a search finds rho only to the root of its tolerance. A constant or alternating
     signal, for example, is recognised here.

@@ -27,7 +27,7 @@ _OUTSIDE = 1e-7
 
 @dataclass(frozen=True)
 class Autocorrelations:
-    """Holds the cost and the errors of the autocorrelations `rho` (n,) with rho_0 = 1."""
+    """Holds autocorrelations `rho` (n,) with rho_0 = 1, the `bias` (n - m,), and the variance factor `v`."""
 
     rho: Array
     bias: Array
