@@ -15,7 +15,7 @@ from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.building.uncertainty import build_plants
-from inputdesign_cli.questions.common.robust import Batch, tried_on
+from inputdesign_cli.questions.common.robust import tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.report.facts import facts
@@ -120,7 +120,7 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     tried = [
         one
         for batch in task.asked.plants.afresh()
-        for one in tried_on(done.design, done.experiment.samples, batch)
+        for one in tried_on(done.design, done.experiment.samples, batch.plants)
     ]
     less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
     dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
@@ -179,7 +179,7 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     assert cost == pytest.approx(12.444049, rel=1e-5)
     own = Alternative(oracle.experiment, oracle.requirements)
     estimated = replace(own, requirements=nominal.asked.question.requirements)
-    by_own, by_estimate = tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
+    by_own, by_estimate = tried_on(design, 500, [own, estimated])
     assert by_own.share == pytest.approx(1.02, abs=0.02)
     assert by_estimate.share == pytest.approx(1.86, abs=0.02)
     assert by_estimate.frequency == pytest.approx(0.390, abs=2e-3)
@@ -254,7 +254,9 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     batches = list(done.plants.afresh())
-    shares = [one.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch)]
+    shares = [
+        one.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch.plants)
+    ]
     whole = robust_result(done, done.plants)
     assert whole.entry.fresh.draws == len(shares) == 120
     assert whole.entry.fresh.missed == sum(share > 1.0 + 1e-6 for share in shares) > 0
@@ -305,14 +307,14 @@ def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 20}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     (batch,) = done.plants.afresh()
-    alone = [tried_on(done.design, 500, batch.only([place]))[0] for place in range(20)]
-    together = tried_on(done.design, 500, batch)
+    alone = [tried_on(done.design, 500, batch.plants[place : place + 1])[0] for place in range(20)]
+    together = tried_on(done.design, 500, batch.plants)
     assert [one.share for one in together] == pytest.approx([one.share for one in alone], rel=1e-9)
     model = batch.plants[3].experiment.model
     gone = model.at(np.where(np.array(model.names) == "b1", 1e-200, model.theta))
     plants = list(batch.plants)
     plants[3] = replace(plants[3], experiment=replace(plants[3].experiment, model=gone))
-    shares = [one.share for one in tried_on(done.design, 500, replace(batch, plants=tuple(plants)))]
+    shares = [one.share for one in tried_on(done.design, 500, plants)]
     assert shares[3] == np.inf
     assert np.delete(shares, 3) == pytest.approx([one.share for one in np.delete(alone, 3)], rel=1e-9)
 
@@ -355,7 +357,7 @@ def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, cov
     tried = [(theta, plants.region.at(theta)) for theta in nominal + radius * z]
     thetas, alternatives = zip(*[one for one in tried if one[1] is not None], strict=True)
     assert len(thetas) > 150
-    shares = [one.share for one in tried_on(done.design, 500, Batch(np.array(thetas), alternatives, 200))]
+    shares = [one.share for one in tried_on(done.design, 500, alternatives)]
     assert max(shares) <= share * (1 + 1e-3)
     assert max(shares) > 0.8
 

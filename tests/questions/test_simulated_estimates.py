@@ -48,7 +48,7 @@ def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
 
     monkeypatch.setattr(SimulatedEstimates, "_estimates", noted)
     monkeypatch.setattr(confidence, "largest_error", lambda errors, estimates: np.zeros(1))
-    told = SimulatedEstimates(None, None, 100, 1.0, sets=4)
+    told = SimulatedEstimates(None, 100, 1.0, sets=4)
     told.corrected(SimpleNamespace(corrected=lambda *_: Calibration(0.9, 100)), [], np.eye(1))
     correcting = set(seen)
     assert len(seen) == len(correcting) == 4

@@ -53,7 +53,7 @@ from inputdesign_cli.questions.assessment.outcome import (
     model_text,
 )
 from inputdesign_cli.questions.common.confidence import Confidence
-from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge, that_agrees
+from inputdesign_cli.questions.common.foresight import Foreseen, Knowledge, that_agrees
 from inputdesign_cli.records import Preparation, Record, read_data
 
 

@@ -8,7 +8,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.questions.building.demand import check_record, longest_record
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_cost, build_model, excitation_band, record_step
-from inputdesign_cli.questions.common.record import Delivery, RecordRequest, least_period
+from inputdesign_cli.questions.common.record import RecordRequest, least_period
 from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.limits import Bounds
 from inputdesign_cli.signal.multisine import blocks_of
@@ -52,12 +52,10 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         if limits.moves is not None
         else tuple(build_signal_settings(spec, method) for method in _methods(spec)[1:]),
         limit_keys=tuple(key for key in stated if spec.at(*key.split(".")) is not None),
-        delivery=Delivery(
-            operating_points=None if signal.offset is None else operating_points(spec),
-            also=(*(signal.also or ()), *(signal.export or ())),
-            full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),
-            sampling_rate=sampling_rate(spec),
-        ),
+        operating_points=None if signal.offset is None else operating_points(spec),
+        also=(*(signal.also or ()), *(signal.export or ())),
+        full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),
+        sampling_rate=sampling_rate(spec),
     )
 
 

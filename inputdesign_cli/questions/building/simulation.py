@@ -7,7 +7,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.system import build_cost, build_loop, build_model, held_plant
-from inputdesign_cli.questions.common.confidence import Simulator
+from inputdesign_cli.questions.common.confidence import SimulatedEstimates
 from inputdesign_cli.questions.common.simulation import Simulation, TrueSystem
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.specification.models.experiment import Noise
@@ -32,13 +32,13 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
     )
 
 
-def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
+def build_simulator(spec: Spec, nominal: Experiment) -> SimulatedEstimates | None:
     """Return the simulator of experiments for an exact confidence; None if asymptotic theory decides."""
     error = spec.accuracy.error
     stated = None if error is None else error.calibrated
     if stated is None or not stated.runs:
         return None
-    return Simulator(nominal, stated.runs, build_units(spec).step)
+    return SimulatedEstimates(nominal, stated.runs, build_units(spec).step)
 
 
 def _true_system(spec: Spec) -> TrueSystem | None:

@@ -21,8 +21,7 @@ from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import confidence_factor, unstated_errors
 from inputdesign_cli.questions.building.parameters import build_earlier, check_known, embedded, inverse
 from inputdesign_cli.questions.building.requirements import build_asked
-from inputdesign_cli.questions.common.foresight import Foresight
-from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge
+from inputdesign_cli.questions.common.foresight import Foreseen, Foresight, Knowledge
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
 from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.sizes import most

@@ -25,7 +25,6 @@ from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
-from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.spectrum import FlatBasis
 
 # A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
@@ -247,8 +246,7 @@ class Planner:
         unit = weighted_sum(task.asked.cost, GivenExcitation.even(nominal, 1.0).power)
         power = cost / unit if np.isfinite(cost) else rules.pilot_power or 0.0
         flat = FlatBasis(nominal.inputs, nominal.band)
-        spectrum = DesignedSpectrum.of(flat, np.array([power]), inputs=nominal.inputs, step=task.record.step)
-        record = given_record(task.record, nominal, spectrum, lambda information: 0.0)
+        record = given_record(task.record, nominal, flat, np.array([power]), lambda information: 0.0)
         samples = np.zeros((rest, nominal.inputs)) if record is None else record.samples
         message = why.diagnostics[0].message
         return Planned(samples, rest, power_of(samples), power * unit, "stopgap", why=message)

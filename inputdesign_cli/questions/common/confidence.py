@@ -35,14 +35,25 @@ _EACH, _LONG = 20, 100
 class SimulatedEstimates:
     """Holds estimates from `runs` records of an excitation on the nominal plant, in raw parameters.
 
-    Its length is that of the records. `sets` of runs correct alpha; others check it.
+    `of` states the excitation and the length of its records. `sets` of runs correct alpha; others check it.
     """
 
     nominal: Experiment
-    excitation: Excitation
     runs: int
     step: float
+    excitation: Excitation | None = None
     sets: int = 1
+
+    def of(self, excitation: Excitation, samples: int, sets: int = 1) -> SimulatedEstimates | None:
+        """Return estimates from records of this length; None if long records make asymptotic theory good."""
+        if samples * self.runs > _MOST:
+            return None
+        nominal = replace(self.nominal, samples=samples)
+        return replace(self, nominal=nominal, excitation=excitation, sets=sets)
+
+    def of_record(self, record: Array) -> SimulatedEstimates | None:
+        """Return the estimates from one record (samples, r)."""
+        return self.of(Recorded("design", record, self.step), len(record))
 
     def corrected(
         self, calibration: Calibration, errors: Sequence[ModelError], information: Array
@@ -69,29 +80,11 @@ class SimulatedEstimates:
     def _estimates(self, seed: int) -> Array:
         """Return the estimates (runs, k), NaN where the search did not settle."""
         seconds_left()
+        assert self.excitation is not None
         study = Study(self.nominal, self.nominal, self.runs, seed, self.step)
         each = _EACH if self.nominal.samples >= _LONG else 1
         trials = tried_on_truth(study, Reapplied(self.excitation, each)).trials
         return np.where(trials.converged[:, None], trials.theta, np.nan)
-
-
-@dataclass(frozen=True)
-class Simulator:
-    """Makes simulated estimates; see `SimulatedEstimates` for attributes, `nominal` of any length."""
-
-    nominal: Experiment
-    runs: int
-    step: float
-
-    def of(self, excitation: Excitation, samples: int) -> SimulatedEstimates | None:
-        """Return estimates from records of this length; None if long records make asymptotic theory good."""
-        if samples * self.runs > _MOST:
-            return None
-        return SimulatedEstimates(replace(self.nominal, samples=samples), excitation, self.runs, self.step)
-
-    def of_record(self, record: Array) -> SimulatedEstimates | None:
-        """Return the estimates from one record (samples, r)."""
-        return self.of(Recorded("design", record, self.step), len(record))
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,17 @@
 
 The local covariance knows of one minimum. A dead time that few frequencies excite has others, whole periods
 away. A record of the design is simulated on the nominal plant and estimated with the search of `identify`.
+Knowledge besides the data rules minima out: who says that it is 25 s within 30 % has said that it is not ten
+minutes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
@@ -18,19 +21,80 @@ from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, foreseen_rivals, not_foreseen
-from inputdesign_cli.identification import Earlier, Estimate
+from inputdesign_cli.identification import Earlier, Estimate, Rival
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.study import searched_run
 from inputdesign_cli.outcome.design import Foreseen as Entry
 from inputdesign_cli.outcome.simulation import Searched
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.knowledge import Knowledge
 
 _SEED = 0
 # Seconds of a search for each sample, channel, channel and parameter, measured; the longest that is begun.
 _SECONDS, _LONGEST = 1.2e-4, 20.0
 # What a simulated search may end with; then nothing can be said.
 _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
+# People are surer than they should be: parameters count as possible to this many times the stated distance.
+_ROOM = 3.0
+# Of its own deviations, by which an estimate may be off.
+_OFF = 3.0
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Holds the region centre + columns z, (k,) and (k, m): z in the unit ball, with `box` in [-1, 1]^m.
+
+    Of directions without a column nothing is known.
+    """
+
+    centre: Array
+    columns: Array
+    box: bool
+
+    def coordinates(self, theta: Array) -> Array:
+        """Return the coordinates z (m,) of parameters (k,)."""
+        return np.asarray(np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0], dtype=float)
+
+    def admits(self, theta: Array) -> bool:
+        """Return whether parameters (k,) are possible."""
+        z = self.coordinates(theta)
+        size = np.max(np.abs(z), initial=0.0) if self.box else np.linalg.norm(z)
+        return bool(size <= _ROOM)
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """Holds the plants that a design was made for: a region of the parameters `of_plant` (indices)."""
+
+    region: Knowledge
+    of_plant: NDArray[np.int64]
+
+    def admits(self, theta: Array, covariance: Array) -> bool:
+        """Return whether an estimate (k,) with its covariance (k, k) is one of these plants."""
+        of_plant, centre = self.of_plant, self.region.centre
+        away = (theta[: centre.size] - centre)[of_plant]
+        own = _OFF**2 * covariance[np.ix_(of_plant, of_plant)]
+        wide = self.region.columns[of_plant]
+        if self.region.box:
+            return bool(np.all(np.abs(away) <= np.abs(wide).sum(axis=1) + np.sqrt(np.diag(own))))
+        return bool(away @ np.linalg.solve(wide @ wide.T + own, away) <= 1.0)
+
+
+def that_agrees(
+    knowledge: Knowledge | None, estimate: Estimate, near: Callable[[Array], Estimate]
+) -> tuple[Estimate, tuple[Rival, ...]]:
+    """Return the likeliest minimum that agrees with the knowledge, and the minima that do not."""
+    minima = (Rival(estimate.theta, 0.0), *estimate.search.rivals)
+    admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]
+    if not admitted or len(admitted) == len(minima):
+        return estimate, ()
+    home = admitted[0]
+    known = {id(one) for one in admitted}
+    others = [
+        (id(one) in known, Rival(one.theta, one.excess - home.excess)) for one in minima if one is not home
+    ]
+    found = estimate if home is minima[0] else near(home.theta)
+    rivals, ruled_out = (tuple(one for agrees, one in others if agrees is kept) for kept in (True, False))
+    return found.with_rivals(rivals), ruled_out
 
 
 @dataclass(frozen=True)
@@ -56,17 +120,15 @@ class Foresight:
         nominal = self.nominal
         seconds = _SECONDS * len(record) * nominal.inputs * nominal.model.outputs * len(nominal.model.names)
         if not self.looks:
-            reason = "solver.any_spectrum: false (or --fast)"
-        elif seconds > _LONGEST:
-            reason = "the record is long"
-        else:
-            try:
-                late = seconds > seconds_left()
-            except OutOfTimeError:
-                late = True
-            reason = f"{what_ended()} left no time" if late else ""
-        if reason:
-            return None, [not_foreseen(reason)]
+            return None, [not_foreseen("solver.any_spectrum: false (or --fast)")]
+        if seconds > _LONGEST:
+            return None, [not_foreseen("the record is long")]
+        try:
+            late = seconds > seconds_left()
+        except OutOfTimeError:
+            late = True
+        if late:
+            return None, [not_foreseen(f"{what_ended()} left no time")]
         try:
             estimate, _, found = self._searched(record, requirements, np.random.default_rng(_SEED))
         except _ENDS:

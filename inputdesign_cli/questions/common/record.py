@@ -25,24 +25,14 @@ from inputdesign_cli.signal.limits import Bounds, limited_responses, peak_share
 from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.signal.selection import Record, best_record
 from inputdesign_cli.signal.settings import SignalSettings
+from inputdesign_cli.spectrum import Basis, TabulatedSpectrum
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
 _TAKES_PART = 1e-6
 
-
-@dataclass(frozen=True)
-class Delivery:
-    """Describes the delivery of a record: (r,) levels added to each input, and files beside signal.csv.
-
-    They are "mat", "npz", "h", "wav"; `full_scale` of the last is the largest value when None.
-    """
-
-    operating_points: Array | None = None
-    also: tuple[str, ...] = ()
-    full_scale: float | None = None
-    sampling_rate: float = 1.0
+Family = Basis | TabulatedSpectrum
 
 
 @dataclass(frozen=True)
@@ -58,6 +48,9 @@ class RecordRequest:
         step: between samples, in the unit of the experiment.
         limit_keys: the keys of the spec that limit single samples, for messages.
         others: may stand in for a kind of signal that does not fit.
+        operating_points: levels (r,) added to each input.
+        also: files beside signal.csv: "mat", "npz", "h", "wav".
+        full_scale: of signal.wav; None: the largest value.
     """
 
     settings: SignalSettings
@@ -73,7 +66,10 @@ class RecordRequest:
     limit_keys: tuple[str, ...] = ()
     stated_method: bool = False
     others: tuple[SignalSettings, ...] = ()
-    delivery: Delivery = Delivery()
+    operating_points: Array | None = None
+    also: tuple[str, ...] = ()
+    full_scale: float | None = None
+    sampling_rate: float = 1.0
 
     def length(self, experiment: int) -> int:
         """Return the samples of the record of an experiment of this length: whole periods of held values."""
@@ -125,7 +121,7 @@ def make_record(
     meets = problem.goal != "factor" and request.meets
     plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
-    spectrum = designed_spectrum(request, design, experiment.inputs)
+    spectrum = spectrum_of(request, design.result.basis, design.result.x)
 
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
     generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
@@ -195,8 +191,13 @@ def level_search(request: RecordRequest, design: Design) -> LevelSearch:
 
     others = any(one is not None for one in (bounds.output, bounds.rate, bounds.moves))
     depends = any(design.problem.experiment.depends_on_plant(kind) for kind, _, _ in bounds.powers)
-    plain = not (others or depends or bounds.quantisers)
-    amplitude = bounds.amplitude if plain and _affords(bounds) else None
+    squares = np.zeros(1) if bounds.amplitude is None else bounds.amplitude**2
+    affordable = all(
+        (squares.sum() if channel is None else squares[channel]) <= most * MET
+        for _, channel, most in bounds.powers
+    )
+    plain = affordable and not (others or depends or bounds.quantisers)
+    amplitude = bounds.amplitude if plain else None
     return LevelSearch(
         design,
         request.settings,
@@ -205,15 +206,6 @@ def level_search(request: RecordRequest, design: Design) -> LevelSearch:
         amplitude,
         allowed if others or depends else None,
         bounds.most_moves,
-    )
-
-
-def _affords(bounds: Bounds) -> bool:
-    """Return whether the limits on the power of the inputs admit all of the amplitude."""
-    squares = np.zeros(1) if bounds.amplitude is None else bounds.amplitude**2
-    return all(
-        (squares.sum() if channel is None else squares[channel]) <= most * MET
-        for _, channel, most in bounds.powers
     )
 
 
@@ -330,21 +322,17 @@ def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
     return whole.length(samples) if whole.feasible(samples, least_period(inputs)) else None
 
 
-def redrawn(request: RecordRequest, design: Design, inputs: int, samples: int) -> Redrawn:
-    """Return a generator of other records of the designed spectrum, of this length, with uniform phases."""
-    settings, found = request.settings, design.result
+def redrawn(request: RecordRequest, basis: Family, x: Array, samples: int) -> Redrawn:
+    """Return a generator of other records of a spectrum, of this length, with uniform phases."""
+    settings = request.settings
     if settings.phases != "random":
         settings = replace(settings, phases="orthogonal")
-    spectrum = designed_spectrum(request, design, inputs)
-    generator = SignalGenerator(spectrum, settings, samples, request.band)
-    return Redrawn("design", generator, found.basis, found.x)
+    generator = SignalGenerator(spectrum_of(request, basis, x), settings, samples, request.band)
+    return Redrawn("design", generator, basis, x)
 
 
 def given_record(
-    request: RecordRequest,
-    experiment: Experiment,
-    spectrum: DesignedSpectrum,
-    ratio: Callable[[Array], float],
+    request: RecordRequest, experiment: Experiment, basis: Family, x: Array, ratio: Callable[[Array], float]
 ) -> Record | None:
     """Return a record of a given spectrum, of its power as far as limits allow; None if too short or long."""
     settings = replace(request.settings, candidates=1, most_candidates=1)
@@ -352,14 +340,15 @@ def given_record(
     if not request.feasible(experiment.samples, least_period(experiment.inputs)):
         return None
     limited = partial(limited_responses, experiment, request.bounds, request.step, settings.hold)
+    spectrum = spectrum_of(request, basis, x)
     generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
     plant = FiniteRecord(experiment, samples, request.step)
     return best_record(generator, plant, Target(ratio), request.bounds)
 
 
-def designed_spectrum(request: RecordRequest, design: Design, inputs: int) -> DesignedSpectrum:
-    """Return the spectrum of a design, for values as far apart as asked."""
-    return DesignedSpectrum.of(design.result.basis, design.result.x, inputs=inputs, step=request.step)
+def spectrum_of(request: RecordRequest, basis: Family, x: Array) -> DesignedSpectrum:
+    """Return a spectrum for values as far apart as asked."""
+    return DesignedSpectrum.of(basis, x, inputs=basis.inputs, step=request.step)
 
 
 def least_period(inputs: int) -> int:

@@ -20,7 +20,7 @@ from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import jointly_whitened
-from inputdesign_cli.questions.common.knowledge import Knowledge
+from inputdesign_cli.questions.common.foresight import Knowledge
 
 CONFIDENCE = 0.999
 """Of the statements on plants that were not drawn."""
@@ -43,23 +43,18 @@ class Batch:
         """Return the number of plants that were unstable."""
         return self.drawn - len(self.plants)
 
-    def only(self, kept: Sequence[int]) -> Batch:
-        """Return the batch of the plants with these numbers."""
-        return replace(self, thetas=self.thetas[list(kept)], plants=tuple(self.plants[i] for i in kept))
-
 
 @dataclass(frozen=True)
 class Kept:
     """Holds the largest ratio of an error at a plant to the admitted one, and its frequency.
 
-    `cost` is that of the design at the plant, where that is looked at, and `asked` are the requirements at a
-    plant that the design was not made for.
+    `asked` are the requirements there, and `cost` is that of the design at the plant where it is looked at.
     """
 
     share: float
+    asked: tuple[Requirement, ...]
     frequency: float | None = None
     cost: float = 0.0
-    asked: tuple[Requirement, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -150,7 +145,7 @@ def _worst(
     problem: Problem, design: Design, informations: NDArray[np.float64], above: float = -np.inf
 ) -> list[Kept]:
     """Return the largest error ratio at each scenario, with M_s (S, k, k); one up to `above` may become 0."""
-    worst = [Kept(0.0)] * len(problem.scenarios)
+    worst = [Kept(0.0, (*there.requirements, *there.side)) for there in problem.scenarios]
     for side in (False, True):
         # Where the best accuracy is sought, requirements may have the ratio that is reached.
         best = design.problem.goal == "factor" and not side
@@ -158,7 +153,7 @@ def _worst(
         for index, violation in problem.demands.violations(informations, above=above * admitted, side=side):
             number, share = problem.demands.asked[index].scenario, violation.ratio / admitted
             if share > worst[number].share:
-                worst[number] = Kept(share, violation.frequency)
+                worst[number] = replace(worst[number], share=share, frequency=violation.frequency)
     return worst
 
 
@@ -178,24 +173,22 @@ def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.floa
     )
 
 
-def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Kept]:
+def tried_on(design: Design, samples: int, plants: Sequence[Alternative], above: float = 0.0) -> list[Kept]:
     """Return the accuracy at plants outside the design; a ratio up to `above` may come out as 0."""
     seconds_left()
     try:
-        at = _at(design, samples, batch.plants)
+        at = _at(design, samples, plants)
         kept = _worst(at, design, at.informations(design.result.x), above)
         if at.paid == "worst" and at.goal == "cost":
             costs = [cost.at(design.result.x) for cost in at.costs]
             kept = [replace(one, cost=costs[i % len(costs)]) for i, one in enumerate(kept)]
+        return kept
     except (np.linalg.LinAlgError, IdesignError):
-        if len(batch.plants) > 1:  # one of them is to blame, or more
-            each = (batch.only([place]) for place in range(len(batch.plants)))
-            return [tried for own in each for tried in tried_on(design, samples, own, above=above)]
-        (plant,) = batch.plants  # the experiment does not identify all of its parameters
-        own = plant.at(plant.experiment)
-        return [Kept(np.inf, asked=(*own.requirements, *own.side))]
-    pairs = zip(kept, at.scenarios, strict=True)
-    return [replace(one, asked=(*there.requirements, *there.side)) for one, there in pairs]
+        if len(plants) > 1:  # one of them is to blame, or more
+            return [kept for plant in plants for kept in tried_on(design, samples, [plant], above)]
+        # The experiment does not identify all of its parameters.
+        own = plants[0].at(plants[0].experiment)
+        return [Kept(np.inf, (*own.requirements, *own.side))]
 
 
 def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:

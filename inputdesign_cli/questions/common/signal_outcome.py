@@ -19,7 +19,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.text_formats import WRITERS
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.delivery import adding
-from inputdesign_cli.questions.common.record import Delivery, RecordRequest
+from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
 from inputdesign_cli.signal.selection import Record
 
@@ -31,7 +31,6 @@ _SETTLED = 0.02
 
 def signal_of(
     request: RecordRequest,
-    units: Units,
     experiment: Experiment,
     record: Record,
     requirements: Sequence[Requirement] = (),
@@ -44,7 +43,7 @@ def signal_of(
     The value of a criterion is for an experiment of the design's length that goes on as the record does.
     Other requirements have their worst ratio.
     """
-    samples, made = record.samples, record.method != "given"
+    units, samples, made = request.units, record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)
     criterion, value, efficiency = criterion_of(requirements), None, None
     ratio = record.worst_ratio if requirements and np.isfinite(record.worst_ratio) else None
@@ -52,7 +51,8 @@ def signal_of(
         level = criterion.level(plant.information_of_experiment(samples))
         value = criterion.value(level)
         efficiency = None if designed is None else level / criterion.level(designed)
-    delivery, y, u = request.delivery, plant.signals("output", samples), plant.signals("input", samples)
+    y, u = plant.signals("output", samples), plant.signals("input", samples)
+    points = request.operating_points
     return replace(
         plain_signal(samples),
         type=record.method,
@@ -67,13 +67,11 @@ def signal_of(
         worst_ratio=ratio if criterion is None else None,
         extra_power=record.extra_power if made else None,
         spectrum_error=None if spectrum is None else _spectrum_error(spectrum.lines(len(samples)), samples),
-        limits=_limits(request, units, record) or None,
+        limits=_limits(request, record) or None,
         of_limits=request.bounds.shares(u, y) or None,
         spectral_factor_residual=record.factor_residual,
-        operating_point=None
-        if delivery.operating_points is None or not made
-        else _channels(delivery.operating_points),
-        wav_full_scale=_full_scale(delivery, record) if "wav" in delivery.also else None,
+        operating_point=None if points is None or not made else _channels(points),
+        wav_full_scale=_full_scale(request, record) if "wav" in request.also else None,
         moves=_moves(samples, units.sample_time) if made and _of_moves(request) else None,
         details=_details(request, record),
     )
@@ -108,21 +106,17 @@ def _channels(values: Array) -> tuple[float, ...]:
 
 
 def with_record(
-    results: Results,
-    request: RecordRequest,
-    units: Units,
-    experiment: Experiment,
-    record: Record,
-    signal: Signal,
+    results: Results, request: RecordRequest, experiment: Experiment, record: Record, signal: Signal
 ) -> Results:
     """Return the results with a record: signal.csv, predicted_output.csv, their plot, and other files."""
+    units = request.units
     time = units.sample_time * np.arange(len(record.samples), dtype=np.float64)
-    signals = list(applied(request.delivery, record).T)
+    signals = list(applied(request, record).T)
     columns = {
         units.time_header: time,
         **dict(zip(map(units.header, units.excitations), signals, strict=True)),
     }
-    around, most, n = request.delivery.operating_points, request.bounds.output, len(time)
+    around, most, n = request.operating_points, request.bounds.output, len(time)
     y = FiniteRecord(experiment, n, units.step).signals("output", record.samples)
     noise = noise_deviation(experiment, n, units.step)
     panels, predicted = [], {units.time_header: time}
@@ -137,7 +131,7 @@ def with_record(
     curves = SignalCurves(
         time,
         dict(zip(units.excitations, signals, strict=True)),
-        _limits(request, units, record),
+        _limits(request, record),
         {name: units.label(name) for name in units.excitations},
         tuple(panels),
         held=units.sampled,
@@ -145,19 +139,18 @@ def with_record(
         levels=around is not None and bool(np.any(around)),
     )
     tables = {"signal": Table(columns), "predicted_output": Table(predicted)}
-    delivery = request.delivery
-    if "step_table" in delivery.also:  # the first value, and each that differs from the one before
+    if "step_table" in request.also:  # the first value, and each that differs from the one before
         moved = np.any(np.diff(record.samples, axis=0, prepend=np.nan) != 0.0, axis=1)
         tables["steps"] = Table({name: values[moved] for name, values in columns.items()})
     # signal.mat, .npz and .h (time, u1 or r1, .., sample_time), and signal.wav (32-bit float up to 1).
-    endings = [ending for ending in WRITERS if ending in delivery.also]
+    endings = [ending for ending in WRITERS if ending in request.also]
     files = {f"signal.{ending}": WRITERS[ending](columns, units.sample_time) for ending in endings}
-    if "wav" in delivery.also:
+    if "wav" in request.also:
         import scipy.io.wavfile
 
         buffer = io.BytesIO()
-        values = applied(delivery, record) / _full_scale(delivery, record)
-        scipy.io.wavfile.write(buffer, round(delivery.sampling_rate), values.astype(np.float32))
+        values = applied(request, record) / _full_scale(request, record)
+        scipy.io.wavfile.write(buffer, round(request.sampling_rate), values.astype(np.float32))
         files["signal.wav"] = buffer.getvalue()
     results = replace(results, files=files)
     return adding(results, replace(results.outcome, signal=signal), (), tables, {"signal": curves})
@@ -181,9 +174,9 @@ def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
     return np.where(still, grown[-1], grown)
 
 
-def _limits(request: RecordRequest, units: Units, record: Record) -> dict[str, tuple[float, float]]:
+def _limits(request: RecordRequest, record: Record) -> dict[str, tuple[float, float]]:
     """Return the least and largest value of each channel of the record, where that signal is limited."""
-    most, around = request.bounds.amplitude, request.delivery.operating_points
+    most, around, units = request.bounds.amplitude, request.operating_points, request.units
     if most is None or units.closed_loop or record.method == "given":
         return {}
     middle = np.zeros(most.size) if around is None else around
@@ -196,9 +189,9 @@ def _largest_moves(u: Array) -> Array:
     return np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0)
 
 
-def applied(delivery: Delivery, record: Record) -> Array:
+def applied(request: RecordRequest, record: Record) -> Array:
     """Return samples (n, r) about the operating points; raise `out-of-range` where they lose their digits."""
-    points = delivery.operating_points
+    points = request.operating_points
     if points is None or record.method == "given":
         return record.samples
     if np.any(np.spacing(np.abs(points)) > _LOST * np.abs(record.samples).max(axis=0)):
@@ -208,11 +201,11 @@ def applied(delivery: Delivery, record: Record) -> Array:
     return record.samples + points
 
 
-def _full_scale(delivery: Delivery, record: Record) -> float:
+def _full_scale(request: RecordRequest, record: Record) -> float:
     """Return the value at full scale in signal.wav, of all channels: the largest range or value."""
-    if delivery.full_scale is not None and record.method != "given":
-        return delivery.full_scale
-    return float(np.abs(applied(delivery, record)).max())
+    if request.full_scale is not None and record.method != "given":
+        return request.full_scale
+    return float(np.abs(applied(request, record)).max())
 
 
 def _spectrum_error(lines: Lines, samples: Array) -> float:

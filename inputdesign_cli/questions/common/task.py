@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -31,8 +30,6 @@ from inputdesign_cli.signal.selection import Record
 
 # Errors that grow by less than this, relative, where the start is unknown are not mentioned.
 _MATTERS = 0.2
-# A start that has faded to one per cent no longer counts.
-_FADED = float(np.log(100.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,19 +79,19 @@ class SpectrumTask(ABC):
 
         A design is of spectra, which have no start; the record may live on its start from rest.
         """
-        samples, step, found = record.samples, self.record.step, list(findings)
+        samples, found = record.samples, list(findings)
         if np.isfinite(record.worst_ratio):
-            growth = growth_by_start(experiment, samples, step, requirements)
+            growth = growth_by_start(experiment, samples, self.record.step, requirements)
             if growth > 1.0 + _MATTERS:
                 known = growth if np.isfinite(growth) else None
                 signal = replace(signal, details={**signal.details, "begun_anywhere": known})
                 found.append(start_matters(growth))
-        results = with_record(results, self.record, self.header.units, experiment, record, signal)
-        results = adding(results, results.outcome, found)
-        if self.foresight is None:
-            return results
-        foreseen, rivals = self.foresight.foreseen(samples, requirements)
-        return adding(results, replace(results.outcome, foreseen=foreseen), rivals)
+        results = with_record(results, self.record, experiment, record, signal)
+        outcome = results.outcome
+        if self.foresight is not None:
+            foreseen, rivals = self.foresight.foreseen(samples, requirements)
+            outcome, found = replace(outcome, foreseen=foreseen), [*found, *rivals]
+        return adding(results, outcome, found)
 
     def to_be_tried(
         self,
@@ -117,31 +114,16 @@ class SpectrumTask(ABC):
 def growth_by_start(
     experiment: Experiment, record: Array, step: float, requirements: Sequence[Requirement]
 ) -> float:
-    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown.
-
-    What samples after the start has faded show, about their means, decides where it is enough.
-    """
-    plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
-    try:
-        at_rest = error(plant.information(record))
-    except np.linalg.LinAlgError:
-        return np.inf
-    if at_rest <= 0.0:
-        return 1.0
-    unit = step if experiment.model.continuous else 1.0
-    damping = max(float(np.min(experiment.singularities.imag, initial=1.0)), 1e-9)
-    psi = plant.gradient(record)[int((_FADED / damping + experiment.memory) / unit) + 1 :]
-    with suppress(np.linalg.LinAlgError):  # too few samples are left
-        moved = psi - psi.mean(axis=0) if len(psi) else np.zeros_like(psi)
-        late = moved.swapaxes(0, 1).reshape(experiment.size, -1)
-        bound = error(plant.known + late @ late.T) / at_rest
-        if bound <= 1.0 + _MATTERS:
-            return bound
+    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown."""
     from inputdesign_cli.identification import information_begun_anywhere
 
+    plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
     u, y = plant.signals("input", record), plant.signals("output", record)
-    anywhere = information_begun_anywhere(experiment.model, u, y, step)
     try:
+        at_rest = error(plant.information(record))
+        if at_rest <= 0.0:
+            return 1.0
+        anywhere = information_begun_anywhere(experiment.model, u, y, step)
         return error(plant.known + experiment.whiten_matrix(anywhere)) / at_rest
     except np.linalg.LinAlgError:
         return np.inf

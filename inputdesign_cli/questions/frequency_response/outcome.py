@@ -227,7 +227,7 @@ def response_results(
 ) -> Results:
     """Return the outcome with its tables and figures."""
     units, experiment = terms.header.units, terms.experiment
-    signal = signal_of(request, units, experiment, plan.record)
+    signal = signal_of(request, experiment, plan.record)
     signal = replace(signal, worst_ratio=plan.record.worst_ratio, start_shift=plan.shift)
     matrices = _matrices(plan.powers)
     spectrum = {units.frequency_header: terms.frequency, **hermitian_columns(matrices, "power")}
@@ -238,7 +238,7 @@ def response_results(
     lines = SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True)
     curves: dict[str, Curves] = {"deviations": drawn, "spectrum": lines}
     results = results_of(terms.header, response_outcome(terms, plan, timing), tables, curves)
-    return with_record(results, request, units, experiment, plan.record, signal)
+    return with_record(results, request, experiment, plan.record, signal)
 
 
 def deviations(

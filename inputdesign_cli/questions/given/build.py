@@ -9,7 +9,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.findings.designs import StatedLimits
-from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import InPhase
 from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits
@@ -124,19 +124,11 @@ def _excitation(spec: Spec, stated: stated_spectrum.GivenSpectrum, experiment: E
     match stated.given:
         case stated_spectrum.GivenSignal() as given:
             samples = read_excitation_record(spec, given.signal, "spectrum.given.signal")
-            plant = FiniteRecord(experiment, len(samples), record_step(spec))
-            power_of: dict[PowerKind, list[float]] = {
-                kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS
-            }
-
-            def information(coordinates: Experiment) -> Array:
-                return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
-
-            return GivenExcitation("signal", power_of, information, samples=samples)
+            return GivenExcitation("signal", experiment, samples=samples, step=record_step(spec))
         case stated_spectrum.GivenWhite(power=power):
             powers = np.array(power if isinstance(power, tuple) else [power / r] * r, dtype=float)
             white = TabulatedSpectrum.white(powers, experiment.band)
-            return GivenExcitation.spectral("white", white, np.ones(1), experiment)
+            return GivenExcitation("white", experiment, (white, np.ones(1)))
         case stated_spectrum.GivenMultisine() as given:
             frequencies, amplitudes = _sinusoids(spec, given)
             constant = (frequencies <= 0.0) | (spec.plant.sampled & (frequencies >= np.pi))
@@ -145,10 +137,9 @@ def _excitation(spec: Spec, stated: stated_spectrum.GivenSpectrum, experiment: E
             x = np.where(constant, 1.0, 0.5) * size**2
             w = frequencies * record_step(spec)
             in_phase = None if r == 1 else InPhase("design", w, amplitudes, lines, x)
-            return GivenExcitation.spectral("multisine", lines, x, experiment, in_phase=in_phase)
+            return GivenExcitation("multisine", experiment, (lines, x), in_phase)
         case stated_spectrum.GivenTable() as given:
-            basis, x = read_given_spectrum(spec, given.file, r)
-            return GivenExcitation.spectral("table", basis, x, experiment)
+            return GivenExcitation("table", experiment, read_given_spectrum(spec, given.file, r))
 
 
 def _sinusoids(spec: Spec, given: stated_spectrum.GivenMultisine) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -20,29 +20,33 @@ from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.findings.designed_records import too_long
 from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept, met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
+from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, spectral_information
 from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectrum, White
 from inputdesign_cli.outcome.objectives import white_labels
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound import Informed
-from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates, Simulator
+from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
-from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, worst_ratio
+from inputdesign_cli.questions.common.record import (
+    as_long,
+    given_record,
+    least_period,
+    ratio_at,
+    redrawn,
+    worst_ratio,
+)
 from inputdesign_cli.questions.common.robust import MET, Kept, Plants
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import spectrum_curves
 from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
 from inputdesign_cli.questions.least_cost.robust_outcome import (
-    Floor,
     RobustResult,
     fresh_plants,
     plants_kept,
     worst_plant,
 )
-from inputdesign_cli.signal.generator import SignalGenerator
-from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
@@ -55,77 +59,73 @@ _TABLE_SHARE, _TABLE_ERROR = 0.5, 1e-4
 
 @dataclass(frozen=True)
 class GivenExcitation:
-    """Holds an excitation by kind, its powers by channel, and M (k, k) in an experiment's coordinates.
+    """Holds an excitation by kind, for the `experiment` of the spec: its spectrum, or a record.
 
-    A recorded signal has `samples` (n, r), the others a `basis` with coefficients `x`. Sinusoids `in_phase`
-    over several inputs have power matrices of rank one, in every period.
+    A `spectrum` is a basis with its coefficients; recorded `samples` (n, r) are a `step` apart. Sinusoids
+    `in_phase` over several inputs have power matrices of rank one, in every period.
     """
 
     kind: str
-    power: dict[PowerKind, list[float]]
-    information: Callable[[Experiment], Array]
-    basis: TabulatedSpectrum | LinesBasis | None = None
-    x: Array | None = None
+    experiment: Experiment
+    spectrum: tuple[TabulatedSpectrum | LinesBasis, Array] | None = None
     in_phase: InPhase | None = None
     samples: Array | None = None
+    step: float = 1.0
 
-    def drawn(self, step: float) -> DesignedSpectrum:
-        """Return the spectrum for samples that are a step apart."""
-        assert self.basis is not None
-        assert self.x is not None
-        return DesignedSpectrum.of(self.basis, self.x, inputs=len(self.power["excitation"]), step=step)
+    @classmethod
+    def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
+        """Return white excitation of this total power, flat over the band and even over channels."""
+        share = np.full(experiment.inputs, power / experiment.inputs)
+        return cls("white", experiment, (TabulatedSpectrum.white(share, experiment.band), np.ones(1)))
+
+    def information(self, experiment: Experiment) -> Array:
+        """Return M (k, k) in the coordinates of an experiment."""
+        if self.spectrum is not None:
+            return spectral_information(*self.spectrum, experiment)
+        assert self.samples is not None
+        return FiniteRecord(experiment, len(self.samples), self.step).information(self.samples)
+
+    @cached_property
+    def power(self) -> dict[PowerKind, list[float]]:
+        """Return the mean squares by kind and channel."""
+        experiment, model, found = self.experiment, self.experiment.model, dict[PowerKind, list[float]]()
+        for kind in POWER_KINDS:
+            if self.samples is not None:
+                plant = FiniteRecord(experiment, len(self.samples), self.step)
+                found[kind] = plant.mean_squares(kind, self.samples).tolist()
+            elif self.spectrum is not None:
+                basis, x = self.spectrum
+                densities = [
+                    partial(experiment.power_density, kind, channel=channel)
+                    for channel in range(model.outputs if kind == "output" else model.inputs)
+                ]
+                each = [basis.integrals(density, experiment.singularities) for density in densities]
+                found[kind] = [float(x @ unit) for unit in each]
+        return found
 
     @property
     def scale(self) -> float:
         """Return the power of the white excitation that coordinates are whitened by."""
         return max(sum(self.power["excitation"]), 1e-300)
 
-    @classmethod
-    def spectral(
-        cls,
-        kind: str,
-        basis: TabulatedSpectrum | LinesBasis,
-        x: Array,
-        experiment: Experiment,
-        *,
-        in_phase: InPhase | None = None,
-    ) -> GivenExcitation:
-        """Return an excitation that is known by its spectrum."""
-
-        def power(of: PowerKind, channel: int) -> float:
-            unit = basis.integrals(
-                lambda w: experiment.power_density(of, w, channel), experiment.singularities
-            )
-            return float(x @ unit)
-
-        model = experiment.model
-        found = {
-            of: [power(of, i) for i in range(model.outputs if of == "output" else model.inputs)]
-            for of in POWER_KINDS
-        }
-        information = partial(spectral_information, basis, x)
-        return cls(kind, found, information, basis, x, in_phase)
-
     def at(self, plant: Alternative, samples: int) -> Kept:
         """Return the largest error ratio at a plant: infinite if its parameters are undetermined."""
         seconds_left()
         own = replace(plant.experiment, samples=samples)
-        asked = tuple(make(own) for make in (*plant.requirements, *plant.side))
         try:
             coordinates = own.whitened(self.scale)
             there = plant.at(coordinates)
-            found = _kept((*there.requirements, *there.side), self.information(coordinates))
-            return replace(found, asked=asked)
+            return _kept((*there.requirements, *there.side), self.information(coordinates))
         except OutOfTimeError:
             raise
         except (np.linalg.LinAlgError, IdesignError):
-            return Kept(np.inf, asked=asked)
+            return Kept(np.inf, tuple(make(own) for make in (*plant.requirements, *plant.side)))
 
     def described(self, units: Units) -> Spectrum:
         """Return the entry of the outcome for this excitation."""
         details: dict[str, object] = {"given": self.kind}
-        if isinstance(self.basis, LinesBasis) and self.x is not None:
-            frequencies, powers = self.basis.lines(self.x)
+        if self.spectrum is not None and isinstance(self.spectrum[0], LinesBasis):
+            frequencies, powers = self.spectrum[0].lines(self.spectrum[1])
             shown = powers[:, 0, 0].real if units.inputs == 1 else powers
             details |= {"frequencies": frequencies / units.frequency, "powers": shown}
         elif self.kind == "white":
@@ -133,12 +133,6 @@ class GivenExcitation:
             if units.inputs == 1:
                 details["coefficients"] = self.power["excitation"]
         return Spectrum("given", details)
-
-    @classmethod
-    def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
-        """Return white excitation of this total power, flat over the band and even over channels."""
-        share = np.full(experiment.inputs, power / experiment.inputs)
-        return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +150,7 @@ class GivenTask(SpectrumTask):
     cost: dict[PowerKind, Weight]
     alpha: float
     calibration: Calibration | None
-    simulator: Simulator | None
+    simulator: SimulatedEstimates | None
     limits: StatedLimits
     plants: Plants | None
 
@@ -181,15 +175,13 @@ class GivenTask(SpectrumTask):
         simulated = self._simulated(experiment)
         confidence = Confidence.of(self.calibration, requirements, information, self.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
-        informed, white = self._informed(experiment, requirements, information)
-        results = self._report(experiment, informed, white, requirements, confidence)
+        results, informed = self._report(experiment, information, requirements, confidence)
         record, signal = self._record(experiment, worst_ratio(requirements)), None
         if record is None:
             found = too_long(self.record.length(experiment.samples), self.record.longest)
         else:
-            signal, found = signal_of(self.record, informed.units, experiment, record, requirements), []
-        power = Powers.of(excitation.power)
-        found += limits_not_kept(self.limits, experiment.samples, power, signal)
+            signal, found = signal_of(self.record, experiment, record, requirements), []
+        found += limits_not_kept(self.limits, experiment.samples, Powers.of(excitation.power), signal)
         if record is None or signal is None:
             results = adding(results, results.outcome, found)
         else:
@@ -203,64 +195,62 @@ class GivenTask(SpectrumTask):
             results, record.samples, renewed, confidence.alpha, informed, experiment, requirements
         )
 
-    def _informed(
-        self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
-    ) -> tuple[Informed, White]:
-        """Return the accuracy curves of the excitation, and white excitation at the same cost."""
-        cost = weighted_sum(self.cost, self.excitation.power)
-        level = cost / weighted_sum(self.cost, GivenExcitation.even(self.experiment, 1.0).power)
-        white = GivenExcitation.even(self.experiment, level).information(experiment)
-        errors, stated = self.errors(experiment, requirements)
-        found = White(cost=cost, excitation_power=level)
-        kind = None if self.criterion is None else self.criterion(experiment).letter
-        labels, known = white_labels(kind, found, experiment.samples), (errors, information, stated)
-        return Informed(self.header.units, *known, white=white, white_labels=labels, label="given"), found
-
     def _report(
         self,
         experiment: Experiment,
-        informed: Informed,
-        white: White,
+        information: Array,
         requirements: Sequence[Requirement],
         confidence: Confidence,
-    ) -> Results:
-        """Return the accuracy that the excitation gives, with its tables and curves."""
-        units, excitation = informed.units, self.excitation
-        beyond, of_table = self._beyond(experiment, requirements, informed.information)
-        met = beyond <= max(_ROUNDING, of_table)
-        error, listed = accuracy_of(units, confidence, requirements, informed.information, np.zeros(0))
-        objective = None
+    ) -> tuple[Results, Informed]:
+        """Return the accuracy that the excitation gives, beside white excitation at the same cost."""
+        units, excitation = self.header.units, self.excitation
+        cost = weighted_sum(self.cost, excitation.power)
+        level = cost / weighted_sum(self.cost, GivenExcitation.even(self.experiment, 1.0).power)
+        white, objective = White(cost=cost, excitation_power=level), None
         if self.criterion is not None:
             criterion = self.criterion(experiment)
-            objective = Objective(criterion.letter, criterion.value(criterion.level(informed.information)))
+            objective = Objective(criterion.letter, criterion.value(criterion.level(information)))
+        errors, stated = self.errors(experiment, requirements)
+        informed = Informed(
+            units,
+            errors,
+            information,
+            stated,
+            white=GivenExcitation.even(self.experiment, level).information(experiment),
+            white_labels=white_labels(
+                None if objective is None else objective.kind, white, experiment.samples
+            ),
+            label="given",
+        )
+        beyond, of_table = self._beyond(experiment, requirements, information)
+        met = beyond <= max(_ROUNDING, of_table)
+        error, listed = accuracy_of(units, confidence, requirements, information, np.zeros(0))
         outcome = Outcome(
             title=self.header.title,
             status="given" if not requirements else "met" if met else "missed",
             objective=objective,
-            cost=white.cost,
+            cost=cost,
             samples=experiment.samples,
             power=Powers.of(excitation.power),
             model_error=error,
             requirements=listed,
-            information=information_of(experiment, informed.information),
+            information=information_of(experiment, information),
             spectrum=excitation.described(units),
             baseline=Baseline(white),
         )
         if met and of_table:
             outcome = outcome.saying([met_within_table(of_table)])
         tables, curves = informed.curves(experiment, self.ellipses)
-        if excitation.basis is not None and excitation.x is not None:
-            level = white.excitation_power if units.inputs == 1 else None
-            tables["spectrum"], drawn = spectrum_curves(
-                units, excitation.basis, excitation.x, experiment.band, white=level
-            )
-            curves["spectrum"] = replace(drawn, label="given")
+        if excitation.spectrum is not None:
+            flat = level if units.inputs == 1 else None
+            drawn = spectrum_curves(units, *excitation.spectrum, experiment.band, white=flat)
+            tables["spectrum"], curves["spectrum"] = drawn[0], replace(drawn[1], label="given")
         if self.plants is not None:
-            found = self._at_plants(experiment, self.plants, _kept(requirements, informed.information))
+            found = self._at_plants(experiment, self.plants, _kept(requirements, information))
             status = "missed" if found.entry.missed else outcome.status
             outcome = replace(outcome, robust=found.entry, status=status).saying(found.findings)
             tables |= found.tables
-        return results_of(self.header, outcome, tables, curves)
+        return results_of(self.header, outcome, tables, curves), informed
 
     def _at_plants(self, experiment: Experiment, plants: Plants, nominal: Kept) -> RobustResult:
         """Return the accuracy at the plants of `uncertainty`, the worst left out as far as allowed.
@@ -275,16 +265,15 @@ class GivenTask(SpectrumTask):
         looked_at = list(at_each)
         if plants.region is not None:
             starts = [experiment.model.theta, *(batch.thetas[place] for place in reversed(rising))]
-            worst_found, _ = worst_plant(plants.region, lambda _, plant: at(plant), starts)
+            worst_found, _ = worst_plant(plants.region, at, starts)
             plants, looked_at = replace(plants, searched=worst_found), [*looked_at, worst_found.kept]
         if not all(np.isfinite(one.share) for one in looked_at):
             message = "the given excitation does not determine the parameters of every plant of uncertainty"
             hint = "excite more frequencies, or state the uncertainty more tightly"
             raise bad_spec("not-exciting", message, hint=hint, key="uncertainty")
         binding = [int(np.argmax([one.share for one in at_each]))]
-        floors = [Floor.at(tried[place].asked) for place in kept]
-        found = plants_kept(self.header.units, plants, kept, at_each, binding, floors)
-        fresh, fewer = fresh_plants(plants, lambda drawn, _: [at(plant) for plant in drawn.plants])
+        found = plants_kept(self.header.units, plants, kept, at_each, binding)
+        fresh, fewer = fresh_plants(plants, lambda drawn, _: [at(plant) for plant in drawn])
         missed = sum(one.share > MET for one in looked_at)
         entry = replace(found.entry, missed=missed, fresh=fresh)
         return replace(found, entry=entry, findings=(*found.findings, *fewer))
@@ -297,9 +286,9 @@ class GivenTask(SpectrumTask):
         def largest(M: Array) -> float:
             return max((worst(r.violations(M)).ratio for r in requirements), default=0.0)
 
-        ratio, basis, x = largest(information), self.excitation.basis, self.excitation.x
+        ratio, (basis, x) = largest(information), self.excitation.spectrum or (None, np.ones(1))
         decides = _ROUNDING < ratio - 1.0 <= _TABLE_ERROR
-        if not decides or x is None or not isinstance(basis, TabulatedSpectrum):
+        if not decides or not isinstance(basis, TabulatedSpectrum):
             return ratio - 1.0, 0.0
         raised = largest(spectral_information(basis.raised(_TABLE_SHARE), x, experiment))
         return ratio - 1.0, min(ratio - raised, _TABLE_ERROR)
@@ -307,10 +296,11 @@ class GivenTask(SpectrumTask):
     def _record(self, experiment: Experiment, ratio: Callable[[Array], float]) -> Record | None:
         """Return the signal as given, or a record of the given spectrum; None if too short."""
         excitation, request = self.excitation, self.record
-        if excitation.samples is not None:
+        if excitation.spectrum is None:
+            assert excitation.samples is not None
             return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
         if excitation.in_phase is None or not request.feasible(experiment.samples, least_period(1)):
-            return given_record(request, experiment, excitation.drawn(request.step), ratio)
+            return given_record(request, experiment, *excitation.spectrum, ratio)
         samples, rng = request.length(experiment.samples), np.random.default_rng(request.settings.seed)
         record = excitation.in_phase.draw(1, samples, rng)[0]
         plant = FiniteRecord(experiment, samples, request.step)
@@ -328,15 +318,13 @@ class GivenTask(SpectrumTask):
 
     def _renewed(self, samples: int) -> Excitation | None:
         """Return the source of new records of the spectrum; None for a record that was given."""
-        excitation, request = self.excitation, self.record
-        if excitation.basis is None or excitation.x is None:
-            return None
-        spectrum = excitation.drawn(request.step)
-        generator = SignalGenerator(spectrum, request.settings, samples, request.band)
-        return excitation.in_phase or Redrawn("design", generator, excitation.basis, excitation.x)
+        given = self.excitation
+        if given.spectrum is None or given.in_phase is not None:
+            return given.in_phase
+        return redrawn(self.record, *given.spectrum, samples)
 
 
 def _kept(requirements: Sequence[Requirement], information: Array) -> Kept:
     """Return the largest ratio of an error to what is admitted, and where it is."""
     found = worst([one for requirement in requirements for one in requirement.violations(information)])
-    return Kept(found.ratio, found.frequency)
+    return Kept(found.ratio, tuple(requirements), found.frequency)

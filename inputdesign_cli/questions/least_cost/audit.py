@@ -20,7 +20,7 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.outcome import Objective, Outcome, plain, read_plain
+from inputdesign_cli.outcome import Outcome, plain, read_plain
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.questions.common.delivery import APART, check_claims, of_bounds, of_cost, of_limit
 from inputdesign_cli.questions.common.robust import kept_by
@@ -54,35 +54,27 @@ class _WrittenSpectrum:
     band: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True)
-class _Written:
-    """Holds the entries of `result.json` that are compared."""
-
-    status: str
-    objective: Objective
-    cost: float
-    spectrum: _WrittenSpectrum
-
-
 def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0) -> None:
     """Raise `InaccurateError` (`internal-disagreement`) if the written spectrum does not bear out the claims.
 
     Requirements that hold `on_grid` only are not claimed between its points. Of a `loose` proof the value and
     its bounds may differ by this share.
     """
-    written = read_plain(_Written, plain(outcome))
     remedy = "rescale the signals, restrict the band, or look for poles near the unit circle"
-    check_claims(_disagreements(done, written, max(APART, loose), on_grid=on_grid), remedy)
+    check_claims(_disagreements(done, outcome, max(APART, loose), on_grid=on_grid), remedy)
 
 
-def _disagreements(done: Designed, written: _Written, apart: float, *, on_grid: bool) -> Iterator[str]:
+def _disagreements(done: Designed, outcome: Outcome, apart: float, *, on_grid: bool) -> Iterator[str]:
     """Yield a sentence for each claim that the spectrum does not bear out."""
-    claimed, problem, goal = written.objective, done.problem, done.question.goal
+    claimed, problem, goal = outcome.objective, done.problem, done.question.goal
+    assert claimed is not None
+    assert outcome.cost is not None
     value, size = claimed.value, float(done.experiment.size) if claimed.kind == "D" else 0.0
     yield from of_bounds(claimed, apart, size)
-    if written.status == "nothing_needed":
+    if outcome.status == "nothing_needed":
         return
-    plants = [_Reread(done, written.spectrum, scenario) for scenario in problem.scenarios]
+    spectrum = read_plain(_WrittenSpectrum, plain(outcome.spectrum))
+    plants = [_Reread(done, spectrum, scenario) for scenario in problem.scenarios]
     # The nominal plant, and others that keep nearly all that is admitted.
     kept = kept_by(problem, done.design, done.experiment.samples)
     doubtful = [one for n, one in enumerate(plants) if n == 0 or kept[n].share > _DOUBTFUL]
@@ -103,7 +95,7 @@ def _disagreements(done: Designed, written: _Written, apart: float, *, on_grid: 
         sum(w * plants[number].power(kind, channel) for kind, channel, w in weights)
         for number in problem.paying
     ]
-    yield from of_cost(paid_for(problem.paid, costs), written.cost)
+    yield from of_cost(paid_for(problem.paid, costs), outcome.cost)
     for limit in done.question.limits:
         for number in (problem.limits[index].scenario for index in limit.everywhere(problem.limits)):
             yield from of_limit(limit, plants[number].power(limit.kind, limit.channel))

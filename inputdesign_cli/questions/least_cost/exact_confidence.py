@@ -16,7 +16,6 @@ from inputdesign_cli.questions.common.confidence import (
     SETTLED,
     Confidence,
     SimulatedEstimates,
-    Simulator,
     beyond_chance,
     bounded_errors,
     settled_alpha,
@@ -45,32 +44,30 @@ class ExactConfidence:
     calibration: Calibration
     usual: float
     question: Question
-    simulator: Simulator | None
+    simulator: SimulatedEstimates | None
 
     def designed(self, design: MakeDesign, request: RecordRequest) -> Designed:
         """Return the design that needs just the alpha that it is for."""
-        calibration, designs, sets = self.calibration, 0, 1
-        alpha, simulated, coverage = self._first_alpha(), None, None
+        calibration, alpha, designs, sets = self.calibration, self._first_alpha(), 0, 1
         for _ in range(_CORRECTIONS):
             done, made = self._settled(design, calibration, alpha)
             designs += made
-            alpha, simulated, coverage = done.confidence.alpha, self._simulated(done, request, sets), None
+            simulated, coverage = self._of_spectrum(done, request, sets), None
             if simulated is None:
                 break
             errors, before = bounded_errors(done.problem.requirements), calibration.excess
-            corrected = simulated.corrected(calibration, errors, done.information)
-            if abs(corrected.excess / before - 1.0) <= _CORRECTED:
-                coverage, asked = self._coverage(done, done.information, simulated), calibration.probability
-                if sets > 1 or not beyond_chance(coverage, asked):
+            calibration = simulated.corrected(calibration, errors, done.information)
+            if abs(calibration.excess / before - 1.0) <= _CORRECTED:
+                coverage = self._coverage(done, done.information, simulated)
+                if sets > 1 or not beyond_chance(coverage, self.calibration.probability):
                     break
                 sets = _SETS
-                corrected = replace(simulated, sets=sets).corrected(calibration, errors, done.information)
-            calibration = corrected
-            alpha *= corrected.excess / before
+                calibration = replace(simulated, sets=sets).corrected(calibration, errors, done.information)
+            alpha = done.confidence.alpha * calibration.excess / before
         coverage = coverage or self._coverage(done, done.information, simulated)
-        confidence = Confidence(done.confidence.alpha, self.usual, done.confidence.calibration, coverage)
         solver = done.answer.solver
         solver = replace(solver, details={**solver.details, "designs": designs})
+        confidence = replace(done.confidence, coverage=coverage)
         return replace(done, confidence=confidence, answer=replace(done.answer, solver=solver))
 
     def _settled(self, design: MakeDesign, calibration: Calibration, start: float) -> tuple[Designed, int]:
@@ -92,19 +89,28 @@ class ExactConfidence:
     def recorded(self, done: Designed, made: Made, request: RecordRequest, known: Known) -> Made:
         """Return the record `made`, or one that keeps the confidence: samples may need a larger alpha."""
         design, alpha, sets = done.design, done.confidence.alpha, 1
+        errors = bounded_errors(done.problem.requirements)
+
+        def needed(record: Record, information: Array) -> float:
+            """Return the alpha of a record with this information (k, k)."""
+            simulated, calibration = self._of_record(record), self.calibration
+            if simulated is not None:
+                calibration = replace(simulated, sets=sets).corrected(calibration, errors, information)
+            return calibration.alpha(errors, information)
+
         for _ in range(_RECORDS):
             information = known(made.record)
             if information is None or not (made.record and made.record.met):
                 return made
-            needed = self._needed(done, made.record, information, sets)
-            if needed <= alpha * (1.0 + SETTLED) and sets == 1:
+            found = needed(made.record, information)
+            if found <= alpha * (1.0 + SETTLED) and sets == 1:
                 coverage = self.of_record(done, made.record, information)
                 if beyond_chance(coverage, self.calibration.probability) < 0:
                     sets = _SETS
-                    needed = self._needed(done, made.record, information, sets)
-            if needed <= alpha * (1.0 + SETTLED):
+                    found = needed(made.record, information)
+            if found <= alpha * (1.0 + SETTLED):
                 break
-            alpha = needed
+            alpha = found
             stricter = tuple(with_alpha(design.problem.requirements, alpha))
             design = replace(design, problem=replace(design.problem, requirements=stricter))
             made = fitting_record(request, done.question.at_alpha(alpha), design, done.experiment.samples)
@@ -114,17 +120,9 @@ class ExactConfidence:
         ratio = worst_ratio(done.problem.requirements)(information)
         return replace(made, record=replace(made.record, worst_ratio=ratio))
 
-    def _needed(self, done: Designed, record: Record, information: Array, sets: int) -> float:
-        """Return the alpha of a record with this information (k, k)."""
-        errors, calibration = bounded_errors(done.problem.requirements), self.calibration
-        simulated = self._of_samples(record)
-        if simulated is not None:
-            calibration = replace(simulated, sets=sets).corrected(calibration, errors, information)
-        return calibration.alpha(errors, information)
-
     def of_record(self, done: Designed, record: Record, information: Array) -> Coverage:
         """Return the share of fresh estimates within the bounds, for a record of information (k, k)."""
-        return self._coverage(done, information, self._of_samples(record))
+        return self._coverage(done, information, self._of_record(record))
 
     def _coverage(self, done: Designed, information: Array, simulated: SimulatedEstimates | None) -> Coverage:
         errors, within = bounded_errors(done.problem.requirements), 1.0
@@ -133,15 +131,14 @@ class ExactConfidence:
         coverage = self.calibration.coverage(errors, information, within)
         return coverage if simulated is None else simulated.checked(coverage, errors, within)
 
-    def _simulated(self, done: Designed, request: RecordRequest, sets: int) -> SimulatedEstimates | None:
+    def _of_spectrum(self, done: Designed, request: RecordRequest, sets: int) -> SimulatedEstimates | None:
         """Return estimates of records of the designed spectrum; None if not asked for, or not made."""
-        samples = as_long(request, done.experiment)
+        samples, found = as_long(request, done.experiment), done.design.result
         if self.simulator is None or samples is None or not done.excites:
             return None
-        found = self.simulator.of(redrawn(request, done.design, done.experiment.inputs, samples), samples)
-        return found and replace(found, sets=sets)
+        return self.simulator.of(redrawn(request, found.basis, found.x, samples), samples, sets)
 
-    def _of_samples(self, record: Record) -> SimulatedEstimates | None:
+    def _of_record(self, record: Record) -> SimulatedEstimates | None:
         return None if self.simulator is None else self.simulator.of_record(record.samples)
 
     def _first_alpha(self) -> float:

@@ -64,7 +64,7 @@ _GRID_POINTS = 300
 
 
 def worst_plant(
-    region: Region, keeps: Callable[[Array, Alternative], Kept], starts: Sequence[Array]
+    region: Region, keeps: Callable[[Alternative], Kept], starts: Sequence[Array]
 ) -> tuple[Searched, Alternative]:
     """Return the worst plant of the region that ascents from parameters (k,) find, the worst known first."""
     tried, worst = 0, list[tuple[Array, Alternative, Kept]]()
@@ -77,7 +77,7 @@ def worst_plant(
         plant = region.at(theta)
         if plant is None:
             return 0.0
-        kept, tried = keeps(theta, plant), tried + 1
+        kept, tried = keeps(plant), tried + 1
         if not worst or kept.share > worst[0][2].share:
             worst = [(theta, plant, kept)]
         return kept.share
@@ -125,8 +125,8 @@ def with_worst_plants(
         shares = np.array([one.share for one in kept[1:]])
         thetas = [nominal, *plants.batch.thetas[np.argsort(-shares, kind="stable")]]
 
-        def keeps(theta: Array, plant: Alternative, design: Design = design, samples: int = samples) -> Kept:
-            return tried_on(design, samples, Batch(theta[None], (plant,), 1))[0]
+        def keeps(plant: Alternative, design: Design = design, samples: int = samples) -> Kept:
+            return tried_on(design, samples, [plant])[0]
 
         found, plant = worst_plant(region, keeps, thetas)
         if found.kept.share <= _NEARLY or added == _MOST_ADDED:
@@ -189,8 +189,7 @@ def robust_result(
     taking_part = (weight > _BINDS) | (shares >= 1.0 - _BINDS)
     binding = [place for place in np.lexsort((-shares, -weight)).tolist() if taking_part[place]]
     support = sum(place > 0 for place in binding)
-    floors = [Floor.at((*one.requirements, *one.side)) for one in problem.scenarios[1:]]
-    found = plants_kept(done.header.units, plants, kept, at_each, binding, floors)
+    found = plants_kept(done.header.units, plants, kept, at_each, binding)
     entry, promised = replace(found.entry, support=support), None
     if plants.paid == "worst" and problem.goal == "cost":
         costs, promised = costs_of(done, problem.basis, done.design.result.x), done.design.result.objective
@@ -212,12 +211,7 @@ def robust_result(
 
 
 def plants_kept(
-    units: Units,
-    plants: Plants,
-    kept: Sequence[int],
-    at_each: Sequence[Kept],
-    binding: Sequence[int],
-    floors: Sequence[Floor],
+    units: Units, plants: Plants, kept: Sequence[int], at_each: Sequence[Kept], binding: Sequence[int]
 ) -> RobustResult:
     """Return the source of the plants, the number that counts, the worst of them, and scenarios.csv.
 
@@ -225,7 +219,8 @@ def plants_kept(
     """
     numbers, batch = [0, *(number + 1 for number in kept)], plants.batch
     shares = np.array([one.share for one in at_each])
-    worst, raised = int(np.argmax(shares)), [p for p, one in enumerate(floors) if one.raised]
+    worst, floors = int(np.argmax(shares)), [Floor.at(one.asked) for one in at_each[1:]]
+    raised = [p for p, one in enumerate(floors) if one.raised]
     floor: parts.FloorUse | None = None
     if raised:  # numbers of the plants that are held to the floor, and of those without an r_adm of their own
         lost = sorted((p for p in raised if floors[p].lost), key=lambda p: -(floors[p].peak or 0.0))
@@ -280,9 +275,7 @@ def _searched(units: Units, plants: Plants) -> parts.SearchedPlant | None:
     found = plants.searched
     if found is None:
         return None
-    plant, floor = None if plants.at is None else plants.at(found.theta), None
-    if plant is not None:
-        floor = Floor.at([make(plant.experiment) for make in (*plant.requirements, *plant.side)])
+    floor = Floor.at(found.kept.asked)
     return parts.SearchedPlant(
         proved=False,
         region=found.region,
@@ -291,14 +284,14 @@ def _searched(units: Units, plants: Plants) -> parts.SearchedPlant | None:
         added=found.added,
         tried=found.tried,
         frequency=_at(units, found.kept),
-        lost=None if floor is None else floor.lost or None,
-        peak=None if floor is None else floor.peak,
+        lost=floor.lost or None,
+        peak=floor.peak,
     )
 
 
 def fresh_plants(
     plants: Plants,
-    try_on: Callable[[Batch, float], Sequence[Kept]],
+    try_on: Callable[[Sequence[Alternative], float], Sequence[Kept]],
     peak: Callable[[Experiment], float] | None = None,
     promised: float | None = None,
 ) -> tuple[parts.FreshPlants | None, list[Finding]]:
@@ -312,7 +305,7 @@ def fresh_plants(
     rejected, largest = 0, 0.0
     for batch in plants.afresh():
         try:
-            at_each = try_on(batch, min(largest, 1.0))
+            at_each = try_on(batch.plants, min(largest, 1.0))
         except OutOfTimeError:
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
@@ -358,8 +351,7 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.
             if theta is None or estimated is None:
                 shares.append(np.inf)
                 continue
-            tried = tried_on(done.design, samples, Batch(theta[None], (estimated,), 1))
-            shares += [one.share for one in tried]
+            shares += [one.share for one in tried_on(done.design, samples, [estimated])]
     except IdesignError:  # no time is left, or what is asked cannot be asked of this plant
         return None
     highest = float(np.quantile(shares, _MOST_OF_THEM, method="higher"))

@@ -14,17 +14,10 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings import unfinished
-from inputdesign_cli.findings.designed_records import (
-    accuracy_missed,
-    length_of_record,
-    less_accurate,
-    requirement_missed,
-    too_long,
-)
+from inputdesign_cli.findings import designed_records as of_records, unfinished
 from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.outcome import Outcome, Signal, White
+from inputdesign_cli.outcome import Outcome, White
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.objectives import white_labels
 from inputdesign_cli.outcome.results import Results, Table
@@ -34,9 +27,9 @@ from inputdesign_cli.questions.common.delivery import Delivered, adding, results
 from inputdesign_cli.questions.common.record import (
     Made,
     design_cost,
-    designed_spectrum,
     peak_at,
     redrawn,
+    spectrum_of,
     worst_ratio,
 )
 from inputdesign_cli.questions.common.searched_record import distance_to_best
@@ -74,7 +67,7 @@ class ConvexTask(SpectrumTask):
         checked = time.perf_counter()
         made = self._made(done)
         record, known = made.record, _known(done, made.record, self.record.step)
-        results = self._illustrated(done, outcome, record, known)
+        results, informed = self._illustrated(done, outcome, record, known)
         if done.plants is not None:
             peak = None if record is None else peak_at(made.request, done.design, record)
             robust = robust_result(done, done.plants, peak)
@@ -93,9 +86,9 @@ class ConvexTask(SpectrumTask):
         return self.to_be_tried(
             results,
             record.samples,
-            redrawn(made.request, made.design, record.samples.shape[1], len(record.samples)),
+            redrawn(made.request, made.design.result.basis, made.design.result.x, len(record.samples)),
             done.confidence.alpha,
-            self._informed(done),
+            informed,
             done.experiment,
             done.problem.requirements,
             flat=done.problem.demands.definite,
@@ -146,25 +139,13 @@ class ConvexTask(SpectrumTask):
             missing = unfinished.no_record_in_time(request.settings.candidates)
             return Made(None, request, done.design, findings=(missing,))
 
-    def _informed(self, done: Designed) -> Informed:
-        """Return the accuracy curves of the design: r_u of every entry if no model error is bounded."""
-        design = done.design
-        errors, stated = self.errors(done.experiment, done.asked)
-        white = design.white.informations[0] / (design.white.s if design.problem.goal == "factor" else 1.0)
-        return Informed(
-            self.header.units,
-            errors,
-            done.information,
-            stated,
-            [design.result.active_at(i) for i, r in enumerate(done.asked) if isinstance(r, OnModelError)],
-            np.asarray(white),
-            of_several=done.plants is not None,
-        )
-
     def _illustrated(
         self, done: Designed, outcome: Outcome, record: Record | None, known: Array | None
-    ) -> Results:
-        """Return the outcome with tables and curves; of a design without excitation the spectrum alone."""
+    ) -> tuple[Results, Informed]:
+        """Return the outcome with tables and curves; of a design without excitation the spectrum alone.
+
+        The accuracy curves are r_u of every entry if no model error is bounded.
+        """
         units, design, problem = self.header.units, done.design, done.problem
         level = design.white_power if units.inputs == 1 else None
         spectrum = spectrum_curves(
@@ -174,25 +155,28 @@ class ConvexTask(SpectrumTask):
             spectrum = with_periodogram(units, *spectrum, record.samples)
         tables: dict[str, Table] = {"spectrum": spectrum[0]}
         curves: dict[str, Curves] = {"spectrum": spectrum[1]}
-        if not done.excites:
-            return results_of(self.header, outcome, tables, curves)
-        informed = self._informed(done)
+        errors, stated = self.errors(done.experiment, done.asked)
         white = (None if outcome.baseline is None else outcome.baseline.white) or White()
-        if not informed.stated:
-            known = _known(done, record, self.record.step, own_length=False)
         kind = None if outcome.objective is None else outcome.objective.kind
-        informed = replace(
-            informed,
-            record=known,
-            equal=equal_white(design, done.experiment.samples, white.ratio or 0.0),
-            white_labels=white_labels(kind, white, done.experiment.samples),
+        informed = Informed(
+            units,
+            errors,
+            done.information,
+            stated,
+            [design.result.active_at(i) for i, r in enumerate(done.asked) if isinstance(r, OnModelError)],
+            design.white.informations[0] / (design.white.s if problem.goal == "factor" else 1.0),
+            equal_white(design, done.experiment.samples, white.ratio or 0.0) if done.excites else None,
+            known if stated else _known(done, record, self.record.step, own_length=False),
+            white_labels(kind, white, done.experiment.samples),
+            of_several=done.plants is not None,
         )
-        more = informed.curves(done.experiment, self.ellipses, flat=problem.demands.definite)
-        tables, curves = tables | more[0], curves | more[1]
-        optimality = optimality_curves(units, design)
-        if optimality is not None:
-            tables["optimality"], curves["optimality"] = optimality
-        return results_of(self.header, outcome, tables, curves)
+        if done.excites:
+            more = informed.curves(done.experiment, self.ellipses, flat=problem.demands.definite)
+            tables, curves = tables | more[0], curves | more[1]
+            optimality = optimality_curves(units, design)
+            if optimality is not None:
+                tables["optimality"], curves["optimality"] = optimality
+        return results_of(self.header, outcome, tables, curves), informed
 
     def _with_record(self, done: Designed, results: Results, made: Made, known: Array | None) -> Results:
         """Return the results with the record, and what a user should know before applying it."""
@@ -200,10 +184,22 @@ class ConvexTask(SpectrumTask):
         error = results.outcome.model_error
         coverage = None if error is None else error.confidence
         if record is None:
-            missing = too_long(request.length(done.experiment.samples), request.longest)
+            missing = of_records.too_long(request.length(done.experiment.samples), request.longest)
             found = [*confidence_missed(coverage, None), *made.findings, *missing]
             return adding(results, results.outcome, found)
-        signal = self._signal(done, made, record, known)
+        design, exact = made.design, self.asked.exact
+        signal = signal_of(
+            made.request,
+            replace(design.problem.experiment, samples=done.experiment.samples),
+            record,
+            design.problem.requirements,
+            designed=done.information if design is done.design else design.result.information,
+            spectrum=spectrum_of(made.request, design.result.basis, design.result.x),
+        )
+        if exact is not None and known is not None:
+            signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
+        if made.input_power is not None:
+            signal = replace(signal, spectrum_of={"input_power": made.input_power})
         shares, block = signal.of_limits or {}, request.settings.block
         limited = any(limit.upper for limit in problem.limits) or bool(shares)
         held = limited or request.bounds.hard or request.settings.level is not None
@@ -211,39 +207,21 @@ class ConvexTask(SpectrumTask):
         findings = [
             *confidence_missed(coverage, signal.confidence),
             *made.findings,
-            *accuracy_missed(record, held=held),
-            *length_of_record(record, asked, block, shares),
+            *of_records.accuracy_missed(record, held=held),
+            *of_records.length_of_record(record, asked, block, shares),
         ]
-        if known is not None:
-            spectral = problem.goal == "factor" and problem.demands.criterion is None
-            near = signal.distance_to_best is not None and signal.distance_to_best <= _NEAR
-            if spectral and not near:  # a record that is near the best there is needs no other
-                designed = float(np.sqrt(done.design.result.objective))
-                findings += less_accurate(record.worst_ratio, designed)
-            names = list(dict.fromkeys(requirement.name for requirement in problem.side))
-            findings += requirement_missed(names, worst_ratio(problem.side)(known))
-        return self.applied(results, done.experiment, record, signal, problem.requirements, findings)
-
-    def _signal(self, done: Designed, made: Made, record: Record, known: Array | None) -> Signal:
-        design, exact = made.design, self.asked.exact
-        signal = signal_of(
-            made.request,
-            self.header.units,
-            replace(design.problem.experiment, samples=done.experiment.samples),
-            record,
-            design.problem.requirements,
-            designed=done.information if design is done.design else design.result.information,
-            spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
-        )
-        if exact is not None and known is not None:
-            signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
         if known is not None:
             cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)
             distance = distance_to_best(done.design, record, known, cost)
             signal = replace(signal, distance_to_best=distance)
-        if made.input_power is None:
-            return signal
-        return replace(signal, spectrum_of={"input_power": made.input_power})
+            spectral = problem.goal == "factor" and problem.demands.criterion is None
+            near = distance is not None and distance <= _NEAR
+            if spectral and not near:  # a record that is near the best there is needs no other
+                designed = float(np.sqrt(done.design.result.objective))
+                findings += of_records.less_accurate(record.worst_ratio, designed)
+            names = list(dict.fromkeys(requirement.name for requirement in problem.side))
+            findings += of_records.requirement_missed(names, worst_ratio(problem.side)(known))
+        return self.applied(results, done.experiment, record, signal, problem.requirements, findings)
 
 
 def _known(done: Designed, record: Record | None, step: float, *, own_length: bool = True) -> Array | None:

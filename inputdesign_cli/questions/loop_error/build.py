@@ -30,7 +30,7 @@ from inputdesign_cli.questions.building.limits import build_power_limits, implie
 from inputdesign_cli.questions.building.signal_settings import build_bounds
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
-from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorSignalSettings, LoopErrorTask
+from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorTask
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
@@ -157,7 +157,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
     )
-    signal, spectrum = _signal(spec, error, plant.inputs), spec.spectrum
+    signal, spectrum, samples = spec.signal, spec.spectrum, spec.signal_samples
     simulation = spec.simulation or Simulation()
     check_compared(simulation.compare, "white")
     true, key = plant, "simulation.plant"
@@ -172,7 +172,14 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         tolerance=spec.solver.tolerance,
         cost=system.build_cost(spec),
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
-        signal=signal,
+        record_samples=samples,
+        filtered=signal.type == "filtered_noise",
+        # As many periods as inputs, where the record can be split so, make the designed matrix exact.
+        periods=signal.periods or (plant.inputs if samples % plant.inputs == 0 else 1),
+        order=signal.order,
+        candidates=signal.candidates or _CANDIDATES,
+        signal_seed=signal.seed or 0,
+        bounds=build_bounds(spec),
         true=replace(problem, plant=true, law=_law(spec, error, true, key)[1]),
         runs=simulation.runs,
         seed=simulation.seed,
@@ -211,32 +218,6 @@ def _transfer(spec: Spec, transfer: Transfer) -> Rational:
     return rational(transfer) if transfer.kind == "discrete" else held(transfer, spec.sample_time)
 
 
-def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalSettings:
-    check_record(spec, inputs**2)
-    signal, samples = spec.signal, spec.signal_samples
-    filtered = signal.type == "filtered_noise"
-    if filtered and error.covariance == "parametric":
-        what, hint = "filter noise to the lines of a parametric design", "write type: multisine"
-        raise _refuse("signal.type", what, f"{hint}, or covariance: asymptotic")
-    if not filtered and signal.periods is not None and samples % signal.periods:
-        raise bad_spec(
-            "conflicting-keys",
-            f"{samples} samples do not make {signal.periods} equal periods",
-            hint="choose a divisor of the number of samples",
-            key="signal.periods",
-        )
-    return LoopErrorSignalSettings(
-        samples=samples,
-        filtered=filtered,
-        # As many periods as inputs, where the record can be split so, make the designed matrix exact.
-        periods=signal.periods or (inputs if samples % inputs == 0 else 1),
-        order=signal.order,
-        candidates=signal.candidates or _CANDIDATES,
-        seed=signal.seed or 0,
-        bounds=build_bounds(spec),
-    )
-
-
 _SIGNAL_KEYS = ("hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation", "scale", "also")
 
 
@@ -266,3 +247,13 @@ def _check_supported(spec: Spec) -> None:
         "signal.phases": ("random",),
     }
     refuse_unhandled(spec, "closed_loop_error", remedies, handled)
+    check_record(spec, spec.plant.inputs**2)
+    error, periods, samples = spec.accuracy.closed_loop_error, spec.signal.periods, spec.signal_samples
+    filtered = spec.signal.type == "filtered_noise"
+    if filtered and error is not None and error.covariance == "parametric":
+        what, hint = "filter noise to the lines of a parametric design", "write type: multisine"
+        raise _refuse("signal.type", what, f"{hint}, or covariance: asymptotic")
+    if not filtered and periods is not None and samples % periods:
+        message = f"{samples} samples do not make {periods} equal periods"
+        hint = "choose a divisor of the number of samples"
+        raise bad_spec("conflicting-keys", message, hint=hint, key="signal.periods")

@@ -45,60 +45,238 @@ _LOWEST = 1e-3
 KEY = "accuracy.closed_loop_error"
 
 
-def design_outcome(
-    task: LoopErrorTask, design: LoopErrorDesign, signal: out.Signal, seconds: dict[str, float]
-) -> out.Outcome:
-    """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
-    samples, white = task.samples, design.white
-    lo, hi = (edge / task.header.units.sample_time for edge in design.problem.band)
-    informations = {"design": design.information, "white": white.information}
-    theories = {name: loss_theory(design.criterion, M) for name, M in informations.items()}
-    inputs, outputs = (np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance))
-    powers: dict[PowerKind, list[float]] = {"input": inputs, "output": outputs, "excitation": inputs}
-    # White noise of the same total power; in open loop the excitation is the input.
-    G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
-    even = [white.level * float(weights.sum())] * design.problem.plant.inputs
-    caused = white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
-    of_white: dict[PowerKind, list[float]] = {"input": even, "output": caused.tolist(), "excitation": even}
-    details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
-    objective = out.Objective(
-        "closed_loop_error",
-        design.value,
-        lower_bound=design.lower_bound,
-        relative_gap=design.gap,
-        any_spectrum_bound=design.lower_bound,
-    )
-    remedy = "rescale the signals, or restrict the band"
-    delivery.check_claims(delivery.of_bounds(objective, task.tolerance), remedy)
-    return out.Outcome(
-        title=task.header.title,
-        status=delivery.proof_status(design.gap, task.tolerance),
-        objective=objective,
-        cost=weighted_sum(task.cost, powers),
-        samples=samples,
-        power=out.Powers.of(powers),
-        closed_loop_error=out.ClosedLoopError(
-            law=task.law,
-            covariance=task.covariance,
-            expected=design.value / samples,
-            band=(lo, hi),
-            noise_model_part=design.noise_part,
-            parametric={name: theory_of(theory) for name, theory in theories.items()},
-            limits=_limits(design),
-        ),
-        information=out.Information(
-            design.problem.structure.names,
-            samples * design.information,
-            np.linalg.inv(design.information) / samples,
-        ),
-        spectrum=_spectrum(task, design),
-        baseline=out.Baseline(
-            out.White(value=white.value, ratio=white.value / design.value, power=out.Powers.of(of_white))
-        ),
-        signal=signal,
-        solver=out.Solver("exchange" if design.of_lines else "dual", task.tolerance, details=details),
-        timing_s=seconds,
-    )
+@dataclass(frozen=True)
+class LoopErrorTask:
+    """Designs for the closed-loop error, and studies the design.
+
+    The `law` of control is called as in the spec, and `grid` are the points of spectrum.csv. The `covariance`
+    is that of a high model order, or exact for the model structure. The record is `filtered` white noise, by
+    a rational filter of `order` states for each input or by taps (None), or a multisine of equal `periods`.
+    The runs are on the plant of `true`, and with `white` noise of equal power is tried, too.
+    """
+
+    problem: LoopErrorProblem
+    header: Header
+    law: str
+    covariance: Literal["asymptotic", "parametric"]
+    samples: int
+    tolerance: float
+    cost: Mapping[PowerKind, Weight]
+    grid: int
+    record_samples: int
+    filtered: bool
+    periods: int
+    order: int | None
+    candidates: int
+    signal_seed: int
+    bounds: Bounds
+    true: LoopErrorProblem
+    runs: int
+    seed: int
+    white: bool
+
+    def solve(self) -> Results:
+        """Return the design with its proof, its signal and its curves."""
+        return self._solved()[1]
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """Return the design with its Monte Carlo study and the histogram of the loss."""
+        _check_simulated(self.problem, self.true)
+        design, results = self._solved()
+        begun, samples = time.perf_counter(), self.record_samples
+        inputs = {"design": design_lines(design, samples)}
+        if self.white:
+            inputs["white"] = white_lines(design, samples)
+        studies = study_losses(
+            self.true, inputs, samples=samples, runs=self.runs, seed=self.seed, executor=executor
+        )
+        tried, improvement, curves = loss_results(self.true.parametric(), studies, inputs, samples)
+        names = tuple(self.true.plant.names)
+        study = Simulation(
+            self.runs, self.seed, tried, samples=samples, parameters=names, improvement=improvement
+        )
+        findings = unstable_runs({name: one.unstable for name, one in studies.items()}, self.runs)
+        return delivery.with_study(results, study, begun, findings, curves=curves)
+
+    def _solved(self) -> tuple[LoopErrorDesign, Results]:
+        started = time.perf_counter()
+        design = design_loop_error(self.problem, self.covariance, tolerance=self.tolerance)
+        solved = time.perf_counter()
+        samples, signal = self._realised(design)
+        outcome = self._outcome(design, signal, delivery.timing(started, solved))
+        tables, curves = self._drawn(design)
+        tables["signal"], curves["signal"] = signal_results(self.header.units, samples)
+        return design, delivery.results_of(self.header, outcome, tables, curves)
+
+    def _outcome(self, design: LoopErrorDesign, signal: out.Signal, seconds: dict[str, float]) -> out.Outcome:
+        """Return the content of result.json; raise `internal-disagreement` of value and bound."""
+        samples, white = self.samples, design.white
+        lo, hi = (edge / self.header.units.sample_time for edge in design.problem.band)
+        informations = {"design": design.information, "white": white.information}
+        theories = {name: loss_theory(design.criterion, M) for name, M in informations.items()}
+        inputs, outputs = (
+            np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance)
+        )
+        powers: dict[PowerKind, list[float]] = {"input": inputs, "output": outputs, "excitation": inputs}
+        # White noise of the same total power; in open loop the excitation is the input.
+        G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
+        even = [white.level * float(weights.sum())] * design.problem.plant.inputs
+        caused = white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
+        of_white: dict[PowerKind, list[float]] = {
+            "input": even,
+            "output": caused.tolist(),
+            "excitation": even,
+        }
+        details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
+        objective = out.Objective(
+            "closed_loop_error",
+            design.value,
+            lower_bound=design.lower_bound,
+            relative_gap=design.gap,
+            any_spectrum_bound=design.lower_bound,
+        )
+        remedy = "rescale the signals, or restrict the band"
+        delivery.check_claims(delivery.of_bounds(objective, self.tolerance), remedy)
+        return out.Outcome(
+            title=self.header.title,
+            status=delivery.proof_status(design.gap, self.tolerance),
+            objective=objective,
+            cost=weighted_sum(self.cost, powers),
+            samples=samples,
+            power=out.Powers.of(powers),
+            closed_loop_error=out.ClosedLoopError(
+                law=self.law,
+                covariance=self.covariance,
+                expected=design.value / samples,
+                band=(lo, hi),
+                noise_model_part=design.noise_part,
+                parametric={name: theory_of(theory) for name, theory in theories.items()},
+                limits=_limits(design),
+            ),
+            information=out.Information(
+                design.problem.structure.names,
+                samples * design.information,
+                np.linalg.inv(design.information) / samples,
+            ),
+            spectrum=self._spectrum(design),
+            baseline=out.Baseline(
+                out.White(value=white.value, ratio=white.value / design.value, power=out.Powers.of(of_white))
+            ),
+            signal=signal,
+            solver=out.Solver("exchange" if design.of_lines else "dual", self.tolerance, details=details),
+            timing_s=seconds,
+        )
+
+    def _drawn(self, design: LoopErrorDesign) -> tuple[dict[str, Table], dict[str, Curves]]:
+        """Return spectrum.csv on the grid that the spec asks for, and the figures."""
+        units, (lo, hi) = self.header.units, design.problem.band
+        if design.of_lines:
+            w, Phi, white = design.frequencies, design.spectrum, None
+            shown, drawn = w, Phi
+        else:
+            w, white = np.linspace(lo, hi, self.grid), design.white.level
+            Phi = design.density(w)
+            shown = np.geomspace(max(lo, _LOWEST * hi), hi, _POINTS)
+            drawn = design.density(shown)
+        table = Table({units.frequency_header: w / units.frequency, **hermitian_columns(Phi, "phi")})
+        _, gains, right = np.linalg.svd(design.problem.plant.plant_at(shown))
+        directions = adjoint(right)
+        power = np.einsum("kai,kab,kbi->ki", np.conj(directions), drawn, directions).real
+        frequency, lines = shown / units.frequency, design.of_lines
+        return {"spectrum": table}, {
+            "spectrum": SpectrumCurves(frequency, drawn, white=white, lines=lines),
+            "directions": DirectionCurves(frequency, gains, power, white=white, lines=lines),
+        }
+
+    def _spectrum(self, design: LoopErrorDesign) -> out.Spectrum:
+        unit, problem = self.header.units.frequency, design.problem
+        if design.of_lines:
+            lines = {"frequencies": design.frequencies / unit, "masses": design.spectrum}
+            return out.Spectrum("multisine", lines)
+
+        def trace(w: Array) -> Array:
+            return np.asarray(np.trace(design.density(w), axis1=1, axis2=2).real)
+
+        def at(w: float) -> dict[str, object]:
+            matrix = design.density(np.array([w]))[0]
+            return {
+                "frequency": w / unit,
+                "trace": float(np.trace(matrix).real),
+                "matrix": _tidy(matrix),
+                "eigenvalues": np.linalg.eigvalsh(matrix),
+            }
+
+        lo, hi = problem.band
+        grid = graded_grid(problem.plant.singularities, lo, hi)
+        peaks, heights = local_maxima(trace, grid, trace(grid))
+        shown = {"peak": float(peaks[np.argmax(heights)]), "lowest": lo, "highest": hi}
+        # C S Phi_r (C S)^* at the lowest frequency, the input of the loop there, and its matrix root.
+        w = np.array([lo])
+        applied = np.linalg.inv(problem.plant.plant_at(w)) @ problem.law.complementary(w)
+        matrix = applied @ (problem.entering(w) - problem.plant.disturbance_at(w)) @ adjoint(applied)
+        loop_input = {
+            "matrix": _tidy(matrix[0]),
+            "root": _tidy(power_of(matrix, 0.5)[0]),
+            "root_eigenvalues": np.sqrt(np.maximum(np.linalg.eigvalsh(matrix[0]), 0.0)),
+        }
+        details = {"grid": self.grid, **{name: at(w) for name, w in shown.items()}, "loop_input": loop_input}
+        return out.Spectrum("pointwise", details)
+
+    def _realised(self, design: LoopErrorDesign) -> tuple[Array, Signal]:
+        """Return the best of several records (N, n) by the error that it gives, scaled into the limits."""
+        samples, periods = self.record_samples, self.periods
+        if self.filtered:
+            make, residual, details = self._by_filter(design)
+        else:
+            lines = design_lines(design, samples // periods)
+            make = partial(even_multisine, lines, samples, periods=periods)
+            residual, details = None, {"periods": periods}
+        w = harmonics(samples)
+        metrics = design.problem.metrics(w)
+        best, value = None, np.inf
+        for stream in np.random.SeedSequence(self.signal_seed).spawn(self.candidates):
+            u = make(np.random.default_rng(stream))
+            powers = periodogram(u).powers
+            # What brings the record to its limits, by its own spectrum.
+            excess = np.max(np.einsum("pkab,kba->p", metrics, powers).real / design.problem.most)
+            excess = max(float(excess), max(self.bounds.shares(u).values(), default=0.0) ** 2)
+            try:
+                M = design.criterion.information(w, powers / excess, np.ones(w.size))
+                attained = design.criterion.value(M)
+            except np.linalg.LinAlgError:  # too short to excite every parameter
+                attained = np.inf
+            if best is None or attained < value:
+                best, value = u / np.sqrt(excess), attained
+        assert best is not None
+        if np.isfinite(value):
+            details["parametric_value"] = value
+        method = "filtered_noise" if self.filtered else "multisine"
+        return best, replace(
+            plain_signal(best), type=method, spectral_factor_residual=residual, details=details
+        )
+
+    def _by_filter(
+        self, design: LoopErrorDesign
+    ) -> tuple[Callable[[np.random.Generator], Array], float | None, dict[str, object]]:
+        """Return the generator of a record, the residual of its spectral factor, and other entries on it."""
+        samples, factor = self.record_samples, matrix_factor(design.density)
+        if self.order is None:
+            details: dict[str, object] = {"floor": factor.floor, "taps": int(factor.taps.shape[0])}
+            return lambda rng: factor.filtered(samples, rng), factor.residual, details
+        filter_ = rational_filter(factor.taps, self.order)
+        wanted = float(np.trace(design.input_covariance))
+        filter_ = filter_.scaled(float(np.sqrt(wanted / filter_.power().sum())))
+        w, weights = design.frequencies, design.weights
+        found: dict[str, object] = {
+            "floor": factor.floor,
+            "order": filter_.order,
+            "pole_radius": filter_.radius,
+            "filter_value": design.criterion.value(
+                design.criterion.information(w, filter_.spectrum(w), weights)
+            ),
+            "filter": {"A": filter_.A, "B": filter_.B, "C": filter_.C, "D": filter_.D},
+        }
+        return lambda rng: filter_.filtered(samples, rng), factor.residual, found
 
 
 def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
@@ -115,68 +293,9 @@ def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
     )
 
 
-def spectrum_results(
-    task: LoopErrorTask, design: LoopErrorDesign
-) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """Return spectrum.csv on the grid that the spec asks for, and the figures."""
-    units, (lo, hi) = task.header.units, design.problem.band
-    if design.of_lines:
-        w, Phi, white = design.frequencies, design.spectrum, None
-        shown, drawn = w, Phi
-    else:
-        w, white = np.linspace(lo, hi, task.grid), design.white.level
-        Phi = design.density(w)
-        shown = np.geomspace(max(lo, _LOWEST * hi), hi, _POINTS)
-        drawn = design.density(shown)
-    table = Table({units.frequency_header: w / units.frequency, **hermitian_columns(Phi, "phi")})
-    _, gains, right = np.linalg.svd(design.problem.plant.plant_at(shown))
-    directions = adjoint(right)
-    power = np.einsum("kai,kab,kbi->ki", np.conj(directions), drawn, directions).real
-    frequency, lines = shown / units.frequency, design.of_lines
-    return {"spectrum": table}, {
-        "spectrum": SpectrumCurves(frequency, drawn, white=white, lines=lines),
-        "directions": DirectionCurves(frequency, gains, power, white=white, lines=lines),
-    }
-
-
 def theory_of(theory: LossTheory) -> TheoreticalLoss:
     """Return the error N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
     return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
-
-
-def _spectrum(task: LoopErrorTask, design: LoopErrorDesign) -> out.Spectrum:
-    unit, problem = task.header.units.frequency, design.problem
-    if design.of_lines:
-        lines = {"frequencies": design.frequencies / unit, "masses": design.spectrum}
-        return out.Spectrum("multisine", lines)
-
-    def trace(w: Array) -> Array:
-        return np.asarray(np.trace(design.density(w), axis1=1, axis2=2).real)
-
-    def at(w: float) -> dict[str, object]:
-        matrix = design.density(np.array([w]))[0]
-        return {
-            "frequency": w / unit,
-            "trace": float(np.trace(matrix).real),
-            "matrix": _tidy(matrix),
-            "eigenvalues": np.linalg.eigvalsh(matrix),
-        }
-
-    lo, hi = problem.band
-    grid = graded_grid(problem.plant.singularities, lo, hi)
-    peaks, heights = local_maxima(trace, grid, trace(grid))
-    shown = {"peak": float(peaks[np.argmax(heights)]), "lowest": lo, "highest": hi}
-    # C S Phi_r (C S)^* at the lowest frequency, the input of the loop there, and its matrix root.
-    w = np.array([lo])
-    applied = np.linalg.inv(problem.plant.plant_at(w)) @ problem.law.complementary(w)
-    matrix = applied @ (problem.entering(w) - problem.plant.disturbance_at(w)) @ adjoint(applied)
-    loop_input = {
-        "matrix": _tidy(matrix[0]),
-        "root": _tidy(power_of(matrix, 0.5)[0]),
-        "root_eigenvalues": np.sqrt(np.maximum(np.linalg.eigvalsh(matrix[0]), 0.0)),
-    }
-    details = {"grid": task.grid, **{name: at(w) for name, w in shown.items()}, "loop_input": loop_input}
-    return out.Spectrum("pointwise", details)
 
 
 def _tidy(matrix: ComplexArray) -> Array | ComplexArray:
@@ -222,54 +341,6 @@ def _moments(values: Array) -> LossMoments:
     return LossMoments(float(values.mean()), sd, sd / float(np.sqrt(values.size)))
 
 
-@dataclass(frozen=True)
-class LoopErrorSignalSettings:
-    """Describes the making of the record: `filtered` white noise, or a multisine of equal `periods`.
-
-    A rational filter has `order` states for each input; None: a filter of taps.
-    """
-
-    samples: int
-    filtered: bool
-    periods: int
-    order: int | None
-    candidates: int
-    seed: int
-    bounds: Bounds
-
-
-def realise(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> tuple[Array, Signal]:
-    """Return the best of several records (N, n) by the error that it gives, scaled into the limits."""
-    samples, periods = settings.samples, settings.periods
-    if settings.filtered:
-        make, residual, details = _by_filter(design, settings)
-    else:
-        lines = design_lines(design, samples // periods)
-        make = partial(even_multisine, lines, samples, periods=periods)
-        residual, details = None, {"periods": periods}
-    w = harmonics(samples)
-    metrics = design.problem.metrics(w)
-    best, value = None, np.inf
-    for stream in np.random.SeedSequence(settings.seed).spawn(settings.candidates):
-        u = make(np.random.default_rng(stream))
-        powers = periodogram(u).powers
-        # What brings the record to its limits, by its own spectrum.
-        excess = np.max(np.einsum("pkab,kba->p", metrics, powers).real / design.problem.most)
-        excess = max(float(excess), max(settings.bounds.shares(u).values(), default=0.0) ** 2)
-        try:
-            M = design.criterion.information(w, powers / excess, np.ones(w.size))
-            attained = design.criterion.value(M)
-        except np.linalg.LinAlgError:  # too short to excite every parameter
-            attained = np.inf
-        if best is None or attained < value:
-            best, value = u / np.sqrt(excess), attained
-    assert best is not None
-    if np.isfinite(value):
-        details["parametric_value"] = value
-    method = "filtered_noise" if settings.filtered else "multisine"
-    return best, replace(plain_signal(best), type=method, spectral_factor_residual=residual, details=details)
-
-
 def design_lines(design: LoopErrorDesign, samples: int) -> Lines:
     """Return the design on the harmonics of a record."""
     if design.of_lines:
@@ -281,85 +352,6 @@ def design_lines(design: LoopErrorDesign, samples: int) -> Lines:
 def white_lines(design: LoopErrorDesign, samples: int) -> Lines:
     """Return white noise of the same total power, in the band of the design."""
     return grid_lines(design.white_density(harmonics(samples)), samples, 1.0)
-
-
-def _by_filter(
-    design: LoopErrorDesign, settings: LoopErrorSignalSettings
-) -> tuple[Callable[[np.random.Generator], Array], float | None, dict[str, object]]:
-    """Return the generator of a record, the residual of its spectral factor, and other entries on it."""
-    samples, factor = settings.samples, matrix_factor(design.density)
-    if settings.order is None:
-        details: dict[str, object] = {"floor": factor.floor, "taps": int(factor.taps.shape[0])}
-        return lambda rng: factor.filtered(samples, rng), factor.residual, details
-    filter_ = rational_filter(factor.taps, settings.order)
-    wanted = float(np.trace(design.input_covariance))
-    filter_ = filter_.scaled(float(np.sqrt(wanted / filter_.power().sum())))
-    w, weights = design.frequencies, design.weights
-    found: dict[str, object] = {
-        "floor": factor.floor,
-        "order": filter_.order,
-        "pole_radius": filter_.radius,
-        "filter_value": design.criterion.value(design.criterion.information(w, filter_.spectrum(w), weights)),
-        "filter": {"A": filter_.A, "B": filter_.B, "C": filter_.C, "D": filter_.D},
-    }
-    return lambda rng: filter_.filtered(samples, rng), factor.residual, found
-
-
-@dataclass(frozen=True)
-class LoopErrorTask:
-    """Designs for the closed-loop error, and studies the design.
-
-    The `law` of control is called as in the spec, and `grid` are the points of spectrum.csv. The `covariance`
-    is that of a high model order, or exact for the model structure. The runs are on the plant of `true`, and
-    with `white` noise of equal power is tried, too.
-    """
-
-    problem: LoopErrorProblem
-    header: Header
-    law: str
-    covariance: Literal["asymptotic", "parametric"]
-    samples: int
-    tolerance: float
-    cost: Mapping[PowerKind, Weight]
-    grid: int
-    signal: LoopErrorSignalSettings
-    true: LoopErrorProblem
-    runs: int
-    seed: int
-    white: bool
-
-    def solve(self) -> Results:
-        """Return the design with its proof, its signal and its curves."""
-        return self._solved()[1]
-
-    def simulate(self, executor: Executor | None = None) -> Results:
-        """Return the design with its Monte Carlo study and the histogram of the loss."""
-        _check_simulated(self.problem, self.true)
-        design, results = self._solved()
-        begun, samples = time.perf_counter(), self.signal.samples
-        inputs = {"design": design_lines(design, samples)}
-        if self.white:
-            inputs["white"] = white_lines(design, samples)
-        studies = study_losses(
-            self.true, inputs, samples=samples, runs=self.runs, seed=self.seed, executor=executor
-        )
-        tried, improvement, curves = loss_results(self.true.parametric(), studies, inputs, samples)
-        names = tuple(self.true.plant.names)
-        study = Simulation(
-            self.runs, self.seed, tried, samples=samples, parameters=names, improvement=improvement
-        )
-        findings = unstable_runs({name: one.unstable for name, one in studies.items()}, self.runs)
-        return delivery.with_study(results, study, begun, findings, curves=curves)
-
-    def _solved(self) -> tuple[LoopErrorDesign, Results]:
-        started = time.perf_counter()
-        design = design_loop_error(self.problem, self.covariance, tolerance=self.tolerance)
-        solved = time.perf_counter()
-        samples, signal = realise(design, self.signal)
-        outcome = design_outcome(self, design, signal, delivery.timing(started, solved))
-        tables, curves = spectrum_results(self, design)
-        tables["signal"], curves["signal"] = signal_results(self.header.units, samples)
-        return design, delivery.results_of(self.header, outcome, tables, curves)
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import get_args
 
@@ -13,8 +14,8 @@ from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
-from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
-from inputdesign_cli.specification import Noise, SimulationNoise, Spec
+from inputdesign_cli.questions.regression.solve import KEY, RegressionTask
+from inputdesign_cli.specification import Noise, Simulation, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
 _STRUCTURED_TOLERANCE = 1e-6
@@ -44,14 +45,21 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         hint = "give at least one of them a weight other than 0"
         raise bad_spec("zero-weights", message, hint=hint, key=f"{KEY}.estimated")
     spectrum, signal, solver = spec.spectrum, spec.signal, spec.solver
+    simulation = spec.simulation or Simulation()
+    check_compared(simulation.compare, *get_args(Contender))
+    true, noise = simulation.plant, simulation.noise or spec.noise
+    _refuse_coloured(noise, "simulation.noise")
+    known: dict[str, Contender] = {name: name for name in get_args(Contender)}
+    regression = Regression(
+        estimated=np.array(error.estimated, dtype=float),
+        neglected=np.array(error.neglected or (0.0,) * plant.regression.neglected, dtype=float),
+        neglected_norm=error.neglected_norm,
+        variance=float(spec.noise.covariance(1)[0, 0]),
+    )
+    variance = float(noise.covariance(1)[0, 0])
     return RegressionTask(
         header=build_header(spec),
-        regression=Regression(
-            estimated=np.array(error.estimated, dtype=float),
-            neglected=np.array(error.neglected or (0.0,) * plant.regression.neglected, dtype=float),
-            neglected_norm=error.neglected_norm,
-            variance=float(spec.noise.covariance(1)[0, 0]),
-        ),
+        regression=regression,
         toeplitz=spectrum is not None and spectrum.type == "moments" and spectrum.structure == "toeplitz",
         samples=spec.experiment.samples,
         target=error.target,
@@ -62,31 +70,12 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         periods=signal.periods,
         start=signal.start or "steady",
         seed=signal.seed or 0,
-        trial=_trial(spec),
-    )
-
-
-def _trial(spec: Spec) -> RegressionTrial | None:
-    simulation = spec.simulation
-    true = None if simulation is None else simulation.plant
-    if simulation is None or true is None or true.kind != "parameters":
-        return None
-    check_compared(simulation.compare, *get_args(Contender))
-    known: dict[str, Contender] = {name: name for name in get_args(Contender)}
-    variance = relative = None
-    if simulation.noise is not None:
-        _refuse_coloured(simulation.noise, "simulation.noise")
-        relative = simulation.noise.relative_std
-        if simulation.noise.variance is not None:
-            variance = float(np.ravel(np.asarray(simulation.noise.variance, dtype=float))[0])
-    theta = np.array(true.parameters, dtype=float)
-    return RegressionTrial(
-        theta,
-        simulation.runs,
-        simulation.seed,
-        tuple(known[name] for name in simulation.compare),
-        variance,
-        relative,
+        theta=None if true is None or true.kind != "parameters" else np.array(true.parameters, dtype=float),
+        true=replace(regression, variance=variance),
+        relative_std=None if simulation.noise is None else simulation.noise.relative_std,
+        compare=tuple(known[name] for name in simulation.compare),
+        runs=simulation.runs,
+        trial_seed=simulation.seed,
     )
 
 

@@ -18,7 +18,6 @@ from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
-from inputdesign_cli.outcome import Signal, Simulation, Solver
 from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
@@ -51,91 +50,6 @@ class MomentsDesign:
         return float(np.trace(self.R))
 
 
-def moments_outcome(
-    task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, seconds: dict[str, float]
-) -> out.Outcome:
-    """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
-    regression, split, target, n = task.regression, design.split, task.target, task.regression.n
-    unit, white = regression.error(np.eye(n)), None
-    if target is not None:
-        kind, value, of = "least_cost", design.energy, "energy"
-        changes = theory.energy_sensitivity(regression, design.energy, target, split)
-        slack = target - unit.bias_squared
-        if slack > 0.0:  # white regressors can meet the target
-            energy = n * unit.variance / slack
-            white = out.White(cost=energy, ratio=energy / value)
-    else:
-        assert task.energy is not None
-        kind, value, of = "mean_squared_error", split.total, "mean_squared_error"
-        changes = theory.error_sensitivity(regression, design.energy, split)
-        error = regression.error(np.eye(n) * (task.energy / n)).total
-        white = out.White(mean_squared_error=error, ratio=error / value)
-    gap = abs(value - design.bound) / value
-    any_bound = task.free()[1] if task.toeplitz else design.bound
-    objective = out.Objective(
-        kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
-    )
-    remedy = "rescale the regressors, or state the weights anew"
-    delivery.check_claims(delivery.of_bounds(objective, design.tolerance), remedy)
-    return out.Outcome(
-        title=task.header.title,
-        status=delivery.proof_status(gap, design.tolerance),
-        objective=objective,
-        cost=design.energy,
-        samples=task.samples,
-        mean_squared_error=out.MeanSquaredError(
-            split.total, split.bias_squared, split.variance, target, others=asdict(split)
-        ),
-        moments=out.Moments(
-            structure="toeplitz" if task.toeplitz else "free",
-            estimated=regression.m,
-            trace=design.energy,
-            R=design.R,
-            entries={f"R_{i + 1}_{j + 1}": float(design.R[i, j]) for i in range(n) for j in range(i, n)},
-            autocorrelations=design.rho,
-        ),
-        sensitivity=out.Sensitivity(
-            of,
-            changes.neglected_norm,
-            changes.noise_deviation,
-            target=None if target is None else changes.goal,
-            energy=changes.goal if target is None else None,
-        ),
-        baseline=out.Baseline(white),
-        signal=signal,
-        solver=design.how,
-        timing_s=seconds,
-    )
-
-
-def tried_regressors(
-    regression: Regression,
-    theta: Array,
-    Phi: Array,
-    *,
-    runs: int,
-    seed: np.random.SeedSequence,
-    executor: Executor | None,
-) -> TriedInput:
-    """Return the mean estimate and error with their standard errors, and the theory for these samples."""
-    found = run_experiments(regression, Phi, theta, runs=runs, seed=seed, executor=executor)
-    squared = found.error**2
-    G, m = Phi.T @ Phi, regression.m
-    inverse = np.linalg.pinv(G[:m, :m], rcond=1e-12, hermitian=True)
-    mean = inverse @ G[:m] @ theta
-    bias = regression.estimated @ mean - regression.estimated @ theta[:m] - regression.neglected @ theta[m:]
-    variance = regression.variance * (regression.estimated @ inverse @ regression.estimated)
-    root, several = np.sqrt(runs), runs > 1
-    return TriedInput(
-        mse=float(squared.mean()),
-        mean_estimate=found.theta.mean(axis=0),
-        theory=TheoryOfError(float(bias**2 + variance), tuple(mean.tolist())),
-        energy=float(np.trace(G)),
-        mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
-        mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
-    )
-
-
 @dataclass(frozen=True)
 class RegressorRecord:
     """Holds Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their form.
@@ -145,42 +59,8 @@ class RegressorRecord:
 
     Phi: NDArray[np.float64]
     channels: NDArray[np.float64]
-    signal: Signal
+    signal: out.Signal
     lines: tuple[Array, Array] | None = None
-
-
-def realise_regressors(task: RegressionTask, design: MomentsDesign) -> RegressorRecord | None:
-    """Return the record with the moments summed over the samples; None when it is too short.
-
-    Regressors are free, or delayed copies of one input. It raises `SpecError` (`bad-period`).
-    """
-    regression, R, rho = task.regression, design.R, design.rho
-    samples, least, periods = task.record_samples, rank(R) if rho is None else regression.n, task.periods
-    if samples < least:
-        return None
-    if periods is not None and (samples % periods or samples // periods < least):
-        message = f"{samples} samples do not make {periods} equal periods of at least {least} samples"
-        hint = f"choose a divisor of {samples} up to {samples // least}, or change signal.samples"
-        raise bad_spec("bad-period", message, hint=hint, key="signal.periods")
-    period, details, lines = samples // periods if periods else None, dict[str, object](), None
-    if rho is None:
-        period = period or (least if samples % least == 0 else samples)
-        Phi = channels = free_regressors(R, samples, period)
-    else:
-        period = period or samples
-        found = design_periodic(regression, rho, float(np.trace(R)), period, target=task.target)
-        power = found.energy / (least * samples)
-        u = periodic_input(found.shares, power, samples, period, np.random.default_rng(task.seed))
-        Phi, channels = delayed_regressors(u, least, task.start), u[:, None]
-        at_rest = _attained(regression, delayed_regressors(u, least, "zero"), R)
-        details = {"start": task.start, "on_grid": found.exact, "from_rest": at_rest}
-        used = np.flatnonzero(found.shares > 0.0)
-        lines = 2.0 * np.pi * used / period, found.shares[used] * power
-    attained = _attained(regression, Phi, R)
-    error = attained.pop("mean_squared_error", None)
-    details = {**attained, "period": period, **details}
-    signal = replace(plain_signal(channels), details=details, mean_squared_error=error)
-    return RegressorRecord(Phi, channels, signal, lines)
 
 
 def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
@@ -192,23 +72,12 @@ def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class RegressionTrial:
-    """Holds the study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
-
-    theta: Array
-    runs: int
-    seed: int
-    compare: tuple[Contender, ...]
-    variance: float | None
-    relative_std: float | None
-
-
-@dataclass(frozen=True)
 class RegressionTask:
     """Minimises the energy, trace R, for a `target` error, or the error for an `energy`, and studies it.
 
     Toeplitz moments belong to delayed copies of one input, and are proved to a relative gap of `tolerance`.
-    The record has a number of equal `periods` (None: free), and a past by `start`.
+    The record has a number of equal `periods` (None: free), and a past by `start`. The trial has the true
+    parameters `theta` (None: not stated), the noise of `true`, or `relative_std` of it, and `compare` inputs.
     """
 
     header: Header
@@ -223,7 +92,12 @@ class RegressionTask:
     periods: int | None
     start: Start
     seed: int
-    trial: RegressionTrial | None
+    theta: Array | None
+    true: Regression
+    relative_std: float | None
+    compare: tuple[Contender, ...]
+    runs: int
+    trial_seed: int
 
     def solve(self) -> Results:
         """Return the design with its proof, its signal and its curves."""
@@ -231,8 +105,8 @@ class RegressionTask:
 
     def simulate(self, executor: Executor | None = None) -> Results:
         """Return the design with least-squares estimates of theta_1 in many runs of y = Phi theta + v."""
-        trial = self.trial
-        if trial is None:
+        theta, true = self.theta, self.true
+        if theta is None:
             message = "a regression is simulated with its true parameters, and there are none"
             hint = "write simulation: {runs: 10000, plant: {parameters: [..]}}, the estimated ones first"
             raise bad_spec("missing-key", message, hint=hint, key="simulation")
@@ -241,23 +115,22 @@ class RegressionTask:
             message = f"{self.record_samples} samples are too few to realise these moments"
             hint = "set experiment.samples"
             raise bad_spec("wrong-shape", message, hint=hint, key="experiment.samples")
-        begun, regression, variance = time.perf_counter(), self.regression, trial.variance
-        if trial.relative_std is not None:
-            variance = float(trial.relative_std**2 * np.mean((record.Phi @ trial.theta) ** 2))
-        regression = replace(regression, variance=regression.variance if variance is None else variance)
-        seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
-        tried = partial(tried_regressors, regression, trial.theta, runs=trial.runs, executor=executor)
+        begun = time.perf_counter()
+        if self.relative_std is not None:
+            true = replace(true, variance=float(self.relative_std**2 * np.mean((record.Phi @ theta) ** 2)))
+        seeds = np.random.SeedSequence(self.trial_seed).spawn(1 + 2 * len(self.compare))
+        tried = partial(tried_regressors, true, theta, runs=self.runs, executor=executor)
         inputs = {"design": tried(record.Phi, seed=seeds[0])}
-        for name, drawn, noise in zip(trial.compare, seeds[1::2], seeds[2::2], strict=True):
+        for name, drawn, noise in zip(self.compare, seeds[1::2], seeds[2::2], strict=True):
             Phi = contending_regressors(
                 name,
                 record.channels.shape,
-                delayed=regression.n if self.toeplitz else None,
+                delayed=true.n if self.toeplitz else None,
                 energy=float(np.sum(record.Phi**2)),
                 rng=np.random.default_rng(drawn),
             )
             inputs[name] = tried(Phi, seed=noise)
-        return delivery.with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
+        return delivery.with_study(results, out.Simulation(self.runs, self.trial_seed, inputs), begun)
 
     def free(self) -> tuple[Array, float]:
         """Return the best moments R (n, n) of any structure, and the bound that proves them."""
@@ -275,11 +148,11 @@ class RegressionTask:
         else:
             R, bound = self.free()
             split = self.regression.error(R)
-            design = MomentsDesign(R, None, split, bound, 1e-9, Solver("closed_form"))
+            design = MomentsDesign(R, None, split, bound, 1e-9, out.Solver("closed_form"))
         solved = time.perf_counter()
-        record = realise_regressors(self, design)
+        record = self._realised(design)
         signal = None if record is None else record.signal
-        outcome = moments_outcome(self, design, signal, delivery.timing(started, solved))
+        outcome = self._outcome(design, signal, delivery.timing(started, solved))
         units, tables = self.header.units, dict[str, Table]()
         # Squared bias and variance over the energy, beside the error of white regressors.
         energy, n = design.energy * np.geomspace(0.1, 10.0, _POINTS), self.regression.n
@@ -320,8 +193,125 @@ class RegressionTask:
         how: dict[str, object] = {"starts": found.starts, "solves": found.solves, "nodes": found.nodes}
         how |= {"assumed_smallest_eigenvalue": found.assumed} if found.assumed else {}
         method = "alternating" if self.alternating else "sequential_convex"
-        solver = Solver(method, self.tolerance, details=how)
+        solver = out.Solver(method, self.tolerance, details=how)
         return MomentsDesign(found.R, found.rho, found.split, found.bound, self.tolerance, solver)
+
+    def _outcome(
+        self, design: MomentsDesign, signal: out.Signal | None, seconds: dict[str, float]
+    ) -> out.Outcome:
+        """Return the content of result.json; raise `internal-disagreement` of value and bound."""
+        regression, split, target, n = self.regression, design.split, self.target, self.regression.n
+        unit, white = regression.error(np.eye(n)), None
+        if target is not None:
+            kind, value, of = "least_cost", design.energy, "energy"
+            changes = theory.energy_sensitivity(regression, design.energy, target, split)
+            slack = target - unit.bias_squared
+            if slack > 0.0:  # white regressors can meet the target
+                energy = n * unit.variance / slack
+                white = out.White(cost=energy, ratio=energy / value)
+        else:
+            assert self.energy is not None
+            kind, value, of = "mean_squared_error", split.total, "mean_squared_error"
+            changes = theory.error_sensitivity(regression, design.energy, split)
+            error = regression.error(np.eye(n) * (self.energy / n)).total
+            white = out.White(mean_squared_error=error, ratio=error / value)
+        gap = abs(value - design.bound) / value
+        any_bound = self.free()[1] if self.toeplitz else design.bound
+        objective = out.Objective(
+            kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
+        )
+        remedy = "rescale the regressors, or state the weights anew"
+        delivery.check_claims(delivery.of_bounds(objective, design.tolerance), remedy)
+        return out.Outcome(
+            title=self.header.title,
+            status=delivery.proof_status(gap, design.tolerance),
+            objective=objective,
+            cost=design.energy,
+            samples=self.samples,
+            mean_squared_error=out.MeanSquaredError(
+                split.total, split.bias_squared, split.variance, target, others=asdict(split)
+            ),
+            moments=out.Moments(
+                structure="toeplitz" if self.toeplitz else "free",
+                estimated=regression.m,
+                trace=design.energy,
+                R=design.R,
+                entries={f"R_{i + 1}_{j + 1}": float(design.R[i, j]) for i in range(n) for j in range(i, n)},
+                autocorrelations=design.rho,
+            ),
+            sensitivity=out.Sensitivity(
+                of,
+                changes.neglected_norm,
+                changes.noise_deviation,
+                target=None if target is None else changes.goal,
+                energy=changes.goal if target is None else None,
+            ),
+            baseline=out.Baseline(white),
+            signal=signal,
+            solver=design.how,
+            timing_s=seconds,
+        )
+
+    def _realised(self, design: MomentsDesign) -> RegressorRecord | None:
+        """Return the record with the moments summed over the samples; None when it is too short.
+
+        Regressors are free, or delayed copies of one input. It raises `SpecError` (`bad-period`).
+        """
+        regression, R, rho = self.regression, design.R, design.rho
+        samples, least, periods = self.record_samples, rank(R) if rho is None else regression.n, self.periods
+        if samples < least:
+            return None
+        if periods is not None and (samples % periods or samples // periods < least):
+            message = f"{samples} samples do not make {periods} equal periods of at least {least} samples"
+            hint = f"choose a divisor of {samples} up to {samples // least}, or change signal.samples"
+            raise bad_spec("bad-period", message, hint=hint, key="signal.periods")
+        period, details, lines = samples // periods if periods else None, dict[str, object](), None
+        if rho is None:
+            period = period or (least if samples % least == 0 else samples)
+            Phi = channels = free_regressors(R, samples, period)
+        else:
+            period = period or samples
+            found = design_periodic(regression, rho, float(np.trace(R)), period, target=self.target)
+            power = found.energy / (least * samples)
+            u = periodic_input(found.shares, power, samples, period, np.random.default_rng(self.seed))
+            Phi, channels = delayed_regressors(u, least, self.start), u[:, None]
+            at_rest = _attained(regression, delayed_regressors(u, least, "zero"), R)
+            details = {"start": self.start, "on_grid": found.exact, "from_rest": at_rest}
+            used = np.flatnonzero(found.shares > 0.0)
+            lines = 2.0 * np.pi * used / period, found.shares[used] * power
+        attained = _attained(regression, Phi, R)
+        error = attained.pop("mean_squared_error", None)
+        details = {**attained, "period": period, **details}
+        signal = replace(plain_signal(channels), details=details, mean_squared_error=error)
+        return RegressorRecord(Phi, channels, signal, lines)
+
+
+def tried_regressors(
+    regression: Regression,
+    theta: Array,
+    Phi: Array,
+    *,
+    runs: int,
+    seed: np.random.SeedSequence,
+    executor: Executor | None,
+) -> TriedInput:
+    """Return the mean estimate and error with their standard errors, and the theory for these samples."""
+    found = run_experiments(regression, Phi, theta, runs=runs, seed=seed, executor=executor)
+    squared = found.error**2
+    G, m = Phi.T @ Phi, regression.m
+    inverse = np.linalg.pinv(G[:m, :m], rcond=1e-12, hermitian=True)
+    mean = inverse @ G[:m] @ theta
+    bias = regression.estimated @ mean - regression.estimated @ theta[:m] - regression.neglected @ theta[m:]
+    variance = regression.variance * (regression.estimated @ inverse @ regression.estimated)
+    root, several = np.sqrt(runs), runs > 1
+    return TriedInput(
+        mse=float(squared.mean()),
+        mean_estimate=found.theta.mean(axis=0),
+        theory=TheoryOfError(float(bias**2 + variance), tuple(mean.tolist())),
+        energy=float(np.trace(G)),
+        mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
+        mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
+    )
 
 
 def _out_of_reach(
