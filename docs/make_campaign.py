@@ -21,7 +21,6 @@ from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.run_files import load_result
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.build import build_campaign
-from inputdesign_cli.questions.campaign.study import energy_of
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -62,7 +61,8 @@ def campaign_in_a_loop(folder: Path) -> None:
         study.true.model, FiniteRecord(at_the_truth, len(r), study.planner.step).information(r)
     )
     ratio = question.ratio(question.information)
-    share = energy_of(study.planner, r, study.true) / study.planner.knowing(study.true.model)[0]
+    energy = len(r) * study.planner.cost_of(study.true, r)
+    share = energy / study.planner.knowing(study.true.model)[0]
     sys.stdout.write(f"true ratio {ratio:.3f}, energy over that of knowing the plant {share:.3f}\n")
     shutil.copy(run / "campaign.png", IMAGES / "campaign_flexible.png")
 

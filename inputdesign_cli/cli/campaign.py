@@ -40,7 +40,8 @@ def campaign(
 
         stated = read_spec(spec, changes)
         place = place.checked(stated)
-        results = begun(partial(questions.next_round, stated), stated.resolve_path("."), place.directory)
+        first = partial(begun, folder=stated.resolve_path("."), directory=place.directory)
+        results = questions.next_round(stated, first, begins=True)
     keep(results, place, Shown(figures, json_output=json_output, quiet=quiet))
 
 
@@ -78,15 +79,19 @@ def proceed(
         with computing(directory, quiet=quiet):
             memory = read_memory(directory, withdrawing=withdraw)
             stated = parse_spec(memory.spec, str(directory / SPEC), folder=memory.folder)
-            decide = partial(questions.next_round, stated)
             if withdraw is not None:
-                results = withdrawn(decide, memory, withdraw)
-            elif data is None:
-                results = advanced(decide, memory, None, None, regardless=regardless)
+                decide = partial(withdrawn, memory=memory, number=withdraw)
             else:
                 taken = replace(written.preparation(), operating_point=levels(operating_point))
-                part = questions.recorded_part(stated, data, taken)
-                results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
+                decide = partial(
+                    advanced,
+                    memory=memory,
+                    given=data,
+                    preparation=taken,
+                    unlike=as_applied,
+                    regardless=regardless,
+                )
+            results = questions.next_round(stated, decide)
         place = Place(Into(directory), figures=stated.figures)
         keep(results, place, Shown(figures, json_output=json_output, quiet=quiet))
     code = _EXIT[results.result["status"]]

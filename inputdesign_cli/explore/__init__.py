@@ -10,15 +10,13 @@ from inputdesign_cli.explore.fits import (
     output_error_form as output_error_form,
 )
 from inputdesign_cli.explore.joint import Found as Found, explore_records as explore_records
-from inputdesign_cli.explore.regressors import (
-    left_of_inputs as left_of_inputs,
-    order_of_excitation as order_of_excitation,
-)
 from inputdesign_cli.explore.relation import (
     answers_output as answers_output,
     early_answers as early_answers,
+    left_of_inputs as left_of_inputs,
     like_answers as like_answers,
     only_answers as only_answers,
+    order_of_excitation as order_of_excitation,
     unhelpful as unhelpful,
     unstable_pole as unstable_pole,
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,27 +17,19 @@ _BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
 _STILL = 0.2
 
 
-class Division(NamedTuple):
-    """Holds the records that estimate, the records that judge, and their division."""
+def divided(parts: Parts) -> tuple[Parts, Parts, str]:
+    """Return the records that estimate, the records that judge, and their division.
 
-    first: Parts
-    second: Parts
-    split: str
-
-
-def divided(parts: Parts) -> Division:
-    """Return the part of the records that estimates and the part that judges, beginning and end as a rule.
-
-    Where an input rests in one of the two, blocks take turns. Where it rests in any blocks as well, the whole
-    record does both.
+    Beginning and end are parted as a rule. Where an input rests in one of the two, blocks take turns. Where
+    it rests in any blocks as well, the whole record does both.
     """
-    for division in _divisions(parts):
-        if _moves(division.first, parts) and _moves(division.second, parts):
-            return division
-    return Division(parts, parts, "none")
+    for first, second, split in _divisions(parts):
+        if _moves(first, parts) and _moves(second, parts):
+            return first, second, split
+    return parts, parts, "none"
 
 
-def _divisions(parts: Parts) -> Iterator[Division]:
+def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, str]]:
     ends = np.cumsum([len(y) for _, y in parts])
     total = int(ends[-1])
     for share in _CUTS:
@@ -48,7 +39,7 @@ def _divisions(parts: Parts) -> Iterator[Division]:
         ]
         first, second = cut(parts, [slice(k) for k in at]), cut(parts, [slice(k, None) for k in at])
         first, second = ([part for part in some if len(part[1])] for some in (first, second))
-        yield Division(first, second, f"the first {share} % and the rest")
+        yield first, second, f"the first {share} % and the rest"
     for count in _BLOCKS:
         length = max(total // count, 1)
         blocks = [
@@ -57,7 +48,7 @@ def _divisions(parts: Parts) -> Iterator[Division]:
             for begin in range(0, len(y), length)
             if len(y) - begin >= length // 2
         ]
-        yield Division(blocks[::2], blocks[1::2], "blocks in turn")
+        yield blocks[::2], blocks[1::2], "blocks in turn"
 
 
 def _moves(some: Parts, whole: Parts) -> bool:

@@ -22,7 +22,7 @@ from inputdesign_cli.explore.fits import (
     output_error_form,
     percent,
 )
-from inputdesign_cli.explore.regressors import moving_in
+from inputdesign_cli.explore.relation import moving_in
 from inputdesign_cli.explore.search import Candidate, Chosen, Family, Ranges, certain, explore_structure
 from inputdesign_cli.explore.structures import process_models
 from inputdesign_cli.explore.sweep import lingering

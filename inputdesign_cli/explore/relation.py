@@ -1,4 +1,4 @@
-"""Regressions without a model: do inputs answer outputs, do they move them at all, is the plant unstable?
+"""Regressions without a model: do inputs excite a plant, move the outputs, answer them; is it unstable?
 
 Past innovations of the outputs help to predict an input in a loop only ([ljung-1999], Section 13.4). Future
 inputs help to predict an output only if the input was logged late. Two signals that wander, drift, or follow
@@ -8,6 +8,7 @@ output from sample to sample then answers nothing that the input does.
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,13 +16,14 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import Parts, output_error_form
-from inputdesign_cli.explore.regressors import past, residuals
 from inputdesign_cli.identification import ScoreTest
+from inputdesign_cli.identification.checks import check_varying
 from inputdesign_cli.plant import Model
 
-_LAGS, _AHEAD, _PER_LAG = 20, 8, 12
+_LAGS, _AHEAD, _PER_LAG, _PER_INPUT = 20, 8, 12, 10
 # Of more samples even what lies beyond the lags would show.
 _MOST_SAMPLES = 10_000
 # Levels: an input answers, an output comes before an input, an input helps to predict an output.
@@ -40,6 +42,9 @@ _BEYOND, _STEP = 5.0, 0.01
 # What would grow by less over the whole record may be drift, or several integrators, without a loop.
 _GROWN = 1e4
 _DEPENDENT = 1e-9
+# Samples to choose a structure, at least; and of a regressor beside the other delays, which is none of them.
+_FEWEST_SAMPLES, _FAINT = 30, 1e-9
+_UNKNOWN = ("gain and dynamics",)
 
 
 def answers_output(parts: Parts) -> list[tuple[int, float]]:
@@ -232,6 +237,79 @@ def _idle(signals: Sequence[tuple[Array, Array]], lags: int) -> bool:
     statistic = (alone - along) / (lags + 1) / (along / free)
     probability = float(scipy.special.fdtrc(lags + 1, free, max(statistic, 0.0)))
     return probability > _HELPS and target.size * float(np.log(simulated / alone)) > -_BY_CHOICE
+
+
+def past(signal: Array, lags: int) -> Array:
+    """Return the `lags` samples before each sample of a signal (n, channels): (n - lags, lags channels)."""
+    shifted = [signal[lags - lag : len(signal) - lag] for lag in range(1, lags + 1)]
+    return np.stack(shifted, axis=1).reshape(len(signal) - lags, -1) if lags else np.zeros((len(signal), 0))
+
+
+def residuals(rows: Sequence[Array], targets: Sequence[Array]) -> list[Array]:
+    """Return the residuals of a regression of targets (n,) or (n, p) on (n, m), all parts together."""
+    solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(targets), rcond=1e-10)[0]
+    return [target - own @ solution for own, target in zip(rows, targets, strict=True)]
+
+
+def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]:
+    """Return the inputs that never move, and the records without them.
+
+    Raises:
+        SpecError: `too-few-samples`, `constant-input` or `constant-output`.
+    """
+    u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
+    rest = np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0) if len(u) else []
+    still = tuple(int(j) for j in np.flatnonzero(rest))
+    moving = [j for j in range(u.shape[1]) if j not in still]
+    for needed in (_FEWEST_SAMPLES, _FEWEST_SAMPLES * (len(moving) + 1) // 2):
+        if len(y) < needed:
+            are = "1 sample is" if len(y) == 1 else f"{len(y)} samples are"
+            raise bad_spec(
+                "too-few-samples",
+                f"{are} too few to choose a structure and to judge it: take {needed} at least",
+                hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
+                key="u",
+            )
+        check_varying(_UNKNOWN, u[:, moving] if moving else u, y)
+    return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
+
+
+def order_of_excitation(parts: Parts, most: int = 50) -> int:
+    """Return the order to which all inputs together are persistently exciting, `most` at most.
+
+    It is the largest n for which n delays of every input, and a level, are linearly independent
+    ([ljung-1999], Section 13.2). A sinusoid over a part of a period has a mean, which counts as a level.
+    """
+    longest = max((u for u, _ in parts), key=len)
+    x = longest - longest.mean(axis=0)
+    most = max(min(most, len(x) // (3 * x.shape[1])), 1)
+
+    def dependent(delays: int) -> bool:
+        columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
+        columns = columns - columns.mean(axis=0)
+        gram = columns.T @ columns
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] <= _FAINT * delays)
+
+    # Rows of few delays include all rows of more: a step may stand there.
+    if not dependent(most):
+        return most
+    return bisect.bisect_left(range(1, most), True, key=dependent)
+
+
+def left_of_inputs(parts: Parts) -> list[float]:
+    """Return the share of each input's power that the other inputs and their pasts do not explain."""
+    inputs, samples = parts[0][0].shape[1], sum(len(u) for u, _ in parts)
+    lags = min(_LAGS, samples // (_PER_INPUT * inputs))
+    long = [u - u.mean(axis=0) for u, _ in parts if len(u) > 3 * lags]
+    if inputs < 2 or lags < 1 or not long:
+        return [1.0] * inputs
+    found = []
+    for j in range(inputs):
+        others, own = [np.delete(u, j, axis=1) for u in long], [u[lags:, j] for u in long]
+        left = residuals([np.column_stack([other[lags:], past(other, lags)]) for other in others], own)
+        found.append(sum(float(e @ e) for e in left) / max(sum(float(x @ x) for x in own), 1e-300))
+    return found
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import scipy
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
 from inputdesign_cli.identification.polynomial_starts import noise_polynomials
+from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.stability import reflected
 from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.plant.filtering import filtered
@@ -196,14 +197,14 @@ class Regressed:
             arrived = held
             if not through:
                 smooth, sloped, held = raw[:3]
-            columns = [-lagged(smooth, lag) for lag in range(1, n + 1)] if through else []
+            columns = [-shifted(smooth, lag, [samples]) for lag in range(1, n + 1)] if through else []
             columns += [sloped] if self.line else []
             for x, (low, high) in zip(inputs, ranges, strict=True):
-                columns += [lagged(x, lag) for lag in range(low, high)]
-            own = [held, *(lagged(impulse, lag) for lag in range(n))]
+                columns += [shifted(x, lag, [samples]) for lag in range(low, high)]
+            own = [held, *(shifted(impulse, lag, [samples]) for lag in range(n))]
             # Before a long delay acts what held before the record, which may differ from its first value.
             late = (low for low, high in ranges if samples // _LONG < low < samples and high - low <= n + 2)
-            own += [lagged(arrived, low) for low in late]
+            own += [shifted(arrived, low, [samples]) for low in late]
             unknown, _ = np.linalg.qr(np.stack(own, axis=1)[skipped:])
             both = np.column_stack([*columns, smooth])[skipped:]
             yield both - unknown @ (unknown.T @ both)
@@ -320,8 +321,3 @@ def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:
 def lingering(polynomial: Array, samples: int) -> int:
     """Return the number of roots that hardly fade within `samples` samples, as if they integrated."""
     return int(np.sum(np.roots(polynomial).real > 1.0 - _FADES / samples))
-
-
-def lagged(x: Array, lag: int) -> Array:
-    """Return x (n,) delayed by some samples, zero before."""
-    return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])

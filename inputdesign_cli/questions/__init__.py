@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from inputdesign_cli.explore import Family
     from inputdesign_cli.outcome.golden import Golden, GoldenRun
     from inputdesign_cli.questions.assessment.assess import Assessment
-    from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
+    from inputdesign_cli.questions.campaign.directory import Rounds
     from inputdesign_cli.questions.exploration.explore import Exploration
     from inputdesign_cli.records import Preparation
 
@@ -158,30 +158,18 @@ def assess(
         return assess_records(build_identification(spec), _paths(data), known)
 
 
-def next_round(spec: Spec, past: Past) -> Decision:
-    """Return the next step of a campaign after its records so far: the next part, or the end.
+def next_round(spec: Spec, decide: Callable[[Rounds], Results], *, begins: bool = False) -> Results:
+    """Return the results of a decision of a campaign, which may be its first: the next part, or the end.
 
     Raises:
         SpecError: the spec has no campaign, or one that this version cannot do.
         DataError: a record cannot be used.
         InfeasibleError, InaccurateError: nothing can be planned.
     """
-    from inputdesign_cli.questions.campaign.build import build_rounds, check_applied_in_parts
-    from inputdesign_cli.questions.campaign.rounds import decide
+    from inputdesign_cli.questions.campaign.build import build_rounds
 
     with _placed(spec), time_limit(spec.solver.time_limit):
-        if not past.done:  # one that has begun goes on
-            check_applied_in_parts(spec)
-        return decide(build_rounds(spec), past)
-
-
-def recorded_part(spec: Spec, path: Path, preparation: Preparation) -> Part:
-    """Return a record of a part of a campaign, as it is kept; `DataError` if it cannot be used."""
-    from inputdesign_cli.questions.campaign.build import build_rounds
-    from inputdesign_cli.questions.campaign.rounds import read_part
-
-    with _placed(spec):
-        return read_part(build_rounds(spec), path, preparation)
+        return decide(build_rounds(spec, begins=begins))
 
 
 def explore(

@@ -11,8 +11,8 @@ from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.identification import identify, information_of_data
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.campaign.build import build_campaign, build_planner, build_rules
+from inputdesign_cli.questions.campaign.directory import continued
 from inputdesign_cli.questions.campaign.plans import standing
-from inputdesign_cli.questions.campaign.rounds import continued
 from inputdesign_cli.questions.campaign.schedule import Standing
 from inputdesign_cli.questions.campaign.study import ways_of
 from inputdesign_cli.records import Record

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from inputdesign_cli import Spec, analyse, assess, identify, parse_spec, questions, simulate, solve, validate
 from inputdesign_cli.errors import InaccurateError, SpecError
 from inputdesign_cli.questions.assessment.build import build_identification
-from inputdesign_cli.questions.campaign.rounds import Past
+from inputdesign_cli.questions.campaign.directory import begun
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "questions.md"
 SPEC = """
@@ -93,10 +94,13 @@ def plain(value):
 
 
 def planned(spec):
-    decision = questions.next_round(spec, Past((), 0, None, None, None, 1))
-    header = decision.task.identification.header
-    head = [header.title, header.units, decision.task.rules, decision.plan.cost]
-    return json.dumps([*map(repr, head), decision.part.columns], default=plain)
+    def decide(task):
+        return replace(begun(task, Path(), Path()), resolved_spec=repr(task.rules))
+
+    results = questions.next_round(spec, decide, begins=True)
+    header, plan = results.outcome.title, results.outcome.campaign.plan
+    head = [header, results.resolved_spec, plan.cost]
+    return json.dumps([*map(repr, head), results.tables["signal"].columns], default=plain)
 
 
 VERBS = {

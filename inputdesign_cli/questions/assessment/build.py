@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -69,7 +70,7 @@ def build_identification(spec: Spec) -> Identification:
         else controller_matrix(controller, spec.sample_time, (nominal.inputs, nominal.outputs)),
         knowledge=build_knowledge(spec),
         foreseen=build_foreseen(spec, nominal),
-        at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
+        at=partial(question_at, spec),
         with_noise=lambda model, more: build_identification(_with_noise(spec, model, more)),
     )
 
@@ -99,12 +100,16 @@ def operating_point(spec: Spec) -> dict[str, float]:
     return {f"u{j + 1}": float(level) for j, level in enumerate(operating_points(spec))}
 
 
-def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
-    """Return the question of a spec for data of some length, and a factor (k, k) of their information.
+def question_at(stated: Spec, model: Model, samples: int, factor: Array, source: str) -> ModelQuestion:
+    """Return the question of a spec at a model, for data of some length and a factor of their information.
+
+    Args:
+        factor: (k, k); `source` of the model is named in diagnostics.
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
     """
+    spec = restated(stated, model, source)
     raw = replace(build_experiment(spec), samples=samples)
     experiment = replace(raw, factor=factor)
 

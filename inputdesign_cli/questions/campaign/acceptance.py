@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,11 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.campaigns import hardly_followed, shorter, without_excitation
 from inputdesign_cli.outcome.campaign import PartRecord, PlannedPart
-from inputdesign_cli.outcome.text_formats import csv_columns
-from inputdesign_cli.questions.campaign.memory import Memory
-from inputdesign_cli.questions.campaign.rounds import Part
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.text_formats import csv_text
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.campaign.memory import Memory, signals_in
+from inputdesign_cli.records import Record
 
 LIKE = 0.9
 """From this correlation on a record follows its plan; below it there is a finding."""
@@ -191,51 +192,62 @@ def _fitted(plan: Array, applied: Array) -> tuple[float, bool]:
     return scale, bool(abs(scale - 1.0) > least)
 
 
+def table_of(units: Units, data: Record) -> Table:
+    """Return the record of a part as it is kept: times, inputs, outputs and, in a loop, the reference."""
+    signals = {"u": data.u, "y": data.y} | ({} if data.r is None else {"r": data.r})
+    columns = {f"{kind}{j + 1}": x for kind, values in signals.items() for j, x in enumerate(values.T)}
+    return Table({units.time_header: data.time, **columns})
+
+
 def accepted(
-    memory: Memory, due: PlannedPart, file: str, given: Path, part: Part, *, unlike: bool
+    memory: Memory, kind: str, given: str, data: Record, table: Table, *, unlike: bool
 ) -> tuple[PartRecord, list[Finding]]:
     """Return the entry of a record, compared with the part that is due, and its findings.
 
     Args:
-        file: its name in the directory; `given`: the file of the user.
+        kind: of the excitation: "u", or "r", the reference of a loop.
+        given: the name of the user's file; `table`: its `data` as they are kept.
         unlike: whether to take a record of something else.
 
     Raises:
-        DataError: `record-copied`, `record-too-long`, `record-other-part`, `record-other-scale`,
-            `record-unlike`.
+        DataError: `campaign-over`, `data-repeated`, `record-copied`, `record-too-long`, `record-other-part`,
+            `record-other-scale`, `record-unlike`.
     """
-    columns = dict(list(part.table.columns.items())[1:])  # without times
-    _check_answers(given.name, part, columns)
-    if part.samples > due.samples:
+    campaign, columns = memory.campaign, dict(list(table.columns.items())[1:])  # without times
+    due, steps = _due(memory, given, table), np.diff(data.time)
+    # The numbers of the samples from the first one on; samples without values are left out.
+    rows = np.rint((data.time - data.time[0]) / (np.median(steps) if steps.size else 1.0)).astype(np.int64)
+    samples, file = int(rows[-1]) + 1, f"record_{len(campaign.records) + 1:02d}.csv"
+    _check_answers(given, kind, columns)
+    if samples > due.samples:
         raise DataError.because(
             "record-too-long",
-            f"{given.name} has {part.samples} samples, and the plan {due.file} has {due.samples}",
+            f"{given} has {samples} samples, and the plan {due.file} has {due.samples}",
             hint="give the samples from the start of the plan to its end; is it the record of another part?",
         )
-    entry = PartRecord(file, given.name, part.samples, due.file, False, part.samples * due.part_power)
-    if part.excitation is None:
-        ended = shorter(given.name, due.file, part.samples, due.samples)
-        return entry, [*without_excitation(given.name, due.file), *ended]
-    plans = [plan for plan in memory.campaign.plans if plan.samples >= part.samples]
-    strongest = max(each.power for each in memory.campaign.plans) ** 0.5
-    matches, wholes = dict[str, Match](), dict[str, Array]()
-    for plan in plans:
-        signals = list(csv_columns(memory.files[plan.file]).values())[1:]
-        wholes[plan.file] = np.asarray(np.stack(signals, axis=1) - plan.offset, dtype=float)
-        about = part.excitation - plan.offset
-        matches[plan.file] = matched(wholes[plan.file], about, part.rows, strongest)
-    match, levelled = matches[due.file], part.excitation - due.offset
+    excitation = data.r if kind == "r" else data.u
+    if excitation is None:
+        entry = PartRecord(file, given, samples, due.file, False, samples * due.part_power)
+        ended = shorter(given, due.file, samples, due.samples)
+        return entry, [*without_excitation(given, due.file), *ended]
+    plans = [plan for plan in campaign.plans if plan.samples >= samples]
+    strongest = max(each.power for each in campaign.plans) ** 0.5
+    wholes = {plan.file: signals_in(memory.files[plan.file]) - plan.offset for plan in plans}
+    matches = {
+        plan.file: matched(wholes[plan.file], excitation - plan.offset, rows, strongest) for plan in plans
+    }
+    match, levelled = matches[due.file], excitation - due.offset
     likest = max(matches, key=lambda name: abs(matches[name].likeness))
     other = likest if abs(matches[likest].likeness) > max(LIKE, abs(match.likeness)) else None
     if not unlike:
-        found = standing_in(wholes[due.file][part.rows], levelled, columns)
-        _check_applied(given.name, due.file, part.kind, match, other, found)
-    samples = match.begins + part.samples
-    energy = float(np.sum(levelled**2)) * samples / len(part.rows)
+        found = standing_in(wholes[due.file][rows], levelled, columns)
+        _check_applied(given, due.file, kind, match, other, found)
+    samples += match.begins
+    energy = float(np.sum(levelled**2)) * samples / len(rows)
     scale = match.scale if match.likeness > LIKE else None
-    entry = PartRecord(file, given.name, samples, due.file, False, energy, match.likeness, scale)
+    entry = PartRecord(file, given, samples, due.file, False, energy, match.likeness, scale)
     findings = hardly_followed(
-        given.name,
+        given,
         due.file,
         likeness=match.likeness,
         spliced=match.spliced,
@@ -244,17 +256,38 @@ def accepted(
         other=other,
         scale=match.scale if match.off else 1.0,
     )
-    return entry, findings + shorter(given.name, due.file, samples, due.samples)
+    return entry, findings + shorter(given, due.file, samples, due.samples)
 
 
-def _check_answers(given: str, part: Part, columns: Mapping[str, Array]) -> None:
+def _due(memory: Memory, given: str, table: Table) -> PlannedPart:
+    """Return the part that is due; raise `DataError` where there is none, or its record has been given."""
+    campaign, due = memory.campaign, memory.campaign.plan
+    if campaign.state != "running" or due is None:
+        raise DataError.because(
+            "campaign-over",
+            f"the campaign in {memory.directory} has ended: {campaign.state}",
+            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; "
+            "where tests refute the structure, --regardless without a record goes on as it is",
+        )
+    for known in campaign.records:
+        if memory.files[known.file] == csv_text(table).encode():
+            stays = " (this one stays withdrawn)" if known.withdrawn else ""
+            raise DataError.because(
+                "data-repeated",
+                f"{given} holds the samples of {known.file}, given as {known.given}",
+                hint=f"give each record once{stays}",
+            )
+    return due
+
+
+def _check_answers(given: str, kind: str, columns: Mapping[str, Array]) -> None:
     """Raise `DataError` (`record-copied`) where an output is what was applied.
 
     In a loop that is the reference: without one, a controller without dynamics makes a copy of y of u.
     """
-    outputs, inputs = ([name for name in columns if name.startswith(kind)] for kind in ("y", part.kind))
+    outputs, inputs = ([name for name in columns if name.startswith(letter)] for letter in ("y", kind))
     for output, name in itertools.product(outputs, inputs):
-        if len(part.rows) > _FEW and copied(columns[output], columns[name]):
+        if len(columns[output]) > _FEW and copied(columns[output], columns[name]):
             raise DataError.because(
                 "record-copied",
                 f"{output} of {given} is a copy of {name}, at some scale and level: what the plant "

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
-from inputdesign_cli.questions.assessment.build import ask, build_identification
-from inputdesign_cli.questions.assessment.identify import ModelQuestion
+from inputdesign_cli.questions.assessment.build import build_identification, question_at
 from inputdesign_cli.questions.building.rebuild import Rebuild
 from inputdesign_cli.questions.building.signal_settings import operating_points
 from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, record_step
 from inputdesign_cli.questions.building.uncertainty import farthest_radius
+from inputdesign_cli.questions.campaign.directory import Rounds
 from inputdesign_cli.questions.campaign.plans import Planner
-from inputdesign_cli.questions.campaign.rounds import Rounds
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
 from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
 from inputdesign_cli.questions.least_cost.build import build_convex
@@ -58,34 +55,24 @@ def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
     if pilot is not None and pilot.power is not None:  # what is known before the experiment begins
         samples, has = samples + pilot.samples, "and its pilot have"
     most = stated.max_samples or max(spec.limits.samples or _LONGEST * samples, samples)
-    if most < samples:
-        raise spec.complain(
-            "conflicting-keys",
-            f"the experiment {has} {samples} samples, and the campaign ends at {most}",
-            hint="raise campaign.max_samples, or lower experiment.samples",
-            key="campaign.max_samples",
-        )
-    if stated.stages is not None:
-        if sum(stated.stages) != samples:
-            raise spec.complain(
-                "conflicting-keys",
-                f"the stages have {sum(stated.stages)} samples together, and the experiment {samples}",
-                hint="make them agree: experiment.samples is the length of the whole",
-                key="campaign.stages",
-            )
-        return Schedule(stated.stages, stated.stages[-1], samples, most)
     tenth = max(spec.experiment.samples // _TENTH, 1)
     block = stated.block or tenth
-    first = min(block, tenth) if pilot is None else pilot.samples
-    for key, length in (("block", block), ("pilot", first)):
-        if length > samples:
-            raise spec.complain(
-                "conflicting-keys",
-                f"the {key} has {length} samples, and the whole experiment {samples}",
-                hint="parts are shorter than the whole",
-                key=f"campaign.{key}",
-            )
-    return Schedule((first,), block, samples, most)
+    parts = stated.stages or (min(block, tenth) if pilot is None else pilot.samples,)
+    message = f"the experiment {has} {samples} samples, and the campaign ends at {most}"
+    raised = "raise campaign.max_samples, or lower experiment.samples"
+    conflicts = [("max_samples", most < samples, message, raised)]
+    if stated.stages is not None:
+        block = parts[-1]
+        message = f"the stages have {sum(parts)} samples together, and the experiment {samples}"
+        agree = "make them agree: experiment.samples is the length of the whole"
+        conflicts += [("stages", sum(parts) != samples, message, agree)]
+    for key, length in (("block", block), ("pilot", parts[0])) if stated.stages is None else ():
+        message = f"the {key} has {length} samples, and the whole experiment {samples}"
+        conflicts += [(key, length > samples, message, "parts are shorter than the whole")]
+    for key, wrong, message, hint in conflicts:
+        if wrong:
+            raise spec.complain("conflicting-keys", message, hint=hint, key=f"campaign.{key}")
+    return Schedule(parts, block, samples, most)
 
 
 def _check(spec: Spec, stated: Campaign) -> None:
@@ -118,12 +105,8 @@ def build_planner(spec: Spec) -> Planner:
         bounded=spec.limits.bounds_power,
         seed=spec.signal.seed or 0,
         designs=Rebuild(spec, build_convex),
-        asked=Rebuild(spec, _asked),
+        asked=partial(question_at, spec),
     )
-
-
-def _asked(spec: Spec) -> Callable[[int, Array], ModelQuestion]:
-    return partial(ask, spec)
 
 
 def build_campaign(spec: Spec) -> CampaignTask:
@@ -147,17 +130,17 @@ def build_campaign(spec: Spec) -> CampaignTask:
     )
 
 
-def build_rounds(spec: Spec) -> Rounds:
-    """Return all that the rounds of a real campaign need; see `build_rules`."""
+def build_rounds(spec: Spec, *, begins: bool = False) -> Rounds:
+    """Return all that the rounds of a real campaign need, which may begin; see `build_rules`.
+
+    Raises:
+        SpecError: `not-supported` for keys of `signal` that do not apply to parts.
+    """
+    lengths = "campaign.block or campaign.stages state the lengths of parts"
+    also = "remove it: signal.csv is the file of a part"
+    stated = ("signal.samples", spec.signal.samples, lengths), ("signal.also", spec.signal.also, also)
+    for key, value, hint in stated:
+        if begins and value is not None:  # a campaign that has begun goes on
+            raise spec.complain("not-supported", f"parts of a campaign have no {key}", hint=hint, key=key)
     rules, planner = build_rules(spec), build_planner(spec)
     return Rounds(build_identification(spec), planner, rules, operating_points(spec))
-
-
-def check_applied_in_parts(spec: Spec) -> None:
-    """Raise `SpecError` (`not-supported`) for keys of `signal` that do not apply to parts."""
-    key, hint = "signal.samples", "campaign.block or campaign.stages state the lengths of parts"
-    if spec.signal.samples is None:
-        key, hint = "signal.also", "remove it: signal.csv is the file of a part"
-        if spec.signal.also is None:
-            return
-    raise spec.complain("not-supported", f"parts of a campaign have no {key}", hint=hint, key=key)

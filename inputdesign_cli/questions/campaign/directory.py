@@ -1,36 +1,85 @@
-"""The verbs of a campaign: begin it, take a record and decide, withdraw a record."""
+"""The verbs of a campaign: begin it, take a record and decide by all of them, withdraw a record."""
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.findings.campaigns import campaign_refuted, planned_otherwise, withdrawn_record
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.campaigns import (
+    campaign_doubted,
+    campaign_refuted,
+    estimate_not_used,
+    no_estimate_yet,
+    planned_otherwise,
+    withdrawn_record,
+)
+from inputdesign_cli.findings.other_systems import contradictions, differences
+from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.campaign import Campaign, PlannedPart, Round
+from inputdesign_cli.outcome.campaign import Campaign, PlannedPart, Round, State
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
+from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
-from inputdesign_cli.questions.campaign.acceptance import accepted
-from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests
-from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
-from inputdesign_cli.questions.campaign.schedule import power_of
+from inputdesign_cli.outcome.text_formats import csv_text
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.assessment.assess import judge
+from inputdesign_cli.questions.assessment.identify import Identification, estimated, mismeasured, told
+from inputdesign_cli.questions.campaign.acceptance import accepted, table_of
+from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests, signals_in
+from inputdesign_cli.questions.campaign.plans import Planner, standing
+from inputdesign_cli.questions.campaign.schedule import Rules, Standing, power_of
+from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.regular_file import read_regular
 
-Decide = Callable[[Past], Decision]
+_ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided": "undecided"}
+# Data that say nothing yet; more of them will.
+_TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
+# Records whose times differ by one sample time, give or take this share of it, are one.
+_CONTINUES = 0.1
 
 
-def begun(decide: Decide, folder: Path, directory: Path) -> Results:
+@dataclass(frozen=True)
+class Rounds:
+    """Holds all that the rounds of a campaign need.
+
+    Attributes:
+        offsets: (r,) the levels that the excitation varies about.
+    """
+
+    identification: Identification
+    planner: Planner
+    rules: Rules
+    offsets: Array
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Describes how a campaign stands after its records.
+
+    Attributes:
+        standing: the model that is built on; None while the data say too little.
+        assessed: the estimate and its accuracy; None as long as there is no estimate.
+        refuted: whether the campaign ends before its time since tests refute the structure.
+    """
+
+    state: State
+    standing: Standing | None = None
+    assessed: Results | None = None
+    findings: tuple[Finding, ...] = ()
+    refuted: bool = False
+
+
+def begun(task: Rounds, folder: Path, directory: Path) -> Results:
     """Return the results with the first plan; names of files in the spec are relative to a `folder`."""
-    decision = decide(Past())
-    task = decision.task
     campaign = Campaign(
         version=VERSION,
         time_unit=task.identification.header.units.time_unit,
@@ -42,14 +91,14 @@ def begun(decide: Decide, folder: Path, directory: Path) -> Results:
         rounds=(),
         digests={},
     )
-    return _decided(decision, campaign, {}, Outcome())
+    return _decided(task, campaign, {}, Outcome(), judged(task, campaign, []))
 
 
 def advanced(
-    decide: Decide,
+    task: Rounds,
     memory: Memory,
-    given: Path | None,
-    part: Part | None,
+    given: Path | None = None,
+    preparation: Preparation | None = None,
     *,
     unlike: bool = False,
     regardless: bool = False,
@@ -57,7 +106,7 @@ def advanced(
     """Return the results of the next decision, with a new record or with those at hand.
 
     Args:
-        given: the file of the user; `part`: its content.
+        given: the file of the user; `preparation`: what to do to it before.
         unlike: whether to take a record at another scale than its plan, like another plan, or like none.
         regardless: whether to go on, from now on, where tests refute the structure.
 
@@ -66,34 +115,20 @@ def advanced(
             `record-other-scale`, `record-unlike`; what is wrong with a record.
     """
     campaign, files, said = memory.campaign, dict(memory.files), Outcome()
-    if given is not None and part is not None:
-        name, text, due = f"record_{len(campaign.records) + 1:02d}", csv_text(part.table), campaign.plan
-        if campaign.state != "running" or due is None:
-            raise DataError.because(
-                "campaign-over",
-                f"the campaign in {memory.directory} has ended: {campaign.state}",
-                hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; "
-                "where tests refute the structure, --regardless without a record goes on as it is",
-            )
-        for known in campaign.records:
-            if files[known.file] == text.encode():
-                stays = " (this one stays withdrawn)" if known.withdrawn else ""
-                raise DataError.because(
-                    "data-repeated",
-                    f"{given.name} holds the samples of {known.file}, given as {known.given}",
-                    hint=f"give each record once{stays}",
-                )
-        record, findings = accepted(memory, due, f"{name}.csv", given, part, unlike=unlike)
-        files[f"{name}.csv"] = text.encode()
-        files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
+    if given is not None:
+        units, data = task.identification.header.units, read_part(task, given, preparation or Preparation())
+        table = table_of(units, data)
+        record, findings = accepted(memory, units.excitation, given.name, data, table, unlike=unlike)
+        files[record.file] = csv_text(table).encode()
+        files[f"{Path(record.file).stem}_as_given{given.suffix.lower()}"] = read_regular(given)
         campaign = replace(campaign, records=(*campaign.records, record))
-        said = Outcome(notes=part.notes).saying(findings)
+        said = Outcome(notes=data.notes).saying(findings)
     if regardless:
         campaign = replace(campaign, regardless=True)
-    return _again(decide, memory, campaign, files, said, given)
+    return _again(task, memory, campaign, files, said, given)
 
 
-def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
+def withdrawn(task: Rounds, memory: Memory, number: int) -> Results:
     """Return the results of the decision without a record, whose file stays; raise `record-unknown`."""
     records = list(memory.campaign.records)
     if not 1 <= number <= len(records) or records[number - 1].withdrawn:
@@ -106,36 +141,23 @@ def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
     records[number - 1] = replace(records[number - 1], withdrawn=True)
     campaign = replace(memory.campaign, records=tuple(records))
     said = Outcome().saying(withdrawn_record(records[number - 1].file, number))
-    return _again(decide, memory, campaign, dict(memory.files), said)
+    return _again(task, memory, campaign, dict(memory.files), said)
 
 
 def _again(
-    decide: Decide,
+    task: Rounds,
     memory: Memory,
     campaign: Campaign,
     files: dict[str, bytes],
     said: Outcome,
     given: Path | None = None,
 ) -> Results:
-    """Decide on the next part from all records that count; `said` is what there is to say of a new one."""
+    """Return the results of a decision by all records that count; `said` is what to say of a new one."""
     counting = [record.file for record in campaign.records if not record.withdrawn]
-    applied = [
-        np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
-        for record in campaign.records
-    ]
-    past = Past(
-        done=campaign.done,
-        applied=np.concatenate(applied) if applied else None,
-        last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
-        first_cost=campaign.first_cost,
-        number=len(campaign.rounds) + 1,
-        regardless=bool(campaign.regardless),
-    )
     # The new record is not in the directory yet; errors about it name the file that was given.
     with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
-        paths = [Path(folder) / name for name in counting]
-        for path in paths:
-            path.write_bytes(files[path.name])
+        for name in counting:
+            Path(folder, name).write_bytes(files[name])
 
         def renamed(text: str) -> str:
             own = text.removeprefix(f"{folder}{os.sep}")
@@ -146,90 +168,87 @@ def _again(
             return replace(one, message=renamed(one.message), location=place)
 
         try:
-            decision = decide(replace(past, records=paths))
+            found = judged(task, campaign, [Path(folder, name) for name in counting])
         except DataError as error:
             raise DataError([named(one) for one in error.diagnostics]) from error
-    if decision.refuted:
-        every, end = len(counting) == len(campaign.records), decision.task.rules.end
+    if found.refuted:
+        every, end = len(counting) == len(campaign.records), task.rules.end
         said = said.saying(campaign_refuted(memory.directory, campaign.done, end, counting, every=every))
-    results = _decided(decision, campaign, files, said)
+    results = _decided(task, campaign, files, said, found)
     provenance = {**results.outcome.provenance, "made_from": list(memory.made_from)}
     return replace(results, outcome=replace(results.outcome, provenance=provenance))
 
 
-def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], said: Outcome) -> Results:
-    """Return the results of a decision; what was `said` before comes first."""
-    number, header, rules = len(campaign.records), decision.task.identification.header, decision.task.rules
-    tables: dict[str, Table] = {}
-    curves: dict[str, Curves] = {}
-    outcome = Outcome(title=header.title, timing_s={})
-    if (assessed := decision.assessed) is not None:
+def _decided(
+    task: Rounds, campaign: Campaign, files: dict[str, bytes], said: Outcome, found: Judged
+) -> Results:
+    """Return the results of a decision, with the next part where the campaign goes on.
+
+    What was `said` before comes first. Raises `IdesignError` if no part can be planned.
+    """
+    header, outcome = task.identification.header, Outcome(title=task.identification.header.title, timing_s={})
+    tables, curves, said = dict[str, Table](), dict[str, Curves](), said.saying(found.findings)
+    if (assessed := found.assessed) is not None:
         outcome, tables, curves = assessed.outcome, dict(assessed.tables), dict(assessed.curves)
-        files[f"model_{number:02d}.yaml"] = assessed.files["model.yaml"]
-    said = said.saying(decision.findings)
-    plan, file = decision.plan, f"plan_{number + 1:02d}.csv"
-    entry = _entry(decision, campaign, file)
+        files[f"model_{len(campaign.records):02d}.yaml"] = assessed.files["model.yaml"]
+    entry = _stood(campaign, found)
     if entry.share == 1.0:
         campaign = replace(campaign, last=entry.estimate)
-    if plan is not None and decision.part is not None:
-        files[file] = csv_text(decision.part).encode()
-        fragile = rules.robust_last and rules.schedule.last(campaign.done) and plan.kind == "nominal"
-        said = said.saying(
-            planned_otherwise(
-                file,
-                why=plan.why,
-                capped=plan.capped,
-                share=plan.share,
-                beyond=plan.beyond,
-                part_cost=plan.part_cost,
-                fragile=fragile,
-            )
-        )
-        if plan.designed and campaign.first_cost is None:
-            campaign = replace(campaign, first_cost=plan.cost)
-        time_of, *signals = decision.part.columns.values()
-        names = [name.split()[0] for name in list(decision.part.columns)[1:]]
-        tables["signal"] = decision.part
-        curves["signal"] = SignalCurves(time_of, dict(zip(names, signals, strict=True)))
-    campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=decision.state)
+    if found.state == "running":
+        part, table, findings = _next_part(task, campaign, files, found)
+        entry, said = replace(entry, plan=part), said.saying(findings)
+        files[part.file], tables["signal"] = csv_text(table).encode(), table
+        time_of, *signals = table.columns.values()
+        named = dict(zip(header.units.excitations, signals, strict=True))
+        curves["signal"] = SignalCurves(time_of, named)
+        if part.kind not in ("pilot", "stopgap") and campaign.first_cost is None:
+            campaign = replace(campaign, first_cost=part.cost)
+    campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=found.state)
     campaign = replace(campaign, digests=digests(campaign, files))
-    tables["rounds"], progress = history(campaign.rounds, rules.end)
-    notes = tuple(dict.fromkeys([*(said.notes or ()), *(outcome.notes or ())]))
-    findings = (*(said.findings or ()), *(outcome.findings or ()))
+    tables["rounds"], progress = history(campaign.rounds, task.rules.end)
     outcome = replace(
         outcome,
-        status=decision.state,
+        status=found.state,
         samples=campaign.done,
         campaign=campaign,
-        notes=notes or None,
-        findings=findings or None,
+        notes=tuple(dict.fromkeys([*(said.notes or ()), *(outcome.notes or ())])) or None,
+        findings=(*(said.findings or ()), *(outcome.findings or ())) or None,
     )
     time_unit, curves = header.units.time_unit, curves | progress
     return Results(outcome, header.resolved_spec, time_unit, tables, curves, files)
 
 
-def _entry(decision: Decision, campaign: Campaign, file: str) -> Round:
-    """Return the round of a decision, whose plan, if there is one, is kept in a `file`."""
-    stands, plan = decision.standing, decision.plan
+def _stood(campaign: Campaign, found: Judged) -> Round:
+    """Return the round of a decision, without a plan."""
     entry = Round(
         samples=campaign.done,
         energy=sum((record.energy for record in campaign.records), start=0.0),
         records=tuple(n for n, record in enumerate(campaign.records, 1) if not record.withdrawn),
-        state=decision.state,
+        state=found.state,
     )
-    if stands is not None:
-        names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
-        entry = replace(
-            entry,
-            estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
-            standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
-            worst_ratio=stands.ratio,
-            share=stands.share,
-        )
-    if plan is None:
+    if (stands := found.standing) is None:
         return entry
-    planned = PlannedPart(
-        file=file,
+    names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
+    return replace(
+        entry,
+        estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
+        standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
+        worst_ratio=stands.ratio,
+        share=stands.share,
+    )
+
+
+def _next_part(
+    task: Rounds, campaign: Campaign, files: Mapping[str, bytes], found: Judged
+) -> tuple[PlannedPart, Table, list[Finding]]:
+    """Return the part to be applied next, its samples for signal.csv, and what is not as the spec asks."""
+    rules, done, number = task.rules, campaign.done, len(campaign.rounds) + 1
+    units, seed = task.identification.header.units, rules.seed_of(number)
+    applied = [signals_in(files[record.plan])[: record.samples] for record in campaign.records]
+    before = np.concatenate(applied) - task.offsets if applied else None
+    plan = task.planner.plan(rules, found.standing, done, seed, campaign.first_cost, before)
+    part = PlannedPart(
+        file=f"plan_{len(campaign.records) + 1:02d}.csv",
         samples=plan.take,
         planned_samples=len(plan.record),
         power=plan.power,
@@ -238,32 +257,112 @@ def _entry(decision: Decision, campaign: Campaign, file: str) -> Round:
         part_cost=plan.part_cost,
         kind=plan.kind,
         capped=plan.capped,
-        seed=decision.seed,
-        offset=tuple(decision.task.offsets.tolist()),
+        seed=seed,
+        offset=tuple(task.offsets.tolist()),
         design=None if plan.claim is None else plan.claim(),
         why=plan.why or None,
     )
-    return replace(entry, plan=planned)
+    findings = planned_otherwise(
+        part.file,
+        why=plan.why,
+        capped=plan.capped,
+        share=plan.share,
+        beyond=plan.beyond,
+        part_cost=plan.part_cost,
+        fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal",
+    )
+    # The times of a part continue the times of the last one.
+    time_of = units.sample_time * np.arange(done, done + plan.take, dtype=np.float64)
+    signals = zip(units.excitations, (plan.applied + task.offsets).T, strict=True)
+    columns = {units.time_header: time_of} | {units.header(name): values for name, values in signals}
+    return part, Table(columns), findings
 
 
 def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]]:
     """Return rounds.csv, a row for each round with an estimate, and its figures; `end` is the last sample."""
     known = [one for one in rounds if one.estimate is not None]
-
-    def column(values: Iterable[float | None]) -> Array:
-        return np.array(list(values), dtype=float)
-
-    samples, energy = column(one.samples for one in known), column(one.energy for one in known)
-    ratio = column(one.worst_ratio for one in known)
-    columns = {"samples": samples, "energy": energy, "worst_ratio": ratio}
+    rows: dict[str, list[float | None]] = {
+        "samples": [one.samples for one in known],
+        "energy": [one.energy for one in known],
+        "worst_ratio": [one.worst_ratio for one in known],
+    }
+    names = list(known[0].estimate or {}) if known else []
+    for name in names:
+        rows[name] = [(one.estimate or {})[name] for one in known]
+        rows[f"sd_{name}"] = [(one.standard_deviation or {})[name] for one in known]
+    columns = {name: np.array(values, dtype=float) for name, values in rows.items()}
     if not known:
         return Table(columns), {}
-    names = list(known[0].estimate or {})
-    estimates = {name: column((one.estimate or {})[name] for one in known) for name in names}
-    spreads = {name: column((one.standard_deviation or {})[name] for one in known) for name in names}
-    for name in names:
-        columns |= {name: estimates[name], f"sd_{name}": spreads[name]}
+    samples, spreads = columns["samples"], {name: columns[f"sd_{name}"] for name in names}
     return Table(columns), {
-        "campaign": CampaignCurves(samples, ratio, energy, end),
-        "estimates": EstimateCurves(samples, estimates, spreads),
+        "campaign": CampaignCurves(samples, columns["worst_ratio"], columns["energy"], end),
+        "estimates": EstimateCurves(samples, {name: columns[name] for name in names}, spreads),
     }
+
+
+def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
+    """Return how a campaign stands by the joint estimate of the records that count, and whether it ends.
+
+    Raises:
+        DataError: a record cannot be used.
+    """
+    rules, identification, done = task.rules, task.identification, campaign.done
+    units, nominal, last = identification.header.units, identification.nominal, campaign.last
+    now, started = Judged("missed" if done >= rules.end else "running"), time.perf_counter()
+    if not paths:
+        return now
+    try:
+        taken = Preparation(operating_point=identification.operating_point)
+        data = continued(read_data(paths, units, taken), units.sample_time)
+        found = estimated(identification, data, paths[0], taken)
+    except DataError as error:
+        if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
+            raise
+        return replace(now, findings=tuple(no_estimate_yet(told(error))))
+    estimate, earlier = found.estimate, identification.earlier
+
+    def informed(model: Model) -> Array:
+        if model is found.model:
+            return estimate.information
+        return information_of_data(
+            model, data.u, data.y, units.step, lengths=data.lengths, free=estimate.start.free, earlier=earlier
+        )
+
+    assessment = judge(identification, found, started, first=last is None)
+    sound = nominal if last is None else nominal.at(np.array(list(last.values()), dtype=float))
+    stands, looks = standing(task.planner, found.model, informed, sound), rules.schedule.looks
+    findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
+    now = replace(now, standing=stands, assessed=assessment.results)
+    files = [name for name, _ in data.files]
+    if differences(estimate, files, looks) or contradictions(estimate, looks):
+        now = replace(now, state="undecided")
+    elif rules.over(done, met=stands is not None and stands.met):
+        now = replace(now, state=_ENDED[assessment.verdict])
+    # Faulty measurements can be mended, and users may go on.
+    elif not campaign.regardless and rules.refuted(estimate) and not mismeasured(identification, found):
+        now = replace(now, state="undecided", refuted=True)
+    elif assessment.verdict == "undecided":
+        findings += campaign_doubted()
+    return replace(now, findings=tuple(findings))
+
+
+def read_part(task: Rounds, path: Path, preparation: Preparation) -> Record:
+    """Return a record of the user, its inputs with their levels; `DataError` if it cannot be used."""
+    units, levels = task.identification.header.units, task.identification.operating_point
+    known = replace(preparation, operating_point={**levels, **preparation.operating_point})
+    data = read_data([path], units, known)
+    return replace(data, u=data.u + np.array([levels.get(f"u{j + 1}", 0.0) for j in range(units.inputs)]))
+
+
+def continued(data: Record, step: float) -> Record:
+    """Join files whose times continue the times of the file before, after one `step`, into one record."""
+    ends = np.cumsum(data.lengths)
+    files = set(np.cumsum([samples for _, samples in data.files]).tolist())
+    lengths = [data.lengths[0]]
+    for end, length in zip(ends[:-1], data.lengths[1:], strict=True):
+        gap = data.time[end] - data.time[end - 1]
+        if int(end) in files and abs(gap - step) <= _CONTINUES * step:
+            lengths[-1] += length
+        else:
+            lengths.append(length)
+    return replace(data, lengths=tuple(lengths))

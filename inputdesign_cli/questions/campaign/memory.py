@@ -22,11 +22,15 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import OutcomeError, plain, read_plain
 from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
 from inputdesign_cli.outcome.run_files import RESULT, SIGNAL, SPEC, load_result, locked, unreadable
+from inputdesign_cli.outcome.text_formats import csv_columns
 from inputdesign_cli.regular_file import read_regular
 
 VERSION = 1
@@ -72,7 +76,37 @@ def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
             else; `campaign-version`; `campaign-changed`, something is not as it was kept.
     """
     with _no_run(directory):
-        return _read(directory, withdrawing)
+        result = read_run(directory)
+        campaign = result.get("campaign")
+        if not isinstance(campaign, dict) or "records" not in campaign:
+            raise DataError.because(
+                "campaign-missing",
+                f"{directory} holds a run, and no campaign",
+                hint="begin one with `idesign campaign SPEC -o DIR`, in a directory of its own",
+            )
+        if campaign.get("version") != VERSION:
+            raise DataError.because(
+                "campaign-version",
+                f"the campaign in {directory} has version {campaign.get('version')}, not {VERSION}",
+                hint="go on with the version of idesign that began it: see environment in result.json",
+            )
+        try:
+            found = read_plain(Campaign, campaign)
+        except OutcomeError as error:
+            raise unreadable(directory / RESULT, "its campaign is not what idesign writes") from error
+        names = {name for name in result.get("files", ()) if _KEPT.fullmatch(name) or name in (SPEC, SIGNAL)}
+        with output_errors(directory):
+            files = {name: read_regular(directory / name) for name in sorted(names)}
+        due = dict.fromkeys([RESULT, *(r.file for r in found.records), *(p.file for p in found.plans)], "")
+        own = {SPEC: result.get("spec_sha256", ""), SIGNAL: result.get("signal_sha256")}
+        known = due | dict(found.digests) | own
+        out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
+        now = {name: _sha256(content) for name, content in files.items()} | {RESULT: _decisions(campaign)}
+        for name, digest in known.items():
+            if digest is not None and name not in out and digest != now.get(name):
+                raise _changed(directory, name, found)
+        spec, kept = files[SPEC].decode("utf-8"), {n: c for n, c in files.items() if n not in (SPEC, SIGNAL)}
+        return Memory(directory, found, spec, tuple(map(str, result.get("made_from", ()))), kept)
 
 
 @contextmanager
@@ -88,37 +122,9 @@ def _no_run(directory: Path) -> Iterator[None]:
         ) from error
 
 
-def _read(directory: Path, withdrawing: int | None) -> Memory:
-    result = read_run(directory)
-    campaign = result.get("campaign")
-    if not isinstance(campaign, dict) or "records" not in campaign:
-        raise DataError.because(
-            "campaign-missing",
-            f"{directory} holds a run, and no campaign",
-            hint="begin one with `idesign campaign SPEC -o DIR`, in a directory of its own",
-        )
-    if campaign.get("version") != VERSION:
-        raise DataError.because(
-            "campaign-version",
-            f"the campaign in {directory} has version {campaign.get('version')}, not {VERSION}",
-            hint="go on with the version of idesign that began it: see environment in result.json",
-        )
-    try:
-        found = read_plain(Campaign, campaign)
-    except OutcomeError as error:
-        raise unreadable(directory / RESULT, "its campaign is not what idesign writes") from error
-    names = {name for name in result.get("files", ()) if _KEPT.fullmatch(name) or name in (SPEC, SIGNAL)}
-    with output_errors(directory):
-        files = {name: read_regular(directory / name) for name in sorted(names)}
-    due = dict.fromkeys([RESULT, *(r.file for r in found.records), *(p.file for p in found.plans)], "")
-    known = due | {**found.digests, SPEC: result.get("spec_sha256", ""), SIGNAL: result.get("signal_sha256")}
-    out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
-    now = {name: _sha256(content) for name, content in files.items()} | {RESULT: _decisions(campaign)}
-    for name, digest in known.items():
-        if digest is not None and name not in out and digest != now.get(name):
-            raise _changed(directory, name, found)
-    spec, kept = files[SPEC].decode("utf-8"), {n: c for n, c in files.items() if n not in (SPEC, SIGNAL)}
-    return Memory(directory, found, spec, tuple(map(str, result.get("made_from", ()))), kept)
+def signals_in(content: bytes) -> Array:
+    """Return the signals (n, r) in the bytes of a plan, without their times."""
+    return np.stack(list(csv_columns(content).values())[1:], axis=1)
 
 
 def digests(campaign: Campaign, files: Mapping[str, bytes]) -> dict[str, str]:

@@ -49,7 +49,7 @@ class Planner:
         bounded: whether limits bound the power, so that a best experiment exists.
         seed: of the record of the whole experiment.
         designs: builds the design of a plan.
-        asked: builds the accuracy question for a number of samples and a factor (k, k) of their information.
+        asked: the accuracy question at a model; see `Identification.at`.
     """
 
     nominal: Experiment
@@ -59,7 +59,7 @@ class Planner:
     bounded: bool
     seed: int
     designs: Rebuild[ConvexTask]
-    asked: Rebuild[Callable[[int, Array], ModelQuestion]]
+    asked: Callable[[Model, int, Array, str], ModelQuestion]
 
     def radius(self, model: Model) -> float:
         """Return the radius of the farthest pole of the plant, or of its loop; infinite if it is unstable."""
@@ -85,7 +85,7 @@ class Planner:
             LinAlgError: the information is singular.
         """
         factor: Array = np.asarray(np.linalg.cholesky(information), dtype=float)
-        return self.asked.at(model)(self.nominal.samples, factor)
+        return self.asked(model, self.nominal.samples, factor, "plan")
 
     def plan(
         self,
@@ -176,17 +176,20 @@ class Planner:
         def cost(experiment: Experiment, scale: float) -> float:
             """Return the cost of a sample of the part, all of it but the lead at a scale."""
             factors = np.where(np.arange(plan.take) < lead, 1.0, scale)[: len(plan.applied), None]
-            whole = np.concatenate([before, factors * plan.applied])
-            at = FiniteRecord(replace(experiment, samples=len(whole)), len(whole), self.step)
-            signals = {kind: at.signals(kind, whole)[len(before) :] for kind in self.cost}
-            powers = {kind: np.mean(x**2, axis=0).tolist() for kind, x in signals.items()}
-            return weighted_sum(self.cost, powers)
+            return self.cost_of(experiment, np.concatenate([before, factors * plan.applied]), len(before))
 
         scale = min(_largest_scale(partial(cost, at), most) for at, most in caps)
         beyond = any(cost(at, scale) > most * REACHED for at, most in caps)
         part_cost, record = cost(caps[0][0], scale), plan.record.copy()
         record[lead : plan.take] *= scale
         return replace(plan, record=record, share=scale**2, part_cost=part_cost, beyond=beyond)
+
+    def cost_of(self, experiment: Experiment, record: Array, begin: int = 0) -> float:
+        """Return the cost of a sample of a record (n, r), from the sample `begin` on, without any noise."""
+        at = FiniteRecord(replace(experiment, samples=len(record)), len(record), self.step)
+        signals = {kind: at.signals(kind, record)[begin:] for kind in self.cost}
+        powers = {kind: np.mean(x**2, axis=0).tolist() for kind, x in signals.items()}
+        return weighted_sum(self.cost, powers)
 
     def knowing(self, model: Model) -> tuple[float, Array | None]:
         """Return the cost of the design for a known plant, over all samples, and its record (samples, r).

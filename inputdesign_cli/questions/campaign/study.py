@@ -20,11 +20,10 @@ from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError, bad_spec
 from inputdesign_cli.findings.neglected import mattering, neglected
 from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
-from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.monte_carlo.study import responses
@@ -164,7 +163,7 @@ def oracle_of(study: CampaignStudy) -> Oracle | None:
         cost, record = study.planner.knowing(study.true.model)
     except IdesignError:
         return None
-    energy = 0.0 if record is None else energy_of(study.planner, record, study.true)
+    energy = 0.0 if record is None else len(record) * study.planner.cost_of(study.true, record)
     return Oracle(cost, energy or None)
 
 
@@ -185,10 +184,9 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
 
 def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
     """Return the runs of one way of experimenting."""
-    run = partial(_ends, replace(study, rules=rules))
     # One run a batch: all ways meet the same noise in the same run.
-    parts = run_batches(run, runs=study.runs, size=1, seed=study.seed, executor=executor)
-    return [run for part in parts for run in part]
+    run = partial(_ended, replace(study, rules=rules))
+    return run_batches(run, runs=study.runs, size=1, seed=study.seed, executor=executor)
 
 
 def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
@@ -273,9 +271,9 @@ def campaigns_curves(
     return tables, curves
 
 
-def _ends(study: CampaignStudy, runs: int, rng: np.random.Generator) -> list[Ended]:
-    """Run several campaigns from rest, one after the other, and return their ends."""
-    return [_Run(study, rng).end() for _ in range(runs)]
+def _ended(study: CampaignStudy, _one: int, rng: np.random.Generator) -> Ended:
+    """Run a campaign from rest to its end."""
+    return _Run(study, rng).end()
 
 
 @dataclass
@@ -372,7 +370,7 @@ class _Run:
         """Return the end of the run, judged on the true plant."""
         study, samples, energy, ratio = self.study, len(self.r), 0.0, None
         if samples:
-            energy = energy_of(study.planner, self.r, study.true)
+            energy = samples * study.planner.cost_of(study.true, self.r)
         if samples and study.true.model.names == self.last.names:
             true = replace(study.true, samples=samples)
             information = FiniteRecord(true, samples, study.planner.step).information(self.r)
@@ -395,12 +393,3 @@ class _Run:
             off = np.abs(error.concerned(self.last.plant_at(error.grid) - true.plant_at(error.grid)))
             kept.append(bool(np.all(np.linalg.norm(off, axis=1) <= error.admissible.at(error.grid))))
         return all(kept) if kept else None
-
-
-def energy_of(planner: Planner, r: Array, true: Experiment) -> float:
-    """Return the cost of a record (n, r) on the true plant, summed over its samples."""
-    at = FiniteRecord(true, len(r), planner.step)
-    powers: dict[PowerKind, list[float]] = {
-        kind: np.mean(at.signals(kind, r) ** 2, axis=0).tolist() for kind in POWER_KINDS
-    }
-    return len(r) * weighted_sum(planner.cost, powers)
