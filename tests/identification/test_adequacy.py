@@ -99,7 +99,7 @@ def test_noise_is_known_no_better_than_its_zero(w):
 )
 def test_what_is_missing_is_found(model, fault, name):
     u, y = data("bj", 700, np.random.default_rng(3))
-    found = identify(model, u[0], y[0])
+    found = identify(model, u[0], y[0], rest=True)
     assert {test.fault for test in found.tests.failed} >= {fault}
     assert by_name(found)[name].probability < 1e-6
 
@@ -121,10 +121,10 @@ def test_of_several_channels_it_names_those_that_fail():
     )
     y = np.concatenate([np.zeros((1, 2)), u[:-1] @ np.array([[1.0, 0.5], [0.7, 1.0]])]) + e
     y[3:, 1] += 0.4 * u[:-3, 0]
-    test = by_name(identify(model, u, y))["recent_inputs"]
+    test = by_name(identify(model, u, y, rest=True))["recent_inputs"]
     assert (test.output, test.source, test.lag) == (1, 0, 3)
     y[1:, 0] += 0.6 * e[:-1, 1]
-    test = by_name(identify(model, u, y))["recent_residuals"]
+    test = by_name(identify(model, u, y, rest=True))["recent_residuals"]
     assert (test.output, test.source, test.lag) == (0, 1, 1)
 
 
