@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
-from inputdesign_cli.findings.places import SHOWN, Samples, file_of, of_file, places, rows_of, without_option
+from inputdesign_cli.findings.places import SHOWN, Record, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.faults import Frozen, frozen, shifted, spikes
@@ -33,7 +33,7 @@ FROZEN = refuted(
 )
 
 
-def faults(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
+def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
     """Return a finding for each output and kind of fault, with its rows."""
     found = []
     for one in spikes(estimate.errors):
@@ -60,7 +60,7 @@ def faults(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
     return found
 
 
-def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[float]) -> list[Finding]:
+def biasing(units: Units, estimate: Estimate, data: Record, fitted: Sequence[float]) -> list[Finding]:
     """Return the faults that give the model of an output other dynamics than the plant has.
 
     Args:
@@ -80,7 +80,7 @@ def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[fl
 
 
 @finding(REFUTED, "columns-misaligned", "Shift the column, or correct the controller of the spec.")
-def loop_faults(kind: FindingKind, controller: TransferMatrix | None, data: Samples) -> list[Finding]:
+def loop_faults(kind: FindingKind, controller: TransferMatrix | None, data: Record) -> list[Finding]:
     """A column was logged at another time. With it shifted, the data follow u = r - C y much better."""
     if controller is None or data.r is None:
         return []
@@ -101,7 +101,7 @@ def _named(units: Units, output: int) -> str:
     return f"y{output + 1}" if units.outputs > 1 else "y"
 
 
-def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
+def _still(estimate: Estimate, data: Record) -> dict[int, list[Frozen]]:
     """Return the stretches in which outputs stand still while an input moves, by output."""
     if data.recorded is None:
         return {}
@@ -115,7 +115,7 @@ def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
 
 
 @finding(REFUTED, "level-shift", "Leave it out with `--without`, or record what changed as a further input.")
-def shifted_levels(kind: FindingKind, estimate: Estimate, data: Samples, time_unit: str) -> list[Finding]:
+def shifted_levels(kind: FindingKind, estimate: Estimate, data: Record, time_unit: str) -> list[Finding]:
     """An output shifts without an input. A load or the gain may have changed."""
     if not estimate.tests.shifted or data.recorded is None:
         return []
@@ -128,7 +128,7 @@ def shifted_levels(kind: FindingKind, estimate: Estimate, data: Samples, time_un
 
 
 def left_out(
-    log: Samples, shifts: Sequence[LevelShift], samples: NDArray[np.int64], time_unit: str, *, short: int
+    log: Record, shifts: Sequence[LevelShift], samples: NDArray[np.int64], time_unit: str, *, short: int
 ) -> str:
     """Return the step of preparation that leaves shifts out of a log.
 
@@ -148,7 +148,7 @@ def left_out(
 
 def _described(
     shifts: Sequence[LevelShift],
-    record: Samples,
+    record: Record,
     rows: NDArray[np.int64],
     samples: NDArray[np.int64],
     time_unit: str,

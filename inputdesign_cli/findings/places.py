@@ -1,18 +1,21 @@
-"""Where samples of a record stand: their files and rows, and the option that leaves them out."""
+"""Records of experiments: where their samples stand in files, and the option that leaves some out."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.finding import Finding
 from inputdesign_cli.outcome.units import Units
 
 SHOWN = 5
+SHORTEST = 10
+"""Samples of the shortest segment."""
 # Rows that an option lists.
 _LISTED = 12
 
@@ -39,8 +42,8 @@ class Recorded:
 
 
 @dataclass(frozen=True)
-class Samples:
-    """Holds recorded experiments, their segments one after the other.
+class Record:
+    """Holds recorded experiments with what was done to them, their segments one after the other.
 
     Attributes:
         u, y: (N, r), (N, p), inputs and outputs, without gaps.
@@ -49,6 +52,15 @@ class Samples:
         lengths: the samples of each segment.
         files: the name of each file and its samples.
         recorded: the signals as the files have them; None: not known.
+        names: of the columns, by channel.
+        step, time_unit: the sample time.
+        findings: what was done to the record and what was seen in it.
+        header: the names of the columns of the first file, in small letters.
+        means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
+        repeated: files that have samples in common.
+        lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
+            the inputs cause a part of it.
+        remarks: what a question did to the record later.
     """
 
     u: Array
@@ -58,6 +70,49 @@ class Samples:
     lengths: tuple[int, ...]
     files: tuple[tuple[str, int], ...]
     recorded: Recorded | None = None
+    names: dict[str, str] = field(default_factory=dict)
+    step: float = 1.0
+    time_unit: str = "s"
+    findings: tuple[Finding, ...] = ()
+    header: tuple[str, ...] = ()
+    means: Array | None = None
+    repeated: tuple[Finding, ...] = ()
+    lined: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return the messages of the findings, and the remarks."""
+        return (*(one.message for one in self.findings), *self.remarks)
+
+    @property
+    def parts(self) -> list[tuple[Array, Array]]:
+        """Return inputs and outputs of each segment."""
+        at = np.cumsum(self.lengths)[:-1]
+        return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
+
+    def at(self, samples: NDArray[np.int64], lengths: tuple[int, ...]) -> Record:
+        """Return the record at some of the samples, in segments of these lengths."""
+        ends = np.cumsum([count for _, count in self.files])
+        counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends)).tolist()
+        return replace(
+            self,
+            u=self.u[samples],
+            r=None if self.r is None else self.r[samples],
+            y=self.y[samples],
+            time=self.time[samples],
+            lengths=lengths,
+            files=tuple((name, count) for (name, _), count in zip(self.files, counts, strict=True)),
+            recorded=None if self.recorded is None else self.recorded.at(samples),
+        )
+
+    def without(self, samples: NDArray[np.int64]) -> Record:
+        """Return the record without some samples, and without segments that become too short."""
+        left = np.setdiff1d(np.arange(len(self.y)), samples)
+        apart = (np.diff(left) > 1) | np.isin(left[1:], np.cumsum(self.lengths))
+        runs = np.split(left, np.flatnonzero(apart) + 1)
+        kept = [run for run in runs if len(run) >= SHORTEST] or [max(runs, key=len)]
+        return self.at(np.concatenate(kept), tuple(map(len, kept)))
 
 
 def file_of(files: Sequence[tuple[str, int]], at: int) -> str:
@@ -66,13 +121,13 @@ def file_of(files: Sequence[tuple[str, int]], at: int) -> str:
     return files[int(np.searchsorted(ends, at, side="right"))][0] if len(files) > 1 else ""
 
 
-def of_file(record: Samples, at: int) -> str:
+def of_file(record: Record, at: int) -> str:
     """Return ` of NAME` for a sample where there are several files."""
     name = file_of(record.files, at)
     return f" of {name}" if name else ""
 
 
-def rows_of(record: Samples, runs: Sequence[tuple[int, int]]) -> list[tuple[str, int, int]]:
+def rows_of(record: Record, runs: Sequence[tuple[int, int]]) -> list[tuple[str, int, int]]:
     """Return the file, the first and the last row of runs of samples; nothing where rows are not known."""
     if record.recorded is None:
         return []
@@ -89,7 +144,7 @@ def without_option(runs: Sequence[tuple[str, int, int]]) -> str:
     return f"--without {shlex.quote(','.join(listed))}" if 0 < len(listed) <= _LISTED else "--without"
 
 
-def places(units: Units, record: Samples, samples: Sequence[int]) -> str:
+def places(units: Units, record: Record, samples: Sequence[int]) -> str:
     """Return when samples were taken, and in which file: the first few of many."""
     shown = [f"{record.time[at]:.10g} {units.time_unit}{of_file(record, at)}" for at in samples[:SHOWN]]
     return ", ".join(shown) + ", .." * (len(samples) > SHOWN)

@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.adequacy import ScoreTest
+from inputdesign_cli.identification.adequacy import ScoreTest, score
 from inputdesign_cli.identification.records import Point, Records
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
@@ -97,7 +97,8 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     for (begin, length), output in product(stretches, range(outputs)):
         inner = slice(_FEWEST, length - _FEWEST)
         of_sample, _ = _scores(white, begin, output, through[output, :length, -1])
-        line = _of_line(records, point.theta, white, begin, length, output)
+        straight = _column(records, point.theta, white, begin, np.linspace(-1.0, 1.0, length), output)
+        line = score(white, straight, np.zeros(1)).statistic
         for lag, response in zip(lags, through[output, :length, :-1].T, strict=True):
             scores, rises = _scores(white, begin, output, response)
             at = _FEWEST + int(np.argmax(scores[inner]))
@@ -106,17 +107,17 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
             found.append((float(scores[at]), output, begin + at, lag, bool(rises[at] > 0.0), bool(alone)))
     if not found:
         return None
-    score, output, sample, lag, rising, alone = max(found)
+    largest, output, sample, lag, rising, alone = max(found)
     # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
     power = float(white.residuals @ white.residuals) / outputs
-    share = min(score * white.variance / power, _MOST_EXPLAINED)
+    share = min(largest * white.variance / power, _MOST_EXPLAINED)
     statistic = -float(np.log1p(-share)) * point.freedom / outputs
     looks = sum(length for _, length in stretches) * outputs * len(lags)
     test = ScoreTest("level_shift", "shift", statistic, 1, _by_chance([statistic], looks), None, output)
     begin, length = next(one for one in stretches if sample < sum(one))
     begins = max(sample - 1 - round(_UNSURE * lag), begin)
     ends = min(sample + 2 + round(_SETTLED * lag), begin + length)
-    return LevelShift(output, sample, lag, begins, ends, rising, test, score, looks, alone)
+    return LevelShift(output, sample, lag, begins, ends, rising, test, largest, looks, alone)
 
 
 def _stretches(records: Records) -> list[tuple[int, int]]:
@@ -164,19 +165,9 @@ def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Arr
     explained = common(white.basis[rows])
     left = power - np.sum(explained**2, axis=1)
     # Where a search ends at a kink, residuals are not at right angles to all gradients.
-    score = common(white.residuals[rows, None])[:, 0] - explained @ (white.basis.T @ white.residuals)
+    along = common(white.residuals[rows, None])[:, 0] - explained @ (white.basis.T @ white.residuals)
     seen = left > _EXPLAINED * power
-    return np.where(seen, score**2 / np.where(seen, left, 1.0), 0.0) / white.variance, score
-
-
-def _of_line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
-    """Return the test statistic of a straight line through one record of an output."""
-    column = _column(records, theta, white, begin, np.linspace(-1.0, 1.0, length), output)
-    left = white.unexplained(column)[:, 0]
-    power = float(left @ left)
-    if power <= _EXPLAINED * float(column[:, 0] @ column[:, 0]):
-        return 0.0
-    return float(left @ white.residuals) ** 2 / (power * white.variance)
+    return np.where(seen, along**2 / np.where(seen, left, 1.0), 0.0) / white.variance, along
 
 
 def _column(records: Records, theta: Array, white: White, begin: int, signal: Array, output: int) -> Array:

@@ -78,25 +78,20 @@ def time_columns(sheet: Sheet) -> list[str]:
     If no name is one of times, columns that are called as clocks are and rise, or hold dates or times of day.
     At last columns whose dates cannot be read: to do without them would be to guess.
     """
-    header = sheet.header
-    every = [
-        (header[i] if i < len(header) and header[i] else str(i + 1), column, column.mostly(rises=True))
-        for i, column in enumerate(sheet.columns)
-    ]
-    for found in (
-        [(n, c) for n, c, up in every if _TIME.fullmatch(n) or (up and _SHORT.fullmatch(n))],
-        [
-            (n, c)
-            for n, c, up in every
-            if (c.mostly(rises=False) if c.dated else up and _CLOCK.fullmatch(n) is not None)
-        ],
-        [(n, c) for n, c, _ in every if c.undated],
-    ):
-        if found:
-            # Dates and times of day that were joined are the same column.
-            once = [n for i, (n, c) in enumerate(found) if c is not found[i - 1][1] or i == 0]
-            return [name for name in once if name.startswith("dat")] or once
-    return []
+    header, surely, likely, unread = sheet.header, [], [], []
+    for i, column in enumerate(sheet.columns):
+        name = (header[i] if i < len(header) else "") or str(i + 1)
+        rises = column.mostly(rises=True)
+        if _TIME.fullmatch(name) or (rises and _SHORT.fullmatch(name)):
+            surely.append((name, column))
+        if column.mostly(rises=False) if column.dated else rises and _CLOCK.fullmatch(name):
+            likely.append((name, column))
+        if column.undated:
+            unread.append((name, column))
+    found = surely or likely or unread
+    # Dates and times of day that were joined are the same column.
+    once = [name for i, (name, column) in enumerate(found) if i == 0 or column is not found[i - 1][1]]
+    return [name for name in once if name.startswith("dat")] or once
 
 
 def is_called_time(name: str) -> bool:

@@ -1,20 +1,18 @@
-"""Records of experiments: signals by channel in segments with even steps, and what was done to them."""
+"""Read files as records: signals by channel in segments with even steps, and what was done to them."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
-from inputdesign_cli.findings.places import Recorded, Samples
+from inputdesign_cli.findings.places import Record as Record, Recorded
 from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_against_spec
 from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
@@ -22,74 +20,13 @@ from inputdesign_cli.records.columns import called, rising, roles_of, without_ti
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
 from inputdesign_cli.records.sheet import Preparation
-from inputdesign_cli.records.signals import SHORTEST, Signals, joined_rows, signals_of, typical_step
+from inputdesign_cli.records.signals import Signals, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
 # The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
 _ALIKE, _LONGER = 0.1, 0.5
 # Sample times of several files, or of a file in two places, differ by less than this share by rounding alone.
 _ROUND = 1e-3
-
-
-@dataclass(frozen=True)
-class Record(Samples):
-    """Holds recorded experiments with what was done to them.
-
-    Attributes:
-        names: of the columns, by channel.
-        step, time_unit: the sample time.
-        findings: what was done to the record and what was seen in it.
-        header: the names of the columns of the first file, in small letters.
-        means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
-        repeated: files that have samples in common.
-        remarks: what a question did to the record later.
-        lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
-            the inputs cause a part of it.
-    """
-
-    names: dict[str, str] = field(default_factory=dict)
-    step: float = 1.0
-    time_unit: str = "s"
-    findings: tuple[Finding, ...] = ()
-    header: tuple[str, ...] = ()
-    means: Array | None = None
-    repeated: tuple[Finding, ...] = ()
-    lined: bool = False
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Return the messages of the findings, and the remarks."""
-        return (*(one.message for one in self.findings), *self.remarks)
-
-    @property
-    def parts(self) -> list[tuple[Array, Array]]:
-        """Return inputs and outputs of each segment."""
-        at = np.cumsum(self.lengths)[:-1]
-        return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
-
-    def at(self, samples: NDArray[np.int64], lengths: tuple[int, ...]) -> Record:
-        """Return the record at some of the samples, in segments of these lengths."""
-        ends = np.cumsum([count for _, count in self.files])
-        counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends)).tolist()
-        return replace(
-            self,
-            u=self.u[samples],
-            r=None if self.r is None else self.r[samples],
-            y=self.y[samples],
-            time=self.time[samples],
-            lengths=lengths,
-            files=tuple((name, count) for (name, _), count in zip(self.files, counts, strict=True)),
-            recorded=None if self.recorded is None else self.recorded.at(samples),
-        )
-
-    def without(self, samples: NDArray[np.int64]) -> Record:
-        """Return the record without some samples, and without segments that become too short."""
-        left = np.setdiff1d(np.arange(len(self.y)), samples)
-        apart = (np.diff(left) > 1) | np.isin(left[1:], np.cumsum(self.lengths))
-        runs = np.split(left, np.flatnonzero(apart) + 1)
-        kept = [run for run in runs if len(run) >= SHORTEST] or [max(runs, key=len)]
-        return self.at(np.concatenate(kept), tuple(map(len, kept)))
 
 
 def read_log(path: Path, preparation: Preparation) -> Record:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding, listed
 from inputdesign_cli.findings.outlying_values import without_spikes
+from inputdesign_cli.findings.places import SHORTEST
 from inputdesign_cli.findings.prepared_records import (
     INPUTS_MOVE_BETWEEN,
     JITTER_EVENED,
@@ -21,7 +22,7 @@ from inputdesign_cli.findings.prepared_records import (
 )
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.records.sheet import Detrend, Preparation
-from inputdesign_cli.records.signals import SHORTEST, Signals
+from inputdesign_cli.records.signals import Signals
 
 # Times may be off by this share of the sample time unsaid, and by the second with a finding.
 EVEN = 1e-3

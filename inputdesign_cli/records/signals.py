@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.outlying_values import beyond_precision
+from inputdesign_cli.findings.places import SHORTEST
 from inputdesign_cli.findings.prepared_records import COLUMNS_JOINED, SHEETS_UNREAD, TIMES_READ
 from inputdesign_cli.records.cells import SAY_TIME, is_date_in_digits
 from inputdesign_cli.records.columns import TIME_UNITS, called, column_named, columns_of, rising, time_unit_in
@@ -23,7 +23,6 @@ _ROUND = 1e-4
 _SINCE_1970 = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 # Counts of these years: a count in one unit is out of range in any other, and as seconds lies millennia away.
 _FIRST, _LAST = (datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (2000, 2100))
-SHORTEST = 10
 # Rows count unchanged where this share of the whole ones stands in long stretches, or, of short records,
 # where this share is whole.
 _KEPT, _FEW, _SHORT = 0.25, 0.5, 2 * SHORTEST
@@ -156,7 +155,7 @@ def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -
         hint = f"--skip {preparation.skip} leaves them all out"
         if preparation.skip < len(time):
             hint = f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}: mind --range"
-        raise _nothing_left(sheet, message, hint)
+        raise sheet.error("data-unreadable", message, hint)
     return np.flatnonzero(kept)
 
 
@@ -168,13 +167,9 @@ def _left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
         if not np.any(inside):
             message = f"{sheet.path.name} has no row from {first} to {last}, which --without is to leave out"
             hint = f"its rows of numbers are lines {sheet.lines[0]} to {sheet.lines[-1]}, the header counted"
-            raise _nothing_left(sheet, message, hint)
+            raise sheet.error("data-unreadable", message, hint)
         found |= inside
     return found
-
-
-def _nothing_left(sheet: Sheet, message: str, hint: str) -> DataError:
-    return DataError.because("data-unreadable", message, hint, "", Location(str(sheet.path), 1, 1))
 
 
 def _check_rising(sheet: Sheet, time: Array) -> None:

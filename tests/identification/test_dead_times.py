@@ -1,5 +1,7 @@
 """Estimates of dead times: minima on kinks and beyond instants, their covariance and the Cramer-Rao bound."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -83,6 +85,7 @@ def estimated(truth, u, y, *, noise=0, rest=None):
     return identify(model, u[:, None], y[:, None], start=truth, rest=rest, near=True)
 
 
+@cache
 def moved(seed):
     """Seven moves of the input of a lag, and white noise: the record, and its log likelihood on a grid.
 

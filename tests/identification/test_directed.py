@@ -119,7 +119,8 @@ def test_it_names_what_is_missing(B, F, first):
     rng = np.random.default_rng(5)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 4)
     y = scipy.signal.lfilter(B, F, u) + scipy.signal.lfilter([1], [1, -0.7], 0.05 * rng.standard_normal(800))
-    found = identify(one_channel([0, 0, 0, 0.2], F=[1, -0.8], D=[1, -0.7]), u[:, None], y[:, None])
+    model = one_channel([0, 0, 0, 0.2], F=[1, -0.8], D=[1, -0.7])
+    found = identify(model, u[:, None], y[:, None], rest=True)
     strongest = min(found.tests.directed, key=lambda one: one.test.probability)
     assert strongest.test in found.tests.failed
     assert first in [one.phrase.removeprefix("one more ") for one in strongest.alternatives]

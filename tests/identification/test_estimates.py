@@ -39,20 +39,6 @@ def test_prediction_errors_at_the_truth_are_the_noise(name):
     np.testing.assert_allclose(errors, e, atol=1e-10)
 
 
-def test_arx_is_least_squares():
-    u, y = data("arx", 300, np.random.default_rng(1))
-    found = identify(SYSTEMS["arx"], u[0], y[0])
-    u, y = u[0, :, 0], y[0, :, 0]
-    shifted = [np.concatenate([np.zeros(lag), x[:-lag]]) for x in (-y, u) for lag in (1, 2)]
-    phi = np.stack(shifted, axis=1)
-    expected = np.linalg.lstsq(phi, y, rcond=None)[0]
-    np.testing.assert_allclose(found.theta, expected, atol=1e-9)
-    residual = y - phi @ expected
-    variance = residual @ residual / (300 - 4)
-    assert found.noise[0, 0] == pytest.approx(variance, rel=1e-9)
-    np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(phi.T @ phi), rtol=1e-7)
-
-
 @pytest.mark.parametrize("name", ["armax", "oe", "bj"])
 def test_a_batch_finds_what_a_plain_optimiser_finds(name):
     model = SYSTEMS[name]
@@ -68,18 +54,6 @@ def test_a_batch_finds_what_a_plain_optimiser_finds(name):
             gtol=1e-12,
         )
         np.testing.assert_allclose(found.theta[run], plain.x, atol=1e-6)
-
-
-@pytest.mark.slow
-def test_residuals_of_a_right_model_pass_as_often_as_they_should():
-    u, y = data("oe", 400, np.random.default_rng(8), runs=60)
-    p = [identify(SYSTEMS["oe"], u[i], y[i]) for i in range(60)]
-    for probabilities in (
-        [e.tests.whiteness.probability for e in p],
-        [e.tests.independence.probability for e in p],
-    ):
-        assert 0.3 < np.mean(probabilities) < 0.7
-        assert np.mean(np.array(probabilities) < 0.05) < 0.2
 
 
 @pytest.mark.slow

@@ -59,16 +59,15 @@ def test_at_most_one_of_a_thousand_records_is_called_frozen(steps):
     assert sum(bool(seen(*record(seed, steps[seed % len(steps)]))) for seed in range(1000)) <= 1
 
 
-@pytest.mark.parametrize(("step", "stuck", "seeds"), [(None, 12, 2), (0.5, 40, 2), (0.7, 60, 3)])
-def test_a_frozen_stretch_is_found_where_it_is(step, stuck, seeds):
-    for seed in range(seeds):
-        u, y, model = record(seed, step, stuck)
-        start = SAMPLES // 3
-        if not np.any(np.diff(u[start : start + stuck - 1], axis=0)):
-            continue
+@pytest.mark.first(3)
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("step", "stuck"), [(None, 12), (0.5, 40), (0.7, 60)])
+def test_a_frozen_stretch_is_found_where_it_is(step, stuck, seed):
+    u, y, model = record(seed, step, stuck)
+    start = SAMPLES // 3
+    if np.any(np.diff(u[start : start + stuck - 1], axis=0)):
         (found,) = seen(u, y, model)
-        assert found.output == 0
-        assert found.first <= start
+        assert (found.output, found.first <= start) == (0, True)
         assert found.first + found.length >= start + stuck
 
 

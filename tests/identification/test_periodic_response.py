@@ -49,7 +49,7 @@ def test_the_deviations_are_those_of_many_records():
     rng, periods = np.random.default_rng(1), Periods(16, blocks=2, skip=0)
     G = rng.standard_normal((4, 1, 2)) + 1j * rng.standard_normal((4, 1, 2))
     u, y, k = blocks(G, rng, periods, 5)
-    records = [periodic_response(u, y + 0.3 * rng.standard_normal(y.shape), periods, k) for _ in range(2000)]
+    records = [periodic_response(u, y + 0.3 * rng.standard_normal(y.shape), periods, k) for _ in range(1000)]
     scatter = np.std([one.G for one in records], axis=0)
     said = np.sqrt(np.mean([one.deviation**2 for one in records], axis=0))
     assert said == pytest.approx(scatter, rel=0.06)

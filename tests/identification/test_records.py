@@ -18,6 +18,11 @@ from tests.support.records import shifted
 CUT = 60
 
 
+def regressors(u, y):
+    """The regressors (samples, 4) of an ARX model with two coefficients in A and in B."""
+    return np.stack([shifted(x, lag) for x in (-y, u) for lag in (1, 2)], axis=1)
+
+
 def model_and_data(name, samples, rng, noise):
     """A model, and samples of it."""
     if name == "in s":
@@ -104,18 +109,19 @@ def test_records_at_rest_are_taken_for_such():
     np.testing.assert_allclose(told.theta, identify(SYSTEMS["bj"], u[0], y[0]).theta, atol=1e-9)
 
 
-def test_arx_from_rest_over_two_records_is_stacked_least_squares():
-    u, y = (x[..., 0] for x in data("arx", 200, np.random.default_rng(8), runs=2))
-    phi = np.concatenate(
-        [
-            np.stack([np.concatenate([np.zeros(lag), x[:-lag]]) for x in (-b, a) for lag in (1, 2)], axis=1)
-            for a, b in zip(u, y, strict=True)
-        ]
-    )
+@pytest.mark.parametrize("runs", [1, 2])
+def test_arx_from_rest_is_stacked_least_squares(runs):
+    u, y = (x[..., 0] for x in data("arx", 200, np.random.default_rng(8), runs=runs))
+    phi = np.concatenate([regressors(*record) for record in zip(u, y, strict=True)])
     expected = np.linalg.lstsq(phi, y.ravel(), rcond=None)[0]
-    found = identify(SYSTEMS["arx"], u.reshape(-1, 1), y.reshape(-1, 1), lengths=(200, 200), rest=True)
+    left = y.ravel() - phi @ expected
+    signals = (x.reshape(-1, 1) for x in (u, y))
+    found = identify(SYSTEMS["arx"], *signals, lengths=(200,) * runs, rest=True)
     np.testing.assert_allclose(found.theta, expected, atol=1e-9)
-    np.testing.assert_allclose(found.errors[:, 0], y.ravel() - phi @ expected, atol=1e-8)
+    np.testing.assert_allclose(found.errors[:, 0], left, atol=1e-8)
+    variance = left @ left / (left.size - 4)
+    assert found.noise[0, 0] == pytest.approx(variance, rel=1e-9)
+    np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(phi.T @ phi), rtol=1e-7)
 
 
 def test_the_simulation_begins_where_the_record_does():
@@ -158,7 +164,7 @@ def test_of_arx_it_is_the_test_of_wald():
     found = jointly(*records)
     estimates, variances = [], []
     for u, y in records:
-        matrix = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
+        matrix = regressors(u, y)
         left = y - matrix @ found.theta
         estimates.append(np.linalg.lstsq(matrix, y, rcond=None)[0])
         variances.append(np.mean(left**2) * np.linalg.inv(matrix.T @ matrix))
@@ -200,6 +206,6 @@ def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
         found = identify(
             SYSTEMS["arx"], u[:, None], y[:, None], experiments=[samples, 200 - samples], rest=True
         )
-    matrix = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
-    np.testing.assert_allclose(found.theta, np.linalg.lstsq(matrix, y, rcond=None)[0], rtol=1e-6)
+    expected = np.linalg.lstsq(regressors(u, y), y, rcond=None)[0]
+    np.testing.assert_allclose(found.theta, expected, rtol=1e-6)
     assert np.all(np.array(found.tests.alike) > 0.01)
