@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn, TextIO
 import typer
 
 from inputdesign_cli.compute.interruptions import bare_interruptions, interrupt
-from inputdesign_cli.compute.watching import Counted, Round, watching
+from inputdesign_cli.compute.time_limit import Counted, Round, watching
 from inputdesign_cli.errors import EXIT_BAD_INPUT, EXIT_INTERRUPTED, Diagnostic, IdesignError, OutputError
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.figures import style
 from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, ORANGE, PALETTE, log_axes
 from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable, Trade
-from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
+from inputdesign_cli.outcome.design import OBJECTIVES, objective
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.run_directory import output_errors, write_bytes
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome import read_plain
-from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.design import objective
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.text_formats import csv_rows
 from inputdesign_cli.regular_file import read_regular

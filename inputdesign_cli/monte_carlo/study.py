@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import Absolute, Entry, ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, Earlier, Estimate, Rival, fit_batch, identify
 from inputdesign_cli.information import Experiment, PowerKind

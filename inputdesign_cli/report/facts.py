@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inputdesign_cli.outcome import Outcome, Simulation
-from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss
-from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss, objective
 from inputdesign_cli.outcome.sentences import sentences, shown, spoken
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 
