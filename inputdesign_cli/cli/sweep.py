@@ -165,9 +165,8 @@ def show_trade(
     if not quiet:
         heads = [f"{length:g} {found.unit}" for length in found.lengths]
         rows = [["criterion" if found.criterion else "error / asked", *heads]]
-        for text, values in zip(found.amplitudes, found.values, strict=True):
-            cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
-            rows.append([f"amplitude {text}" if text else "best record", *cells])
+        for name, values in found.rows.items():
+            rows.append([name, *(f"{value:.3g}" if math.isfinite(value) else "none" for value in values)])
         typer.echo("\n" + "\n".join(aligned(rows, right=range(len(heads) + 1))))
         if not found.criterion:
             typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
+EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
+_PATIENCE = 2.0  # seconds until a computation says how far it is
+_ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
 class _Errors(io.TextIOWrapper):
@@ -124,11 +127,6 @@ def ending_early(stop: Callable[[], None]) -> Iterator[list[int]]:
         yield came
     finally:
         restore()
-
-
-EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
-_PATIENCE = 2.0  # seconds until a computation says how far it is
-_ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:

@@ -20,6 +20,9 @@ from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.plant import Model
 
+# Records of outputs that are simulated and identified in one pass.
+_OUTPUTS_AT_ONCE = 100
+
 
 @dataclass(frozen=True)
 class PredictedError:
@@ -117,10 +120,6 @@ class Trials:
             own = np.all(predicted.entries == (i, j), axis=1)
             r_u[own] = at(predicted.w[own], (i, j))
         return r_u
-
-
-# Records of outputs that are simulated and identified in one pass.
-_OUTPUTS_AT_ONCE = 100
 
 
 @dataclass(frozen=True)

@@ -249,11 +249,11 @@ def test_fits_that_are_drawn_elsewhere_are_told(page):
 
 def test_every_amplitude_of_a_trade_is_drawn():
     page = Figure()
-    texts = tuple(map(str, range(9)))
-    draw_trade(Trade(SIZES, "s", texts, np.arange(18.0).reshape(9, 2) + 1.0, False), page)
+    names = {f"amplitude {number}" for number in range(9)}
+    draw_trade(Trade(SIZES, "s", {name: SIZES + n for n, name in enumerate(names)}, False), page)
     (axes,) = page.axes
     drawn = lines_by_label(axes)
-    assert {f"amplitude {text}" for text in texts} <= set(drawn)
+    assert names <= set(drawn)
     assert apart(list(drawn.values()))
 
 
