@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import inputdesign_cli
-from inputdesign_cli.error_codes import explanation, explanations
+from inputdesign_cli.diagnostics import explanation, explanations
 from inputdesign_cli.errors import SpecError
 from tests.support.wording import long_sentences, unclear_words
 

@@ -80,7 +80,7 @@ def explain(code: str | None = None, *, every: bool = False) -> None:
 
     Says what it means and what to do about it.
     """
-    from inputdesign_cli.error_codes import explanation
+    from inputdesign_cli.diagnostics import explanation
     from inputdesign_cli.findings import explanations
 
     if every and code is None:

@@ -15,7 +15,7 @@ import inputdesign_cli
 from inputdesign_cli import questions
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.reference import Kind
-from inputdesign_cli.error_codes import explanation
+from inputdesign_cli.diagnostics import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.findings import explanations
 from tests.support.command_line import RESULT, diagnostic

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from inputdesign_cli.figures.estimates import draw_campaign
 from inputdesign_cli.figures.plots import draw, draw_all, figure, painter
 from inputdesign_cli.figures.readings import readings
-from inputdesign_cli.figures.studies import draw_campaign
 from inputdesign_cli.figures.style import TYPE_SIZE, painted, rendered
 from inputdesign_cli.figures.sweep import draw_trade
 from inputdesign_cli.figures.sweep_table import Trade
