@@ -164,11 +164,7 @@ def check(
 
 
 def _found(path: Path) -> Path:
-    """Return the file of this name, or else the golden file of the package, with or without its ending.
-
-    Raises:
-        DataError: `golden-missing`, there is neither.
-    """
+    """Return the file of this name, or the golden file of the package, or raise `golden-missing`."""
     if path.exists():
         return path
     own = {one.stem: one for one in sorted((shipped() / "golden").glob("*.yaml"))}

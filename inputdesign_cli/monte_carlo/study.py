@@ -157,10 +157,7 @@ def _run(
 
     The noise is drawn first, so that every excitation meets the same. Runs where the search does not
     settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
-    with an error of its own in each run.
-
-    Args:
-        model: the model whose structure is estimated; the search begins at its parameters.
+    with an error of its own in each run. The search begins at the parameters of `model`.
     """
     system = true.model
     e = _noise(true, runs, rng)
@@ -216,12 +213,7 @@ def _again_where_lost(
 
 
 def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
-    """Combine estimates (runs, k) with earlier estimates.
-
-    Args:
-        prior: the information (k, k) of the earlier estimates, which may be singular.
-        centre: the parameters (k,) about which they scatter.
-    """
+    """Combine estimates (runs, k) with earlier ones about `centre`, whose information may be singular."""
     values, vectors = np.linalg.eigh(prior)
     root: NDArray[np.float64] = vectors * np.sqrt(np.maximum(values, 0.0))
     earlier = prior @ centre + rng.standard_normal(found.theta.shape) @ root.T
