@@ -35,6 +35,10 @@ FUNCTIONS: dict[str, _Function] = {
     "cosh": (math.cosh, math.sinh),
     "tanh": (math.tanh, lambda x: 1.0 - math.tanh(x) ** 2),
 }
+LONGEST = 500
+_REMEMBERED = 64  # sets of expressions, as a search asks for one at many points
+_SHOWN = 60  # letters of a composed expression that is longer
+CONSTANTS = {"pi": math.pi}
 
 
 class Step(NamedTuple):
@@ -123,12 +127,6 @@ def _combined(sign: str, first: _Result, second: _Result) -> tuple[float, float,
     power = math.pow(a, b)
     in_base = b * math.pow(a, b - 1.0) if first.slope is not None and b else 0.0
     return power, in_base, power * math.log(a) if second.slope is not None else 0.0
-
-
-LONGEST = 500
-_REMEMBERED = 64  # sets of expressions, as a search asks for one at many points
-_SHOWN = 60  # letters of a composed expression that is longer
-CONSTANTS = {"pi": math.pi}
 
 
 class ExpressionError(ValueError):

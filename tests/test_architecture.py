@@ -11,17 +11,7 @@ ROOT = Path(inputdesign_cli.__file__).parent
 
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
 ORDER = [
-    {
-        "arrays",
-        "errors",
-        "finding",
-        "error_codes",
-        "expressions",
-        "version",
-        "regular_file",
-        "compute",
-        "plugins",
-    },
+    {"arrays", "errors", "finding", "expressions", "version", "regular_file", "compute", "plugins"},
     {"diagnostics", "levels"},
     {"specification", "plant"},
     {"spectrum", "information", "accuracy"},

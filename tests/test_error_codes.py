@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from inputdesign_cli.error_codes import explanation, explanations
+from inputdesign_cli.diagnostics import explanation, explanations
 from inputdesign_cli.errors import SpecError
 from tests.support.wording import long_sentences, unclear_words
 from tests.test_architecture import FILES, ROOT, nodes, offenders, room_of

@@ -23,7 +23,7 @@ OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loa
 # Where a file is opened otherwise than by `read_regular`, how often, and why nothing waits there.
 OPENED = {
     "regular_file.py": (2, "the function itself"),
-    "error_codes.py": (1, "a file of the package"),
+    "diagnostics.py": (1, "a file of the package"),
     "cli/options.py": (1, "a file of the package"),
     "cli/reference.py": (2, "files of the package"),
     "cli/terminal.py": (3, "the null device and the standard streams"),

@@ -10,12 +10,10 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.campaign import campaign, proceed, status
-from inputdesign_cli.cli.check import check
-from inputdesign_cli.cli.data import assess, explore, identify
+from inputdesign_cli.cli.data import assess, campaign, explore, identify, proceed, status
 from inputdesign_cli.cli.designs import analyse, simulate, solve, validate
 from inputdesign_cli.cli.options import declared
-from inputdesign_cli.cli.reference import examples, explain, init, schema
+from inputdesign_cli.cli.reference import check, examples, explain, init, schema
 from inputdesign_cli.cli.signal import signal
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded, prepare_signals, prepare_streams

@@ -141,11 +141,7 @@ def levels(text: str) -> dict[str, float]:
 
 
 def _named(text: str, option: str, example: str) -> dict[str, str]:
-    """Parse `u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
-
-    Raises:
-        typer.BadParameter: A part has no `=`, or names nothing.
-    """
+    """Parse `u1=a,y1=b` by channel, or raise `typer.BadParameter`; u, y and r are u1, y1 and r1."""
     found: dict[str, str] = {}
     for part in filter(None, map(str.strip, text.split(","))):
         name, equals, value = (piece.strip() for piece in part.partition("="))
@@ -162,11 +158,7 @@ def _named(text: str, option: str, example: str) -> dict[str, str]:
 
 
 def _runs(text: str, data: Sequence[Path]) -> Iterator[Run]:
-    """Parse rows as in 183-240,310; with several files, the name of one stands before each run.
-
-    Raises:
-        typer.BadParameter: A part is something else, or its file is not clear.
-    """
+    """Parse rows as in 183-240,310, or raise `typer.BadParameter`; one of several files is named first."""
     names = {str(path) for path in data} | {path.name for path in data}
     shared = {name for name, count in Counter(path.name for path in data).items() if count > 1}
     part = ""

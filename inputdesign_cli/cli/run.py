@@ -165,11 +165,7 @@ def keep(results: Results, place: Place, shown: Shown, *, page: bool = False) ->
 
 
 def _show(results: Results, files: Sequence[Path], shown: Shown, *, replaced: bool = False) -> None:
-    """Print the result as it was written, if it was, or its summary.
-
-    Args:
-        replaced: whether a run with other values stood there before.
-    """
+    """Print the result as it was written, if it was, or its summary; `replaced` is as in `summary`."""
     if shown.json_output and files:
         typer.echo(read_regular(files[-1]).decode(), nl=False)
     elif shown.json_output:

@@ -122,11 +122,7 @@ def signal(
 
 
 def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, float]:
-    """Return two numbers, the second larger.
-
-    Raises:
-        typer.BadParameter: The text is something else.
-    """
+    """Return two numbers, the second larger, or raise `typer.BadParameter`."""
     low, high = found = span(text, option, "LOW:HIGH")
     if not (max(map(abs, found)) <= _LARGEST and high - low >= _SMALLEST and low >= least):
         sizes = f"{max(least, -_LARGEST):g} to {_LARGEST:g}, {_SMALLEST:g} apart or more"

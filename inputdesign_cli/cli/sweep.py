@@ -86,12 +86,7 @@ def sweep(
 
 
 def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
-    """Print what a sweep has come to.
-
-    Raises:
-        typer.Exit: a point ended by a mistake in the program, or its worker was lost.
-        IdesignError: the first failure, where no point has a result.
-    """
+    """Print what a sweep has come to; end as its first failure does where no point has a result."""
     for why in () if quiet else done.damaged:
         typer.echo(f"note: {why}; the point was computed again", err=True)
     if json_output:
@@ -165,9 +160,8 @@ def show_trade(
     if not quiet:
         heads = [f"{length:g} {found.unit}" for length in found.lengths]
         rows = [["criterion" if found.criterion else "error / asked", *heads]]
-        for text, values in zip(found.amplitudes, found.values, strict=True):
-            cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
-            rows.append([f"amplitude {text}" if text else "best record", *cells])
+        for name, values in found.rows.items():
+            rows.append([name, *(f"{value:.3g}" if math.isfinite(value) else "none" for value in values)])
         typer.echo("\n" + "\n".join(aligned(rows, right=range(len(heads) + 1))))
         if not found.criterion:
             typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")

@@ -25,13 +25,16 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn, TextIO
 import typer
 
 from inputdesign_cli.compute.interruptions import bare_interruptions, interrupt
-from inputdesign_cli.compute.watching import Counted, Round, watching
+from inputdesign_cli.compute.time_limit import Counted, Round, watching
 from inputdesign_cli.errors import EXIT_BAD_INPUT, EXIT_INTERRUPTED, Diagnostic, IdesignError, OutputError
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
+EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
+_PATIENCE = 2.0  # seconds until a computation says how far it is
+_ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
 class _Errors(io.TextIOWrapper):
@@ -124,11 +127,6 @@ def ending_early(stop: Callable[[], None]) -> Iterator[list[int]]:
         yield came
     finally:
         restore()
-
-
-EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
-_PATIENCE = 2.0  # seconds until a computation says how far it is
-_ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore.division import busiest, cut, divided
 from inputdesign_cli.explore.drift import levelled, slopes_of

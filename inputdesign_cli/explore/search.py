@@ -20,7 +20,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import LEAST_DECAY, NOT_COMPUTED, Parts, fits, is_steady
 from inputdesign_cli.explore.structures import Orders, Process

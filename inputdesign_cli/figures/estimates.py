@@ -1,4 +1,4 @@
-"""Figures of parameters, structures and moments: where estimates are to be expected, and where they were."""
+"""Figures of parameters, structures and moments, and of many experiments or many parts of one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures import style
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, PALETTE
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.results import Array
 
@@ -18,6 +18,12 @@ _TICKS = 2  # intervals between numbers: these are wide for three columns
 _LEAST_SHOWN = -20.0  # per cent of fit
 _OPAQUE = 0.8
 _NUMBERED = 8  # rows up to which the entries are written into the cells
+_COLOURS = (BLUE, ORANGE, GREEN, GREY)
+# With few runs, fine bins would show each run separately.
+_FEWEST_BINS, _BINS, _RUNS_A_BIN = 6, 40, 4
+# Shares of the ratios and of the losses that are shown: few runs of the tail would squeeze the rest.
+_RATIOS, _LOSSES = 0.99, 0.998
+_WIDE = 5.0  # costs beyond it are shown over their logarithm
 
 
 def _panels(page: Figure, number: int, columns: int) -> list[Axes]:
@@ -154,4 +160,83 @@ def draw_error(page: Figure, curves: of.ErrorCurves, time_unit: str) -> None:
     style.log_axes(axes, "x")
     axes.set(xlim=(energy[0], energy[-1]), ylim=(0.0, 3.0 * curves.design[1]))
     axes.set(xlabel="energy, trace R", ylabel="mean-squared error")
+    style.legend_above(axes)
+
+
+def draw_campaign(page: Figure, curves: of.CampaignCurves, time_unit: str) -> None:
+    """Draw the worst ratio, which falls to one, and the energy, which rises, over the samples."""
+    upper, lower = page.subplots(2, 1, sharex=True)
+    upper.plot(curves.samples, curves.ratio, "o-", color=BLUE, markersize=4, label="after each part")
+    upper.axhline(1.0, color=ORANGE, linestyle=DASHED, label="what is asked")
+    style.plain_decades(upper, "y")
+    upper.set_ylabel("worst ratio")
+    lower.plot(curves.samples, curves.energy, "o-", color=BLUE, markersize=4)
+    lower.set_ylim(bottom=0.0)
+    lower.set(xlabel="samples applied", ylabel="energy applied")
+    if 2 * curves.samples[-1] > curves.end:
+        lower.axvline(curves.end, color=BLACK, linestyle=DASHED)
+    style.legend_above(upper)
+
+
+def draw_true_ratio(page: Figure, curves: of.RatioCurves, time_unit: str) -> None:
+    """Draw a histogram of the true ratio for each way, on common bins; up to one the requirement is met."""
+    axes = page.add_subplot()
+    everything = np.concatenate(list(curves.ratios.values()))
+    low, top = min(float(everything.min()), 0.95), max(float(np.quantile(everything, _RATIOS)), 1.05)
+    runs = max(ratios.size for ratios in curves.ratios.values())
+    step = (top - low) / int(np.clip(runs // _RUNS_A_BIN, _FEWEST_BINS, _BINS))
+    # An edge at one: no bin mixes runs that meet the requirement with runs that miss it.
+    bins = (1.0 + step * np.arange(np.floor((low - 1.0) / step), np.ceil((top - 1.0) / step) + 1.0)).tolist()
+    for (name, ratios), colour in zip(curves.ratios.items(), PALETTE, strict=False):
+        filled = name == "campaign"
+        axes.hist(
+            np.minimum(ratios, bins[-1]),
+            bins=bins,
+            weights=np.full(ratios.size, 100.0 / max(ratios.size, 1)),
+            color=colour,
+            alpha=0.45 if filled else 1.0,
+            histtype="stepfilled" if filled else "step",
+            linewidth=1.4,
+            label=name.replace("_", " "),
+        )
+    axes.axvline(1.0, color=BLACK, linestyle=DASHED)
+    axes.set_xlabel("largest r_u / r_adm of the true plant\n(beyond the last bin: in it)")
+    axes.set_ylabel("share of the runs (%)")
+    style.legend_over_all(page)
+
+
+def draw_trade(page: Figure, curves: of.TradeCurves, time_unit: str) -> None:
+    """Draw the share of runs within r_adm over the mean cost, both with spread; the oracle's cost is one."""
+    axes = page.add_subplot()
+    for (name, point), colour in zip(curves.points.items(), PALETTE, strict=False):
+        cost, cheap, dear, share, low, high = point
+        axes.plot([cheap, dear], [100 * share, 100 * share], color=colour, linewidth=1.2)
+        axes.plot([cost, cost], [100 * low, 100 * high], color=colour, linewidth=1.2)
+        axes.plot([cost], [100 * share], "o", color=colour, markersize=7, label=name.replace("_", " "))
+    axes.axvline(1.0, color=BLACK, linestyle=DASHED, label="knows the plant: its spectrum")
+    if curves.record is not None:
+        axes.axvline(curves.record, color=BLACK, linestyle=DOTTED, label="knows the plant: its record")
+    if max(dear for _, _, dear, *_ in curves.points.values()) > _WIDE:
+        style.plain_decades(axes, "x")
+    axes.set_xlabel("cost over that of the spectrum that knows the plant\n(mean, 5 to 95 %)")
+    axes.set_ylabel("runs within r_adm (%), 95 % limits")
+    axes.set_ylim(top=101.0)
+    style.legend_over_all(page)
+
+
+def draw_loss(page: Figure, curves: of.LossCurves, time_unit: str) -> None:
+    """Draw the histogram of the loss for each input on common bins, with its mean as a vertical line."""
+    axes = page.add_subplot()
+    top = max(float(np.quantile(loss, _LOSSES)) for loss in curves.losses.values())
+    bins = np.linspace(0.0, top, _BINS + 1).tolist()
+    for index, (name, loss) in enumerate(curves.losses.items()):
+        colour = _COLOURS[index % len(_COLOURS)]
+        weights = np.full(loss.size, 100.0 / loss.size)
+        label = f"{name}: mean {loss.mean():.4g}, sd {loss.std(ddof=1):.4g}"
+        axes.hist(loss, bins=bins, weights=weights, color=colour, alpha=0.45, label=label)
+        axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
+        if name in curves.theory:
+            axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
+    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
+    axes.set(ylabel="share of the runs (%)", xlim=(0.0, top))
     style.legend_above(axes)

@@ -37,6 +37,9 @@ _MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
 
 
 P = TypeVar("P", bound=of.Panel)
+_DISCS = 36
+# Of the plane, what is shown: so far around -1 and 0 the loop decides on its margins.
+_LEFT, _RIGHT, _HALF = -2.2, 1.2, 1.35
 
 
 def draw_panels(
@@ -282,11 +285,6 @@ def _plot_bands(axes: Axes, curves: of.ErrorBandPanel, *, runs: int) -> None:
             label = f"where more than {100 * (1.0 - high):.2g} % of the runs leave r_adm"
             style.band(axes, w, admitted, outer, ORANGE, None, label=label, where=beyond)
         style.plot_admitted(axes, w, curves.r_adm)
-
-
-_DISCS = 36
-# Of the plane, what is shown: so far around -1 and 0 the loop decides on its margins.
-_LEFT, _RIGHT, _HALF = -2.2, 1.2, 1.35
 
 
 def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:

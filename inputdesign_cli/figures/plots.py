@@ -7,8 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures import estimates, frequency, records, spectrum, studies
-from inputdesign_cli.figures.frequency import draw_nyquist
+from inputdesign_cli.figures import estimates, frequency, records, spectrum
 from inputdesign_cli.figures.style import FILE_TYPES, FileType, Width, painted, rendered
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import Curves
@@ -17,7 +16,7 @@ from inputdesign_cli.outcome.results import Results
 # Each draws its curves on an empty page; the text is the unit of time.
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.BoundCurves: frequency.draw_bound,
-    of.CampaignCurves: studies.draw_campaign,
+    of.CampaignCurves: estimates.draw_campaign,
     of.CloudCurves: estimates.draw_cloud,
     of.DeviationCurves: frequency.draw_deviations,
     of.DirectionCurves: spectrum.draw_directions,
@@ -27,17 +26,17 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.ErrorCurves: estimates.draw_error,
     of.FanCurves: frequency.draw_fan,
     of.FitCurves: records.draw_fit,
-    of.LossCurves: studies.draw_loss,
+    of.LossCurves: estimates.draw_loss,
     of.MomentsCurves: estimates.draw_moments,
-    of.NyquistCurves: draw_nyquist,
+    of.NyquistCurves: frequency.draw_nyquist,
     of.OptimalityCurves: spectrum.draw_optimality,
     of.OrderCurves: estimates.draw_orders,
-    of.RatioCurves: studies.draw_true_ratio,
+    of.RatioCurves: estimates.draw_true_ratio,
     of.ResidualCurves: records.draw_residuals,
     of.ResponseCurves: frequency.draw_response,
     of.SignalCurves: records.draw_signal,
     of.SpectrumCurves: spectrum.draw_spectrum,
-    of.TradeCurves: studies.draw_trade,
+    of.TradeCurves: estimates.draw_trade,
 }
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.figures import style
 from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, ORANGE, PALETTE, log_axes
 from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable, Trade
-from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
+from inputdesign_cli.outcome.design import OBJECTIVES, objective
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.run_directory import output_errors, write_bytes
 
@@ -301,8 +301,7 @@ def scale_key(axes: Axes, key: str, x: Array) -> None:
 def draw_trade(trade: Trade, page: Figure) -> None:
     """Draw the ratios to what is asked, which stands at one, or the criterion, over the length."""
     axes = page.add_subplot()
-    for number, (text, row) in enumerate(zip(trade.amplitudes, trade.values, strict=True)):
-        name = f"amplitude {text}" if text else "best record"
+    for number, (name, row) in enumerate(trade.rows.items()):
         colour, dashes = style.stroke(number)
         drawn = {"color": colour, "linestyle": dashes, "label": name}
         curve(axes, trade.lengths, row, marker="o", markersize=4, **drawn)
@@ -310,7 +309,7 @@ def draw_trade(trade: Trade, page: Figure) -> None:
     axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"length of the experiment ({trade.unit})")
-    mark_failures(axes, trade.lengths[np.all(np.isnan(trade.values), axis=0)])
+    mark_failures(axes, trade.lengths[np.all(np.isnan([*trade.rows.values()]), axis=0)])
     if trade.criterion:
         axes.set_ylabel("criterion")
     else:

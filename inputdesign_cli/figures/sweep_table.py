@@ -6,13 +6,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome import read_plain
-from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.design import objective
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.text_formats import csv_rows
 from inputdesign_cli.regular_file import read_regular
@@ -111,20 +111,15 @@ class SweepTable:
             return None
 
 
-@dataclass(frozen=True)
-class Trade:
-    """Holds the worst ratio to the requirement, or the criterion, over lengths (in `unit`) and amplitudes.
+class Trade(NamedTuple):
+    """Holds the worst ratios to the requirement, or a `criterion`, over lengths (n,) in `unit`.
 
-    Args:
-        amplitudes: their texts, one where only the length was varied.
-        values: (amplitudes, lengths), NaN without a result.
-        criterion: whether the values are a criterion, and not ratios that are to be one at most.
+    A row (n,) belongs to an amplitude, by its name, and has NaN where there is no result.
     """
 
     lengths: Array
     unit: str
-    amplitudes: tuple[str, ...]
-    values: Array
+    rows: Mapping[str, Array]
     criterion: bool
 
 

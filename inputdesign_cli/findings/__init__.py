@@ -6,7 +6,7 @@ A file says when its finding holds and what its sentence is. It is found by its 
 from importlib import import_module
 from pkgutil import iter_modules
 
-from inputdesign_cli.error_codes import Explanation, explanations as of_errors
+from inputdesign_cli.diagnostics import Explanation, explanations as of_errors
 from inputdesign_cli.finding import KINDS, FindingKind
 from inputdesign_cli.specification import plugins
 

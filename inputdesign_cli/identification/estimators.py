@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying
 from inputdesign_cli.identification.coloured import ColouredKind

@@ -17,7 +17,7 @@ from numpy.polynomial import polynomial as ascending
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts, late_samples
 from inputdesign_cli.identification.polynomials import with_entry

@@ -21,6 +21,7 @@ _RECORDS = 4
 _FREQUENCIES_AT_ONCE = 16384
 # Frequency responses of more numbers than this are computed anew for each record.
 _KEPT = 2**22
+Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 
 
 @dataclass(frozen=True)
@@ -122,9 +123,6 @@ class RecordTransforms:
     @cached_property
     def _gradient(self) -> ComplexArray:
         return self.experiment.excitation_gradient(self._frequencies)
-
-
-Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 
 
 @dataclass(frozen=True)

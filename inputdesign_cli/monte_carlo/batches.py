@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from inputdesign_cli.compute.executor import Executor, InProcess, WorkerLostError
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.errors import IdesignError
 
 Answer = TypeVar("Answer")

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import Absolute, Entry, ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, Earlier, Estimate, Rival, fit_batch, identify
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.plant import Model
+
+# Records of outputs that are simulated and identified in one pass.
+_OUTPUTS_AT_ONCE = 100
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Trials:
         power: mean squares that the excitation causes, channel by channel: input, output, excitation.
         total_power: mean squares of inputs and outputs, noise included.
         first: (samples, r), the excitation of the first run.
+        information: (k, k) in theory, or None if the true system has other parameters than the model.
     """
 
     true: Experiment
@@ -57,6 +61,8 @@ class Trials:
     power: dict[PowerKind, list[float]]
     total_power: dict[PowerKind, list[float]]
     first: Array
+    name: str = ""  # of the excitation
+    information: Array | None = None
 
     @classmethod
     def joined(cls, parts: Sequence[Trials]) -> Trials:
@@ -119,63 +125,29 @@ class Trials:
         return r_u
 
 
-# Records of outputs that are simulated and identified in one pass.
-_OUTPUTS_AT_ONCE = 100
-
-
-@dataclass(frozen=True)
-class Study:
-    """Holds the experiment on the design model and on the true system.
-
-    Attributes:
-        nominal, true: the experiment on the design model and on the true system; the same object where
-            they do not differ.
-        step: time between samples in the unit of the experiment's frequencies.
-    """
-
-    nominal: Experiment
-    true: Experiment
-    runs: int
-    seed: int
-    step: float
-
-
-@dataclass(frozen=True)
-class Tried:
-    """Holds the runs of one excitation on one system.
-
-    Attributes:
-        information: (k, k) in theory, or None if the true system has other parameters than the model.
-    """
-
-    name: str
-    trials: Trials
-    information: Array | None
-
-
-def tried_on_truth(study: Study, excitation: Excitation, executor: Executor | None = None) -> Tried:
-    """Try an excitation on the true system.
+def tried_on(
+    system: Experiment,
+    model: Model,
+    excitation: Excitation,
+    *,
+    runs: int,
+    seed: int,
+    step: float,
+    executor: Executor | None = None,
+) -> Trials:
+    """Try an excitation on a system: the true one, or the design model.
 
     Args:
+        model: whose structure is estimated.
+        seed: the same for every excitation, so that they meet the same noise.
+        step: time between samples in the unit of the experiment's frequencies.
         executor: where the batches of runs are computed (default: in this process); the result does not
             depend on it.
     """
-    return _tried(study, study.true, excitation, executor)
-
-
-def tried_on_model(study: Study, excitation: Excitation, executor: Executor | None = None) -> Tried | None:
-    """Try the excitation on the design model; return None if that is the true system."""
-    return None if study.true is study.nominal else _tried(study, study.nominal, excitation, executor)
-
-
-def _tried(study: Study, experiment: Experiment, excitation: Excitation, executor: Executor | None) -> Tried:
-    model = study.nominal.model
-    run = partial(_run, experiment, model, excitation, study.step)
-    # The same seed for every excitation: they meet the same noise.
-    size = max(1, _OUTPUTS_AT_ONCE // model.outputs)
-    parts = run_batches(run, runs=study.runs, size=size, seed=study.seed, executor=executor)
-    same = experiment.model.names == model.names
-    return Tried(excitation.name, Trials.joined(parts), excitation.information(experiment) if same else None)
+    run, size = partial(_run, system, model, excitation, step), max(1, _OUTPUTS_AT_ONCE // model.outputs)
+    parts = run_batches(run, runs=runs, size=size, seed=seed, executor=executor)
+    information = excitation.information(system) if system.model.names == model.names else None
+    return replace(Trials.joined(parts), name=excitation.name, information=information)
 
 
 def _run(
@@ -185,10 +157,7 @@ def _run(
 
     The noise is drawn first, so that every excitation meets the same. Runs where the search does not
     settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
-    with an error of its own in each run.
-
-    Args:
-        model: the model whose structure is estimated; the search begins at its parameters.
+    with an error of its own in each run. The search begins at the parameters of `model`.
     """
     system = true.model
     e = _noise(true, runs, rng)
@@ -244,12 +213,7 @@ def _again_where_lost(
 
 
 def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
-    """Combine estimates (runs, k) with earlier estimates.
-
-    Args:
-        prior: the information (k, k) of the earlier estimates, which may be singular.
-        centre: the parameters (k,) about which they scatter.
-    """
+    """Combine estimates (runs, k) with earlier ones about `centre`, whose information may be singular."""
     values, vectors = np.linalg.eigh(prior)
     root: NDArray[np.float64] = vectors * np.sqrt(np.maximum(values, 0.0))
     earlier = prior @ centre + rng.standard_normal(found.theta.shape) @ root.T

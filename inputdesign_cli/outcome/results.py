@@ -24,6 +24,11 @@ from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
 from inputdesign_cli.outcome.robust import Robust
 from inputdesign_cli.outcome.simulation import Simulation
 
+Array = NDArray[np.float64]
+# Data as JSON has it. What is in a result is known by its path, not by its type.
+Json = Any
+Result = Mapping[str, Json]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -73,12 +78,6 @@ class Outcome:
             return self
         messages = tuple(one.message for one in more)
         return replace(self, findings=(*(self.findings or ()), *more), notes=(*(self.notes or ()), *messages))
-
-
-Array = NDArray[np.float64]
-# Data as JSON has it. What is in a result is known by its path, not by its type.
-Json = Any
-Result = Mapping[str, Json]
 
 
 @dataclass(frozen=True)

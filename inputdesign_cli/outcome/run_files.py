@@ -37,6 +37,9 @@ _LONGEST_NAME = 255  # bytes, of a file system
 # How each page that `idesign report` writes begins: one of the user's own is not removed.
 PAGE_MARK = b'<meta name="generator" content="idesign '
 _DAMAGES = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
+_WORK, _LOCK = ".run.partial", ".run.lock"
+_PATIENCE = 10.0  # seconds that another writer is waited for
+_POLL = 0.02  # seconds between two tries
 
 
 def load_result(directory: Path) -> dict[str, Any]:
@@ -136,11 +139,6 @@ def environment() -> Mapping[str, str]:
         "idesign": __version__,
         **{name: metadata.version(name) for name in _LIBRARIES},
     }
-
-
-_WORK, _LOCK = ".run.partial", ".run.lock"
-_PATIENCE = 10.0  # seconds that another writer is waited for
-_POLL = 0.02  # seconds between two tries
 
 
 @contextmanager

@@ -12,6 +12,8 @@ import orjson
 
 from inputdesign_cli.outcome.results import Array, Table
 
+_A_LINE = 4
+
 
 def csv_text(table: Table) -> str:
     """Return a header line and a line for each row, in the fewest digits that give back every bit.
@@ -94,9 +96,6 @@ def csv_rows(content: bytes) -> list[list[str]]:
         return [[_unescaped(cell) for cell in line] for line in lines]
     except csv.Error as error:
         raise ValueError(str(error)) from error
-
-
-_A_LINE = 4
 
 
 def mat_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:

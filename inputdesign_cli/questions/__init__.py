@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 Files = str | Path | Sequence[str | Path]
 Verb = Literal["solve", "analyse", "simulate"]
 """What makes results of a spec, by the names that commands, sweeps and golden files use."""
+# Numbers of a spec within this many powers of ten of one are not to blame.
+_USUAL = 6.0
 
 
 def solve(spec: Spec) -> Results:
@@ -325,10 +327,6 @@ def _response(spec: Spec) -> Task:
     from inputdesign_cli.questions.frequency_response.build import build_response_task
 
     return build_response_task(spec)
-
-
-# Numbers of a spec within this many powers of ten of one are not to blame.
-_USUAL = 6.0
 
 
 @contextmanager

@@ -9,13 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from inputdesign_cli.outcome import Outcome, Simulation
-from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss
-from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss, objective
 from inputdesign_cli.outcome.sentences import sentences, shown, spoken
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 
 # The status of an excitation that was given, in words.
 _GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
+BREAK = "\n"  # within a cell: what follows is a remark
+_SPREAD = "{:.4g} ± {:.2g}"
+# Below this share of its standard deviation the digits of an estimate say nothing, not even its order.
+_NOTHING = 1e-3
+_NORMAL = 1.96  # standard deviations to either side of 95 %
 
 
 class Fact(NamedTuple):
@@ -63,13 +67,6 @@ def answer(verb: str, outcome: Outcome) -> str:
 def provenance(environment: Mapping[str, object], more: Iterable[Fact] = ()) -> list[Fact]:
     """Return the versions, and further facts that show where numbers come from."""
     return [*more, *(Fact(name, str(version)) for name, version in environment.items() if version)]
-
-
-BREAK = "\n"  # within a cell: what follows is a remark
-_SPREAD = "{:.4g} ± {:.2g}"
-# Below this share of its standard deviation the digits of an estimate say nothing, not even its order.
-_NOTHING = 1e-3
-_NORMAL = 1.96  # standard deviations to either side of 95 %
 
 
 @dataclass(frozen=True)

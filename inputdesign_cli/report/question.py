@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.design import objective
 from inputdesign_cli.outcome.sentences import sentences
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum

@@ -43,11 +43,7 @@ def bibtex_text(directory: Path) -> str:
 
 
 def _is_sweep(directory: Path) -> bool:
-    """Return whether a directory holds a sweep; else it holds a run.
-
-    Raises:
-        DataError: `run-missing`, there is neither.
-    """
+    """Return whether a directory holds a sweep, not a run, or raise `run-missing` where there is neither."""
     if (directory / "sweep.json").is_file():
         return True
     if (directory / RESULT).is_file():

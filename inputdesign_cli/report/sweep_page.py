@@ -13,7 +13,7 @@ from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.sweep import bound_of, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
+from inputdesign_cli.outcome.design import OBJECTIVES, objective
 from inputdesign_cli.outcome.run_directory import read_outcome
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, chart

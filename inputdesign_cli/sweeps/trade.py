@@ -51,8 +51,9 @@ def trade_of(table: SweepTable, spec: Spec) -> Trade:
     criterion = spec.accuracy.criterion is not None
     known = (table.numbers(name) for name in (_QUANTITIES[1:] if criterion else _QUANTITIES))
     values = next((v for v in known if v is not None), np.full(table.rows, np.nan))
-    lengths, amplitudes = np.unique(found), tuple(dict.fromkeys(texts))
-    cells = np.full((len(amplitudes), lengths.size), np.nan)
-    cells[[amplitudes.index(text) for text in texts], np.searchsorted(lengths, found)] = values
+    lengths, names = np.unique(found), [f"amplitude {text}" if text else "best record" for text in texts]
+    rows = {name: np.full(lengths.size, np.nan) for name in names}
+    for name, place, value in zip(names, np.searchsorted(lengths, found), values, strict=True):
+        rows[name][place] = value
     step, unit = (spec.sample_time, spec.time_unit) if spec.plant.sampled else (1.0, "samples")
-    return Trade(lengths * step, unit, amplitudes, cells, criterion)
+    return Trade(lengths * step, unit, rows, criterion)

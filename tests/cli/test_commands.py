@@ -15,7 +15,7 @@ import inputdesign_cli
 from inputdesign_cli import questions
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.reference import Kind
-from inputdesign_cli.error_codes import explanation
+from inputdesign_cli.diagnostics import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.findings import explanations
 from tests.support.command_line import RESULT, diagnostic
@@ -95,7 +95,7 @@ def test_check_of_an_infeasible_run_says_why(run, failing, tmp_path):
 def test_check_takes_golden_files_of_the_package_by_name(name, run, verbs, monkeypatch, tmp_path):
     (tmp_path / "package" / "golden").mkdir(parents=True)
     (tmp_path / "package" / "golden" / "own.yaml").write_text(GOLDEN % "0.2585")
-    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "package")
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.reference"], "shipped", lambda: tmp_path / "package")
     code, out, _ = run("check", name)
     assert (code, "2 of 2 quantities agree" in out) == (0, True)
     code, _, err = run("check", "other.yaml")
@@ -105,7 +105,7 @@ def test_check_takes_golden_files_of_the_package_by_name(name, run, verbs, monke
 
 
 def test_check_without_golden_files(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "nowhere")
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.reference"], "shipped", lambda: tmp_path / "nowhere")
     code, _, err = run("check", "--junit", "report.xml")
     assert code == 2
     assert "golden/*.yaml" in err

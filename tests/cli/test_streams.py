@@ -12,7 +12,7 @@ import pytest
 
 from inputdesign_cli.cli import terminal as terminal_module
 from inputdesign_cli.cli.terminal import aligned, colourful, computing, status
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, tell
 from tests.support.processes import running
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from inputdesign_cli.compute import interruptions
 from inputdesign_cli.compute.executor import InProcess, WorkerLostError
 from inputdesign_cli.compute.interruptions import bare_interruptions, interrupt
 from inputdesign_cli.compute.processes import Processes
-from inputdesign_cli.compute.watching import Counted, Round, tell, watching
+from inputdesign_cli.compute.time_limit import Counted, Round, tell, watching
 from tests.support import jobs
 from tests.support.processes import running
 

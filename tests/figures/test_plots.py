@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from inputdesign_cli.figures.estimates import draw_campaign
 from inputdesign_cli.figures.plots import draw, draw_all, figure, painter
 from inputdesign_cli.figures.readings import readings
-from inputdesign_cli.figures.studies import draw_campaign
 from inputdesign_cli.figures.style import TYPE_SIZE, painted, rendered
 from inputdesign_cli.figures.sweep import draw_trade
 from inputdesign_cli.figures.sweep_table import Trade
@@ -249,11 +249,11 @@ def test_fits_that_are_drawn_elsewhere_are_told(page):
 
 def test_every_amplitude_of_a_trade_is_drawn():
     page = Figure()
-    texts = tuple(map(str, range(9)))
-    draw_trade(Trade(SIZES, "s", texts, np.arange(18.0).reshape(9, 2) + 1.0, False), page)
+    names = {f"amplitude {number}" for number in range(9)}
+    draw_trade(Trade(SIZES, "s", {name: SIZES + n for n, name in enumerate(names)}, False), page)
     (axes,) = page.axes
     drawn = lines_by_label(axes)
-    assert {f"amplitude {text}" for text in texts} <= set(drawn)
+    assert names <= set(drawn)
     assert apart(list(drawn.values()))
 
 

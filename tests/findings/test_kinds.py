@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from inputdesign_cli import error_codes
+from inputdesign_cli import diagnostics
 from inputdesign_cli.finding import Finding, Severity, trusted, undecided
 from inputdesign_cli.findings import kinds
 from tests.support.wording import long_sentences, unclear_words
@@ -25,7 +25,7 @@ def test_a_kind_is_explained(kind):
 
 
 def test_no_code_is_that_of_an_error_too():
-    assert kinds().keys() & error_codes.explanations().keys() == set()
+    assert kinds().keys() & diagnostics.explanations().keys() == set()
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ import warnings
 from pathlib import Path
 
 from inputdesign_cli import parse_spec, solve, validate
-from inputdesign_cli.diagnostics import render
-from inputdesign_cli.error_codes import explanations
+from inputdesign_cli.diagnostics import explanations, render
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.codec import json_text

@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli.compute.watching import watching
+from inputdesign_cli.compute.time_limit import watching
 from inputdesign_cli.identification import identify
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 

@@ -40,39 +40,29 @@ def test_the_files_of_a_run(tmp_path):
     assert (tmp_path / "runs" / "a" / "signal.png").read_bytes() == b"drawn"
 
 
-def test_the_result_names_its_software_and_its_spec(tmp_path):
-    write_run(a_run("first"), tmp_path / "a")
-    result = json.loads((tmp_path / "a" / "result.json").read_text())
+def test_read_run_returns_what_was_written_with_its_software_and_its_spec(tmp_path):
+    write_with_figures(a_run("first"), tmp_path / "a")
+    result = read_run(tmp_path / "a")
+    assert result["title"] == "first"
+    assert result["objective"] == {"kind": "least_cost", "value": 5.0}
+    assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png", "figures.json"}
     assert result["spec_sha256"] == hashlib.sha256((tmp_path / "a" / "spec.yaml").read_bytes()).hexdigest()
     assert result["environment"]["python"] == platform.python_version()
     assert result["environment"]["numpy"] == metadata.version("numpy")
     assert set(result["environment"]) >= {"platform", "idesign", "scipy", "cvxpy", "clarabel"}
 
 
-def test_read_run_returns_what_was_written(tmp_path):
-    write_with_figures(a_run("first"), tmp_path / "a")
-    result = read_run(tmp_path / "a")
-    assert result["title"] == "first"
-    assert result["objective"] == {"kind": "least_cost", "value": 5.0}
-    assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png", "figures.json"}
-
-
-def test_a_later_run_replaces_an_earlier_one_and_its_stale_figure(tmp_path):
-    write_with_figures(a_run("first", optimality=True), tmp_path / "a")
-    write_with_figures(a_run("second"), tmp_path / "a")
-    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "figures.json", "result.json"}
-    assert marks(tmp_path / "a") == {"second"}
-
-
-def test_files_of_the_user_survive(tmp_path):
+def test_a_later_run_replaces_an_earlier_one_with_its_stale_figure_and_no_file_of_the_user(tmp_path):
     write_with_figures(a_run("first", optimality=True), tmp_path / "a")
     (tmp_path / "a" / "notes.txt").write_text("mine")
     (tmp_path / "a" / "photo.png").write_text("mine")
     (tmp_path / "a" / "data").mkdir()
     write_with_figures(a_run("second"), tmp_path / "a")
+    run = {"spec.yaml", "signal.csv", "signal.png", "figures.json", "result.json"}
+    assert names(tmp_path / "a") == run | {"notes.txt", "photo.png", "data"}
     assert (tmp_path / "a" / "notes.txt").read_text() == "mine"
     assert (tmp_path / "a" / "photo.png").read_text() == "mine"
-    assert (tmp_path / "a" / "data").is_dir()
+    assert marks(tmp_path / "a") == {"second"}
 
 
 @pytest.mark.parametrize(
@@ -93,18 +83,12 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path, there, target, code):
     assert (tmp_path / there).read_text() == "mine"
 
 
-def test_a_run_into_an_empty_directory(tmp_path):
-    (tmp_path / "a").mkdir()
-    write_run(a_run("first"), tmp_path / "a")
-    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
-
-
-def test_a_link_to_a_directory_stays_a_link(tmp_path):
+def test_a_link_to_an_empty_directory_stays_a_link(tmp_path):
     (tmp_path / "disc").mkdir()
     (tmp_path / "a").symlink_to(tmp_path / "disc")
     write_run(a_run("first"), tmp_path / "a")
     assert (tmp_path / "a").is_symlink()
-    assert (tmp_path / "disc" / "result.json").is_file()
+    assert names(tmp_path / "disc") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
 
 
 def contents(directory) -> dict[str, bytes]:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, simulate, solve
-from inputdesign_cli.compute.time_limit import stoppable
-from inputdesign_cli.compute.watching import watching
+from inputdesign_cli.compute.time_limit import stoppable, watching
 from inputdesign_cli.errors import InaccurateError
 from tests.fuzzing.judge import written
 from tests.fuzzing.textbook import findings

@@ -66,7 +66,8 @@ def test_the_page_of_a_run(runs, name):
     assert (runs / name / "spec.yaml").read_text() in "".join(page.itertext())
 
 
-def test_a_page_tells_which_result_it_is_about(runs):
+def test_a_page_tells_which_result_it_is_about_and_is_the_same_for_the_same_run(runs):
+    assert report_text(runs / "open") == page_of(runs / "open")
     digest = hashlib.sha256((runs / "open" / "result.json").read_bytes()).hexdigest()
     page = parse(page_of(runs / "open"))
     (stamp,) = [meta for meta in page.iter(f"{XHTML}meta") if meta.get("name") == "sha256"]
@@ -80,10 +81,12 @@ def copied(runs, tmp_path):
     return tmp_path / "run"
 
 
-def test_a_result_that_says_nothing_is_no_run(copied):
+def test_what_is_no_run_is_said(copied, tmp_path):
     (copied / "result.json").write_text('{"format": 1}')
-    with pytest.raises(DataError, match="cannot be read as the result of a run"):
-        report_text(copied)
+    for directory, code in ((copied, "run-unreadable"), (tmp_path, "run-missing")):
+        with pytest.raises(DataError) as caught:
+            report_text(directory)
+        assert caught.value.diagnostics[0].code == code
 
 
 def paths(value, path=()):
@@ -141,10 +144,6 @@ def test_charts_are_pictures_with_words(runs):
         kind, _, data = image.get("src").partition(";base64,")
         assert kind == "data:image/svg+xml"
         assert ElementTree.fromstring(base64.b64decode(data)).tag.endswith("svg")
-
-
-def test_the_same_run_gives_the_same_page(runs):
-    assert report_text(runs / "open") == page_of(runs / "open")
 
 
 def test_a_simulation_of_an_unknown_kind_is_among_all_numbers(copied, monkeypatch):
@@ -213,20 +212,11 @@ def test_a_sweep_without_any_result_has_a_page(runs, tmp_path):
     assert "2 points: 2 invalid" in said
 
 
-def test_a_directory_without_a_run(tmp_path):
-    with pytest.raises(DataError) as caught:
-        report_text(tmp_path)
-    assert caught.value.diagnostics[0].code == "run-missing"
-
-
 def test_peaks_of_a_loop_are_those_of_each_signal():
-    signal = {"samples": 10, "peak": [3.0], "input_peak": [2.0], "output_peak": [5.0]}
-    told = {name: text for name, text, _ in facts(typed({"signal": signal}), "s")}["signal"]
-    assert told == "10 samples, peak of r 3, peak of u 2, peak of y 5"
-    told = {name: text for name, text, _ in facts(typed({"signal": signal | {"input_peak": [3.0]}}), "s")}[
-        "signal"
-    ]
-    assert told == "10 samples, peak 3"
+    signal = {"samples": 10, "peak": [3.0], "output_peak": [5.0]}
+    for input_peak, peaks in (([2.0], "peak of r 3, peak of u 2, peak of y 5"), ([3.0], "peak 3")):
+        found = facts(typed({"signal": signal | {"input_peak": input_peak}}), "s")
+        assert {name: text for name, text, _ in found}["signal"] == f"10 samples, {peaks}"
 
 
 SPECS = Path(__file__).parents[2] / "specs"

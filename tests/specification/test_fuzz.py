@@ -9,8 +9,7 @@ from pathlib import Path
 import yaml
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from inputdesign_cli.diagnostics import as_json, render
-from inputdesign_cli.error_codes import explanations
+from inputdesign_cli.diagnostics import as_json, explanations, render
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import parse_spec
 

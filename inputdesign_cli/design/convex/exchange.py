@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError
-from inputdesign_cli.compute.watching import Round, tell
+from inputdesign_cli.compute.time_limit import OutOfTimeError, Round, tell
 from inputdesign_cli.design.convex.candidate import Place
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.problem import Problem

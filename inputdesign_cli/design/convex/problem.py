@@ -35,6 +35,9 @@ from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts,
 from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
 from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
 
+_RIPPLE = 16  # points of the grid a lag
+Goal = Literal["cost", "factor", "samples"]
+
 
 def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
     """Return the scenarios whose weight Y_s of `weights` (S, k, k) is not zero."""
@@ -96,10 +99,6 @@ class Gradients:
         if known is None or known[0] is not w:
             known = self._products[scenario] = (w, experiment.products(w))
         return experiment.valued(known[1], weight)
-
-
-_RIPPLE = 16  # points of the grid a lag
-Goal = Literal["cost", "factor", "samples"]
 
 
 @dataclass(frozen=True)

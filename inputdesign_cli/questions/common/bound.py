@@ -16,7 +16,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import curves as plots
-from inputdesign_cli.outcome.objectives import WHITE
+from inputdesign_cli.outcome.design import WHITE
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.spectrum import axis, distinct

@@ -15,7 +15,7 @@ from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Excitation, Reapplied, Recorded
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
-from inputdesign_cli.monte_carlo.study import Study, tried_on_truth
+from inputdesign_cli.monte_carlo.study import tried_on
 from inputdesign_cli.outcome.design import Coverage as Reported
 from inputdesign_cli.outcome.shares import per_cent
 
@@ -81,9 +81,9 @@ class SimulatedEstimates:
         """Return the estimates (runs, k), NaN where the search did not settle."""
         seconds_left()
         assert self.excitation is not None
-        study = Study(self.nominal, self.nominal, self.runs, seed, self.step)
         each = _EACH if self.nominal.samples >= _LONG else 1
-        trials = tried_on_truth(study, Reapplied(self.excitation, each)).trials
+        again, model = Reapplied(self.excitation, each), self.nominal.model
+        trials = tried_on(self.nominal, model, again, runs=self.runs, seed=seed, step=self.step)
         return np.where(trials.converged[:, None], trials.theta, np.nan)
 
 

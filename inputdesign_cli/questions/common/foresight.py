@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, what_ended
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, OutOfTimeError, seconds_left, tell, what_ended
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, foreseen_rivals, not_foreseen

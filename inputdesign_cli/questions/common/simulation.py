@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -23,14 +24,7 @@ from inputdesign_cli.findings import simulated_runs
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
-from inputdesign_cli.monte_carlo.study import (
-    PredictedError,
-    Study,
-    Trials,
-    Tried,
-    tried_on_model,
-    tried_on_truth,
-)
+from inputdesign_cli.monte_carlo.study import PredictedError, Trials, tried_on
 from inputdesign_cli.outcome import Powers, Simulation as Studied, curves as plots
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
@@ -107,17 +101,17 @@ def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, plo
 
 def tried_input(
     units: Units,
-    tried: Tried,
+    trials: Trials,
     predicted: PredictedError,
     errors: Array,
     cost: Mapping[PowerKind, Weight],
-    modelled: Tried | None,
+    modelled: Trials | None,
 ) -> TriedInput:
     """Return the errors with one excitation against those `predicted`, on the design model too."""
-    trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
+    information, r_adm = trials.information, predicted.r_adm
     frequency = predicted.w / units.frequency
     entry = TriedInput(
-        **vars(_fractions(tried, predicted, errors)),
+        **vars(_fractions(trials, predicted, errors)),
         mean_estimate=_named(trials, trials.theta.mean(axis=0)),
         cost=weighted_sum(cost, trials.power),
         power=Powers.of(trials.power),
@@ -125,7 +119,7 @@ def tried_input(
         not_converged=int(np.sum(~trials.converged)),
     )
     if modelled is not None:
-        on_model = _fractions(modelled, predicted, modelled.trials.errors(predicted))
+        on_model = _fractions(modelled, predicted, modelled.errors(predicted))
         entry = replace(entry, on_design_model=on_model)
     if information is not None:
         deviations = np.sqrt(np.diag(covariance_in_theory(information)))
@@ -150,7 +144,7 @@ def _named(trials: Trials, values: Array) -> dict[str, float]:
     return dict(zip(trials.names, values.tolist(), strict=True))
 
 
-def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesignModel:
+def _fractions(tried: Trials, predicted: PredictedError, errors: Array) -> OnDesignModel:
     """Return fractions of the runs whose error stays within bounds at all frequencies, with 95 % limits."""
 
     def within(bound: Array | None) -> tuple[float | None, tuple[float, float] | None]:
@@ -159,7 +153,7 @@ def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesi
         inside = int(np.sum(np.all(errors <= bound, axis=1)))
         return inside / len(errors), binomial_limits(inside, len(errors))
 
-    own = None if tried.information is None else tried.trials.bound(predicted, tried.information)
+    own = None if tried.information is None else tried.bound(predicted, tried.information)
     promised = predicted.r_u if tried.name == "design" else None
     return OnDesignModel(*within(predicted.r_adm), *within(own), *within(promised))
 
@@ -225,7 +219,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     excitations = _excitations(plan, delivered, delivered.record)
     nominal = replace(plan.nominal, samples=len(delivered.record))
     true = nominal if plan.truth is None else plan.truth.experiment(nominal, outcome.power.output or ())
-    study = Study(nominal, true, plan.runs, plan.seed, units.step)
+    trying = partial(tried_on, runs=plan.runs, seed=plan.seed, step=units.step, executor=executor)
     counted, simulated = outcome.samples, len(delivered.record)
     foretold = results.curves if counted == simulated else delivered.of_length(simulated)
     predicted = _predicted(plan, foretold, delivered.alpha, excitations[0].information(nominal))
@@ -233,17 +227,17 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     curves: dict[str, plots.Curves] = {name: foretold[name] for name in ("ellipses",) if name in foretold}
     for excitation in excitations:
         name = excitation.name
-        tried = tried_on_truth(study, excitation, executor)
-        errors = tried.trials.errors(predicted)
-        modelled = tried_on_model(study, excitation, executor)
+        tried = trying(true, nominal.model, excitation)
+        errors = tried.errors(predicted)
+        modelled = None if true is nominal else trying(nominal, nominal.model, excitation)
         inputs[name] = tried_input(units, tried, predicted, errors, plan.cost, modelled)
         curves[f"errors_{name}"] = error_bands(units, predicted, errors, name)
         theory = None if tried.information is None else covariance_in_theory(tried.information)
-        drawn = cloud(tried.trials, theory)
+        drawn = cloud(tried, theory)
         if drawn is not None:
             curves[f"cloud_{name}"] = drawn
         if true.loop is not None:
-            shown = disturbance(units, true.loop, tried.trials.first)
+            shown = disturbance(units, true.loop, tried.first)
             tables[f"disturbance_{name}"], curves[f"disturbance_{name}"] = shown
     searched = None
     if outcome.foreseen is not None and outcome.foreseen.rivals and delivered.rivals is not None:
@@ -256,17 +250,17 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
         *(simulated_runs.runs_miss_confidence(asked, inputs["design"]) if "design" in inputs else []),
         *simulated_runs.one_minimum(searched),
     ]
-    model, rng = true.model, np.random.default_rng(study.seed)
+    model, rng = true.model, np.random.default_rng(plan.seed)
     several = tuple(map(tuple, model.covariance.tolist()))
     entry = Studied(
-        runs=study.runs,
-        seed=study.seed,
+        runs=plan.runs,
+        seed=plan.seed,
         inputs=inputs,
         samples=true.samples,
         excitation="new" if plan.renewed else "record",
         true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
         true_variance=float(model.covariance[0, 0]) if model.outputs == 1 else several,
-        wishart_range=tuple(wishart_range(nominal.size, study.runs, rng)) if study.runs > 1 else (),
+        wishart_range=tuple(wishart_range(nominal.size, plan.runs, rng)) if plan.runs > 1 else (),
     )
     return with_study(results, entry, started, findings, tables, curves)
 

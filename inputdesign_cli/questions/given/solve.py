@@ -22,7 +22,7 @@ from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept, met_
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, spectral_information
 from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectrum, White
-from inputdesign_cli.outcome.objectives import white_labels
+from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound import Informed

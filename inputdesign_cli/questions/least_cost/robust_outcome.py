@@ -16,8 +16,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
-from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, OutOfTimeError, seconds_left, tell
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before

@@ -19,7 +19,7 @@ from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.outcome import Outcome, White
 from inputdesign_cli.outcome.curves import Curves
-from inputdesign_cli.outcome.objectives import white_labels
+from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions.common.bound import Informed, equal_white
 from inputdesign_cli.questions.common.confidence import covered
