@@ -10,8 +10,9 @@ import inputdesign_cli
 ROOT = Path(inputdesign_cli.__file__).parent
 
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
+FOUNDATION = "arrays errors finding expressions version regular_file compute plugins"
 ORDER = [
-    {"arrays", "errors", "finding", "expressions", "version", "regular_file", "compute", "plugins"},
+    set(FOUNDATION.split()),
     {"diagnostics", "levels"},
     {"specification", "plant"},
     {"spectrum", "information", "accuracy"},
@@ -28,16 +29,7 @@ ORDER = [
     {"cli", "__main__"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
-MATHEMATICS = {
-    "plant",
-    "spectrum",
-    "information",
-    "accuracy",
-    "design",
-    "signal",
-    "identification",
-    "explore",
-}
+MATHEMATICS = LEVEL.keys() & {"plant", "explore", *ORDER[3], *ORDER[4]}
 FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("specification", "outcome")} | {
     ("specification", "plant"),
     ("monte_carlo", "specification"),

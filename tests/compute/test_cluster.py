@@ -105,6 +105,7 @@ def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_p
     assert timeless_files(there) == timeless_files(here)
 
 
+@pytest.mark.slow
 def test_data_files_travel_with_the_points(loopback, tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "r.csv").write_text("frequency,r_adm\n0,1\n3.2,1\n")

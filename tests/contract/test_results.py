@@ -16,7 +16,7 @@ from tests.support.commands import caller
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 EXPECTED = json.loads((HERE / "results.json").read_text())
-QUICK = {"analyse-first_order_given", "simulate-first_order", "simulate-regression", "identify-process"}
+QUICK = {"analyse-first_order_given", "simulate-first_order", "simulate-regression"}
 CLOSE = 2e-6
 # Proofs stop where they are good enough, and that depends on the order of additions.
 ROUGH = {

@@ -13,8 +13,7 @@ import resource
 import sys
 import tempfile
 import time
-from collections import Counter
-from multiprocessing.connection import Connection, wait
+from collections import Counter, deque
 from pathlib import Path
 
 from inputdesign_cli.compute.executor import ONE_THREAD
@@ -30,7 +29,6 @@ from tests.fuzzing.mutations import ROOT, mutated
 
 _HANGS = 90.0  # seconds: more than time limits leave
 _MEMORY = 8 * 2**30
-_CONTEXT = multiprocessing.get_context("fork")
 
 
 def text_of(seed: int) -> str:
@@ -38,37 +36,27 @@ def text_of(seed: int) -> str:
     return yaml.safe_dump(spec, default_flow_style=None, sort_keys=False)
 
 
-def _work(seed: int, answers: Connection) -> None:
+def _work(seed: int) -> tuple[str, str]:
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (until the process ends)
-    answers.send(judged(text_of(seed), ROOT / "specs"))
+    return judged(text_of(seed), ROOT / "specs")
 
 
 def main() -> int:
     seconds, seed = float(os.environ.get("FUZZ_SECONDS", "60")), int(os.environ.get("FUZZ_SEED", "0"))
     folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
-    end, running, ends, faults = time.monotonic() + seconds, {}, Counter(), 0
-    while running or time.monotonic() < end:
-        while len(running) < (os.cpu_count() or 1) and time.monotonic() < end:
-            ours, theirs = _CONTEXT.Pipe(duplex=False)
-            worker = _CONTEXT.Process(target=_work, args=(seed, theirs))
-            worker.start()
-            theirs.close()
-            running[ours] = (worker, seed, time.monotonic())
-            seed += 1
-        ready = wait(list(running), timeout=1.0)
-        for answers, (worker, number, started) in list(running.items()):
-            late = time.monotonic() - started > _HANGS
-            if answers not in ready and not late:
-                continue
+    end, running, ends, faults = time.monotonic() + seconds, deque(), Counter(), 0
+    count = os.cpu_count() or 1
+    with multiprocessing.get_context("fork").Pool(count, maxtasksperchild=1) as pool:
+        while running or time.monotonic() < end:
+            while len(running) < 4 * count and time.monotonic() < end:
+                running.append((seed, pool.apply_async(_work, (seed,))))
+                seed += 1
+            number, answer = running.popleft()
             try:
-                end_of, found = ("hangs", "hangs") if late else answers.recv()
-            except EOFError:
-                worker.join()
-                end_of, found = "killed", f"the process ended with {worker.exitcode}"
-            worker.kill()
-            worker.join()
-            del running[answers]
+                end_of, found = answer.get(_HANGS)
+            except multiprocessing.TimeoutError:
+                end_of, found = "hangs", "hangs, or its process was killed"
             ends[end_of] += 1
             if found:
                 faults += 1

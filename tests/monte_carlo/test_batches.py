@@ -72,6 +72,7 @@ def test_errors_of_a_batch_are_raised():
         run_batches(partial(complain, "job"), runs=4, size=4, seed=0)
 
 
+@pytest.mark.slow
 def test_a_batch_whose_processes_are_killed_is_said():
     with pytest.raises(IdesignError, match="a batch of 2 simulated runs has no result") as caught:
         run_batches(end, runs=2, size=2, seed=0, executor=Processes(1))

@@ -6,7 +6,6 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import (
     ContinuousModel,
     Loop,
@@ -18,7 +17,6 @@ from inputdesign_cli.plant import (
     close_loop,
 )
 from inputdesign_cli.plant.held import HeldEntry, Intersample
-from inputdesign_cli.spectrum import FirBasis
 from tests.support.plants import descending, known, lag_of, late_entries
 from tests.support.records import check_estimate, check_record
 
@@ -54,13 +52,6 @@ def test_realisation_and_response_are_one_plant(model):
     A, B, C, D = sampled.realisation
     expected = np.array([C @ np.linalg.solve(x * np.eye(len(A)) - A, B) + D for x in z])
     np.testing.assert_allclose(sampled.plant_at(W), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("tau", DELAYS)
-def test_numerator_and_denominator_in_q_are_those_of_the_response(tau):
-    entry = late(tau).held(0, 0, STEP)
-    expected = scipy.signal.freqz(*entry.sampled, worN=W)[1]
-    np.testing.assert_allclose(SampledModel(late(tau), STEP).plant_at(W)[:, 0, 0], expected, atol=1e-12)
 
 
 def test_the_gradient_has_two_sides_at_a_boundary():
@@ -130,23 +121,6 @@ def test_response_and_gradient_are_those_of_the_closed_form_down_to_the_pole():
     np.testing.assert_allclose(gradient[:, 2], in_a1, rtol=1e-9)
 
 
-def test_gradient_of_a_free_pole_is_that_of_differences():
-    """b / ((s + p)(s + q)) near p = 0, a0 = p q: the closed form of the sampled plant with two real poles."""
-    b, a1, step = 0.3, 0.8, 3e-4
-    z = np.exp(1j * np.linspace(0.05, 3.0, 20))
-
-    def held(a0):
-        large = (a1 + np.sqrt(a1**2 - 4 * a0)) / 2
-        p, q = -a0 / large, -large
-        parts = [np.expm1(x * H) / x / (x - y) / (z - np.exp(x * H)) for x, y in ((p, q), (q, p))]
-        return b * sum(parts)
-
-    model = plant_of([b], [1, a1, 0])
-    expected = (8 * (held(step) - held(-step)) - (held(2 * step) - held(-2 * step))) / (12 * step)
-    found = model.plant_gradient(np.angle(z))[:, 1, 0, 0]
-    np.testing.assert_allclose(found, expected, rtol=1e-8)
-
-
 def test_double_integrator_and_dead_time():
     z = np.exp(1j * DOWN)
     np.testing.assert_allclose(
@@ -157,50 +131,6 @@ def test_double_integrator_and_dead_time():
     np.testing.assert_allclose(
         late.plant_gradient(DOWN)[:, -1, 0, 0], (1 / z**2 - 1 / z) / (z - 1), rtol=1e-9
     )
-
-
-def pair(controller, below):
-    """b / s and b1 q^-1 / (1 - q^-1) with b1 = b H, in one loop; the poles are known."""
-    C = TransferMatrix.build([[controller]], [[below]])
-    models = (
-        known(plant_of([0.4], [1, 0]), "a0"),
-        known(PolynomialModel.single([0, 0.4 * H], F=[1, -1]), "f1"),
-    )
-    return [Experiment(model, 7, loop=close_loop(model, C)) for model in models]
-
-
-@pytest.mark.parametrize("controller", [([1.2, -1.0], [1, -1]), ([0.9], [1])], ids=["PI", "P"])
-def test_the_loop_around_an_integrator_is_that_of_polynomials(controller):
-    held, polynomial = pair(*controller)
-    w = np.array([0.0, 1e-3, 0.3, np.pi])
-    for one, other in zip(held.loop.sensitivity(w), polynomial.loop.sensitivity(w), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-5)
-    basis = FirBasis(1, 4)
-    maps = [basis.integrals(e.information_density, e.singularities) for e in (held, polynomial)]
-    np.testing.assert_allclose(maps[0], H**2 * maps[1], rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(held.noise_information, H**2 * polynomial.noise_information, rtol=1e-9)
-    powers = [
-        basis.integrals(lambda w, e=e: e.power_density("output", w), e.singularities)
-        for e in (held, polynomial)
-    ]
-    np.testing.assert_allclose(powers[0], powers[1], rtol=1e-9, atol=1e-10)
-    rng = np.random.default_rng(0)
-    r, e = rng.standard_normal((2, 3, 200, 1))
-    for one, other in zip(held.loop.signals(r, e), polynomial.loop.signals(r, e), strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-9)
-
-
-def test_information_next_to_the_pole_is_that_of_simulated_impulses():
-    """psi of the gain alone, sample by sample: the integral over frequency is the sum over time."""
-    gain = pair([0.9], [1])[0]
-    samples = 400
-    excitation = FirBasis(1, 0).integrals(gain.information_density, gain.singularities)[0]
-    for source, found in (("r", excitation), ("e", gain.noise_information)):
-        r, e = np.zeros((2, samples, 1))
-        (r if source == "r" else e)[0] = 1.0
-        _, u = gain.loop.signals(r, e)
-        psi = H * np.concatenate([[0.0], np.cumsum(u[:-1, 0])])  # d(y) / db
-        assert found[0, 0] == pytest.approx(7 * psi @ psi, rel=1e-9)
 
 
 def test_integrators_that_inputs_share_are_one():

@@ -9,7 +9,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel, Loop, PolynomialModel, SampledModel, TransferMatrix
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
-from tests.support.plants import arrays, descending
+from tests.support.plants import arrays, descending, known, lag_of
 
 T = 0.4
 LONG = 500
@@ -42,17 +42,30 @@ def held():
     return SampledModel(plant, T)
 
 
+def tank():
+    """An integrator whose pole is known, behind a hold."""
+    return known(SampledModel(lag_of([0.4], [1, 0]), T), "a0")
+
+
+def sampled_tank():
+    """It by its polynomials."""
+    return known(PolynomialModel.single([0, 0.4 * T], F=[1, -1]), "f1")
+
+
 # The controllers: entries (input, output); that of `held` has a delay where the plant has none.
 BELOW = [[[1, -1], [1, -1]], [[1], [1, -0.3]], [[1, 0.2], [1]]]
 CONTROLLERS = {
     box_jenkins: ([[[0.4, -0.32], [0.05]], [[0.0], [0.1, 0.05]], [[0.1], [0.0]]], BELOW),
     single: ([[[1.1, -0.7]]], [[[1, -1]]]),
     held: ([[[0.4, -0.32], [0.05]], [[0.0], [0, 0.1, 0.05]], [[0.1], [0.0]]], BELOW),
+    tank: ([[[1.2, -1.0]]], [[[1, -1]]]),
+    sampled_tank: ([[[0.9]]], [[[1]]]),
 }
 
 
 def textbook(model):
     """A, the fractions (b, a) of the entries, C and D in A y = (b / a) u + (C / D) e."""
+    model = getattr(model, "coefficients", model)
     if isinstance(model, PolynomialModel):
         A, C, D = (model.per_output(rows) for rows in (model.A, model.C, model.D))
         entries = [list(zip(*rows, strict=True)) for rows in zip(model.B, model.F, strict=True)]
@@ -173,7 +186,11 @@ def test_responses_are_those_of_matrix_algebra(case):
     H = np.array(H).T[:, :, None] * np.eye(len(H))
     inputs, outputs = np.eye(G.shape[2]), np.eye(G.shape[1])
     inner, outer = np.linalg.inv(inputs + K @ G), np.linalg.inv(outputs + G @ K)
-    for found, expected in ((y_r, G @ inner), (u_r, inner), (y_e, outer @ H), (u_e, -K @ outer @ H)):
+    S, CS = experiment.loop.sensitivity(w)
+    for found, expected in (
+        *((y_r, G @ inner), (u_r, inner), (y_e, outer @ H), (u_e, -K @ outer @ H)),
+        *((S, outer), (CS, K @ outer)),
+    ):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
 
 
@@ -182,8 +199,7 @@ def looped(model, numerator, below=(1.0,)):
 
 
 def one(numerator, denominator, C, below=(1.0,), *, step=T):
-    plant = ContinuousModel.monic(descending([[numerator]]), descending([[denominator]]), np.eye(1))
-    return looped(SampledModel(plant, step), C, below)
+    return looped(SampledModel(lag_of(numerator, denominator), step), C, below)
 
 
 def test_closed_poles_are_the_roots_of_the_characteristic_polynomial():
@@ -265,82 +281,3 @@ def test_fast_sampling_keeps_the_slow_poles():
     found = np.log(loop.closed_poles[np.abs(loop.closed_poles) > 0.5]) / step
     for pole in slow:
         assert np.abs(found - pole).min() < 1e-3
-
-
-# First-order entries b / (s + a): each is a polynomial in q^-1 of one b and one f.
-GAIN = np.array([[2.0, -0.5], [0.4, 1.2]])
-DECAY = np.array([[1.0, 1.5], [0.8, 0.3]])
-PI = [[[0.5, -0.4], [0.1]], [[0.0], [0.6, -0.5]]]
-UNDER = [[[1, -1], [1, -1]], [[1], [1, -1]]]
-
-
-def held_first_order():
-    rows = [[[b] for b in row] for row in GAIN], [[[1.0, a] for a in row] for row in DECAY]
-    plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), COVARIANCE)
-    return SampledModel(plant, T)
-
-
-def polynomial_first_order():
-    forgotten = np.exp(-DECAY * T)
-    B = [[[0, b] for b in row] for row in GAIN / DECAY * (1 - forgotten)]
-    F = [[[1, -f] for f in row] for row in forgotten]
-    one = (np.ones(1),)
-    return PolynomialModel(arrays(B), one, arrays(F), one, one, COVARIANCE)
-
-
-def derivative():
-    """d (b1, f1) / d (b, a) of all four entries, by hand: b1 = b (1 - E) / a, f1 = -E, E = exp(-a T)."""
-    b, a = GAIN.ravel(), DECAY.ravel()
-    E = np.exp(-a * T)
-    J = np.zeros((8, 8))
-    J[:4, :4] = np.diag((1 - E) / a)
-    J[:4, 4:] = np.diag(b * (T * E * a - (1 - E)) / a**2)
-    J[4:, 4:] = np.diag(T * E)
-    return J
-
-
-@pytest.fixture(scope="module")
-def pair():
-    """The same loop, by states and by polynomials."""
-    C = TransferMatrix.build(PI, UNDER)
-    loops = Loop(held_first_order(), C), Loop(polynomial_first_order(), C)
-    for loop in loops:
-        loop.check_stability()
-    return [Experiment(loop.model, 9, loop=loop) for loop in loops]
-
-
-def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
-    held, polynomial = pair
-    J, basis = derivative(), FirBasis(2, 3)
-    assert held.model.names[:2] == ("b0[1,1]", "b0[1,2]")
-    assert polynomial.model.names[:2] == ("b1[1,1]", "b1[1,2]")
-    maps = [basis.integrals(e.information_density, e.singularities) for e in pair]
-    expected = J.T @ maps[1] @ J
-    np.testing.assert_allclose(maps[0], expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
-    noise = J.T @ polynomial.noise_information @ J
-    assert np.abs(noise).max() > 0.1  # the noise tells something around the loop
-    np.testing.assert_allclose(held.noise_information, noise, rtol=1e-9, atol=1e-9 * np.abs(noise).max())
-
-
-def test_loop_is_that_of_polynomials(pair):
-    held, polynomial = pair
-    basis, w = FirBasis(2, 2), np.array([0.0, 0.02, 1.0, np.pi])
-    for kind in ("input", "output", "excitation"):
-        for channel in (None, 1):
-            powers = [
-                basis.integrals(
-                    lambda w, e=e, kind=kind, channel=channel: e.power_density(kind, w, channel),
-                    e.singularities,
-                )
-                for e in pair
-            ]
-            np.testing.assert_allclose(powers[0], powers[1], rtol=1e-9, atol=1e-9)
-    for one, other in zip(held.loop.sensitivity(w), polynomial.loop.sensitivity(w), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
-    rng = np.random.default_rng(0)
-    r, e = rng.standard_normal((2, 3, 120, 2))
-    for one, other in zip(held.loop.signals(r, e), polynomial.loop.signals(r, e), strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-10)
-    moduli = [np.sort(np.abs(experiment.loop.closed_poles)) for experiment in pair]
-    np.testing.assert_allclose(moduli[0], moduli[1][-moduli[0].size :], atol=1e-8)
-    np.testing.assert_allclose(moduli[1][: -moduli[0].size], 0.0, atol=1e-8)

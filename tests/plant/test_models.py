@@ -58,6 +58,7 @@ MODELS = {
     "late, continuous": late(0.37),
     "late entries": SampledModel(late_entries(), STEP),
     "late entries, continuous": late_entries(),
+    "integrating": SampledModel(lag_of([0.3], [1, 0.8, 0]), STEP),
     "in words": in_words(SampledModel(process(), 0.7)),
     "in words, continuous": in_words(process()),
     "partly known": known(box_jenkins(), "c1[2]", "b2[1,1]", "a1"),

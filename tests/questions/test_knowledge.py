@@ -22,9 +22,9 @@ def heater(*overrides):
     return load_spec("specs/heater.yaml", [asked, *overrides])
 
 
-def record(seed, folder):
+def record(seed, folder, periods=25, level=0.17):
     """A record of the true heater that begins at rest, and its expected excess in -2 log likelihood."""
-    u = np.tile(0.17 * ONCE, 25)
+    u = np.tile(level * ONCE, periods)
     y, late = (HEATER[0] * plainly(HEATER[1], L, u) for L in (HEATER[2], HEATER[2] + PERIOD * H))
     noise = np.sqrt(VARIANCE) * np.random.default_rng(seed).standard_normal(u.size)
     path = folder / "record.csv"
@@ -64,7 +64,7 @@ def test_the_likeliest_of_all_is_not_taken_where_the_plant_cannot_be_that(tmp_pa
 
 def test_knowledge_that_the_data_refute_rules_nothing_out(tmp_path):
     wrong = ["plant.parameters.L=100", "uncertainty={intervals: {L: [95, 105]}, scenarios: 3, fresh: 0}"]
-    path, _ = record(6, tmp_path)
+    path, _ = record(6, tmp_path, periods=12, level=0.24)
     identification = identify(heater(*wrong), path).result["identification"]
     assert "ruled_out" not in identification
     assert identification["rivals"]

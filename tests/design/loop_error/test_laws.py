@@ -8,7 +8,7 @@ from inputdesign_cli.design.loop_error import InternalModel, MinimumVariance, Mo
 from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of, weight
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
 from inputdesign_cli.design.loop_error.problem import metric
-from inputdesign_cli.plant import Rational, TransferMatrix, zero_order_hold
+from inputdesign_cli.plant import Rational, TransferMatrix
 from tests.support.loop_error import (
     GAINS,
     adjoint,
@@ -116,15 +116,6 @@ def test_internal_model_keeps_zeros_outside_and_the_delay_in_the_loop():
     np.testing.assert_allclose(law.complementary(np.zeros(1))[0, 0, 0], 1.0, rtol=1e-12)
 
 
-def test_a_zero_order_hold_of_a_lag():
-    held = zero_order_hold([1.0], [75.0, 1.0], 2.0)
-    above, below = held.numerator, held.denominator_polynomial
-    a = np.exp(-2 / 75)
-    np.testing.assert_allclose(above, [0, 1 - a], atol=1e-15)
-    np.testing.assert_allclose(below, [1, -a], atol=1e-15)
-    assert above[0] == 0.0
-
-
 def case(n, K, seed):
     rng = np.random.default_rng(seed)
     A = random_hermitian(rng, K, n)
@@ -154,7 +145,7 @@ def grid_program(A, metrics, limits, weights):
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_gap_closes_and_the_certificate_holds(n, seed):
-    A, metrics, limits, weights = case(n, 96, seed)
+    A, metrics, limits, weights = case(n, 48, seed)
     design = design_within(A, metrics, limits, weights)
     assert abs(design.gap) < 1e-10
     powers = np.einsum("pkab,kba,k->p", metrics, design.spectrum, weights).real
@@ -302,11 +293,9 @@ def test_the_spectrum_of_the_column_is_the_matrix_root_times_s2():
     np.testing.assert_allclose(S2[[1, 3]], [19.2562, 0.513421], rtol=1e-5)
 
 
-def test_the_printed_matrix_is_the_elementwise_root():
+def test_the_matrix_root_of_the_gains_of_the_column():
     K = np.linalg.inv(GAINS)
     gram = K @ K.T
-    printed = np.array([[50.86022, 50.81780], [50.81780, 50.78046]])
-    np.testing.assert_allclose(np.sqrt(gram), printed, atol=6e-6)
     root = power_of(gram[None].astype(complex), 0.5)[0].real
     np.testing.assert_allclose(root, [[36.24406924, 35.68094398], [35.68094398, 36.13206075]], rtol=1e-8)
     np.testing.assert_allclose(np.linalg.eigvalsh(root), [0.50707707, 71.86905293], rtol=1e-7)

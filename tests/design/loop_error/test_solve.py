@@ -2,6 +2,8 @@
 
 import csv
 import json
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,14 +17,18 @@ CONTROL = "accuracy.closed_loop_error.control"
 SHORT = ("experiment.samples=1000", "signal.candidates=2")
 
 
-@pytest.fixture
-def spec(request):
-    path = request.config.rootpath / "specs" / "distillation_column.yaml"
-    return lambda *overrides: load_spec(path, overrides)
+def spec(*overrides):
+    return load_spec(Path(__file__).parents[3] / "specs" / "distillation_column.yaml", overrides)
 
 
-def test_the_design_of_the_column(spec, tmp_path):
-    outcome = solve(spec(*SHORT))
+@cache
+def solved(*overrides):
+    """What is found of a short experiment; no test may change it."""
+    return solve(spec(*SHORT, *overrides))
+
+
+def test_the_design_of_the_column(tmp_path):
+    outcome = solved()
     result = outcome.result
     assert result["status"] == "optimal"
     assert result["objective"]["kind"] == "closed_loop_error"
@@ -53,7 +59,7 @@ def test_the_design_of_the_column(spec, tmp_path):
         assert (tmp_path / "run" / picture).stat().st_size > 10_000
 
 
-def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed(spec):
+def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed():
     limits = "limits={input_power: [1.2, 0.5], output_power: [0.001, 0.001]}"
     outcome = solve(spec("experiment.samples=4000", "signal.candidates=3", limits))
     u = np.array([outcome.tables["signal"].columns[f"u{i}"] for i in (1, 2)])
@@ -76,7 +82,7 @@ def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed(spec):
         (["signal={type: filtered_noise, order: 4}"], "filter"),
     ],
 )
-def test_filtered_noise_reports_its_factor(spec, overrides, kind):
+def test_filtered_noise_reports_its_factor(overrides, kind):
     signal = solve(spec("experiment.samples=1000", *overrides, "signal.candidates=2")).result["signal"]
     assert signal["type"] == "filtered_noise"
     assert kind in signal
@@ -87,8 +93,8 @@ def test_filtered_noise_reports_its_factor(spec, overrides, kind):
         assert signal["filter_value"] < 6.3e-6
 
 
-def test_the_exact_covariance_gives_lines_and_a_better_input(spec):
-    outcome = solve(spec(*SHORT, "accuracy.closed_loop_error.covariance=parametric"))
+def test_the_exact_covariance_gives_lines_and_a_better_input():
+    outcome = solved("accuracy.closed_loop_error.covariance=parametric")
     result = outcome.result
     assert result["objective"]["value"] == pytest.approx(5.204e-6, rel=1e-4)
     assert result["objective"]["relative_gap"] < 1e-6
@@ -99,24 +105,24 @@ def test_the_exact_covariance_gives_lines_and_a_better_input(spec):
     )
 
 
-def test_a_band_counts_the_error_inside_it_only(spec):
-    inside = solve(spec(*SHORT, "limits.band=[0.005, 0.5]")).result
-    whole = solve(spec(*SHORT)).result
+def test_a_band_counts_the_error_inside_it_only():
+    inside = solved("limits.band=[0.005, 0.5]").result
+    whole = solved().result
     assert inside["objective"]["value"] < whole["objective"]["value"]
     assert inside["closed_loop_error"]["band"] == pytest.approx([0.005, 0.5])
     assert sum(inside["power"]["input"]) == pytest.approx(2.0, rel=1e-9)
 
 
-def test_internal_model_with_its_filter_is_model_reference_on_a_plant_without_zeros(spec):
+def test_internal_model_with_its_filter_is_model_reference_on_a_plant_without_zeros():
     reference = "{numerator: [0, 0.3], denominator: [1, -0.7]}"
-    by_reference = solve(spec(*SHORT, f"{CONTROL}={{model_reference: {reference}}}")).result
+    by_reference = solved(f"{CONTROL}={{model_reference: {reference}}}").result
     internal = f"{CONTROL}={{internal_model: {{numerator: [0.3], denominator: [1, -0.7]}}}}"
-    by_filter = solve(spec(*SHORT, internal)).result
+    by_filter = solved(internal).result
     assert by_filter["objective"]["value"] == pytest.approx(by_reference["objective"]["value"], rel=1e-10)
     assert by_filter["closed_loop_error"]["law"] == "internal_model"
 
 
-def test_a_target_matrix_and_its_scalar_agree(spec):
+def test_a_target_matrix_and_its_scalar_agree():
     t = "[0, 0.3]"
     scalar = f"{CONTROL}={{model_reference: {{numerator: {t}, denominator: [1, -0.7]}}}}"
     matrix = f"{CONTROL}={{model_reference: {{numerator: [[{t}, [0]], [[0], {t}]], denominator: [1, -0.7]}}}}"
@@ -124,26 +130,24 @@ def test_a_target_matrix_and_its_scalar_agree(spec):
         f"{CONTROL}={{model_reference: {{continuous: {{numerator: [[[1], [0]], [[0], [1]]], "
         "denominator: [75, 1]}}}"
     )
-    values = [
-        solve(spec(*SHORT, *o)).result["objective"]["value"] for o in ([scalar], [matrix], [continuous], [])
-    ]
+    values = [solved(*o).result["objective"]["value"] for o in ([scalar], [matrix], [continuous], [])]
     assert values[0] == pytest.approx(values[1], rel=1e-10)
     assert values[2] == pytest.approx(values[3], rel=1e-10)
 
 
-def test_minimum_variance_reports_what_no_input_changes(spec):
-    result = solve(spec(*SHORT, f"{CONTROL}={{minimum_variance: true}}")).result
+def test_minimum_variance_reports_what_no_input_changes():
+    result = solved(f"{CONTROL}={{minimum_variance: true}}").result
     part = result["closed_loop_error"]["noise_model_part"]
     assert 0 < part < result["objective"]["value"]
 
 
-def test_a_continuous_time_plant_is_sampled(spec):
+def test_a_continuous_time_plant_is_sampled():
     plant = (
         "plant={continuous: {numerator: [[[0.878], [-0.864]], [[1.082], [-1.096]]], denominator: [75, 1]}, "
         "sample: zoh}"
     )
     noise = "noise={D: [1, -0.9736857494], variance: 1.0e-10}"
-    result = solve(spec(*SHORT, plant, noise)).result
+    result = solved(plant, noise).result
     loop = result["spectrum"]["loop_input"]
     np.testing.assert_allclose(
         loop["matrix"], [[2586.76231842, 2582.4486396], [2582.4486396, 2578.65557718]], rtol=1e-9
@@ -151,19 +155,19 @@ def test_a_continuous_time_plant_is_sampled(spec):
     np.testing.assert_allclose(loop["root_eigenvalues"], [0.50707707, 71.86905293], rtol=1e-7)
 
 
-def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm(spec):
+def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm():
     """S = 1 - T vanishes at pi/2 rad/sample, where C is infinite: the criterion stays finite and settles."""
     z0 = "{numerator: [0, 0.2, -0.5, 0.2, 0.5], denominator: [1]}"
     numerator = np.array([0, 0.2, -0.5, 0.2, 0.5])
     sensitivity = np.concatenate([[1.0], np.zeros(4)]) - numerator
     value = abs(np.polynomial.polynomial.polyval(np.exp(-0.5j * np.pi), sensitivity))
     assert value < 1e-12
-    result = solve(spec(*SHORT, f"{CONTROL}={{model_reference: {z0}}}")).result
+    result = solved(f"{CONTROL}={{model_reference: {z0}}}").result
     assert np.isfinite(result["objective"]["value"])
     assert result["solver"]["settled"] < 1e-10
 
 
-def test_simulate_adds_the_study(spec):
+def test_simulate_adds_the_study():
     outcome = simulate(spec("experiment.samples=1500", "signal.candidates=2", "simulation.runs=40"))
     study = outcome.result["simulation"]
     assert study["runs"] == 40
@@ -176,7 +180,7 @@ def test_simulate_adds_the_study(spec):
     assert "loss" in outcome.curves
 
 
-def test_simulate_on_a_true_system_of_its_own(spec):
+def test_simulate_on_a_true_system_of_its_own():
     """The S1 design of the paper: H without its pole in the design, with it in the true system."""
     outcome = simulate(
         spec(
@@ -200,7 +204,7 @@ def test_simulate_on_a_true_system_of_its_own(spec):
         ("relative_std", ["simulation.noise={relative_std: 0.1}"]),
     ],
 )
-def test_what_is_not_simulated_is_said(spec, words, overrides):
+def test_what_is_not_simulated_is_said(words, overrides):
     with pytest.raises(SpecError) as caught:
         simulate(spec(*overrides))
     (told,) = caught.value.diagnostics
@@ -209,7 +213,7 @@ def test_what_is_not_simulated_is_said(spec, words, overrides):
 
 
 @pytest.mark.slow
-def test_the_monte_carlo_row_of_table_i(spec):
+def test_the_monte_carlo_row_of_table_i():
     study = simulate(spec("signal.candidates=1")).result["simulation"]
     for name, mean in (("white", 0.002835), ("design", 0.002050)):
         loss = study["inputs"][name]["loss"]
