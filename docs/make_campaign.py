@@ -1,4 +1,4 @@
-"""Plays the campaign of docs/robust.md on the flexible transmission, and keeps its figure.
+"""Plays the campaign of docs/campaigns.md on the flexible transmission, and keeps its figure.
 
     python docs/make_campaign.py [DIR]
 

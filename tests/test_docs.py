@@ -36,6 +36,13 @@ def test_links_to_headings_lead_to_one(page):
     assert missing == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_table_has_a_header(page):
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    tables = re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE)
+    assert [table for table in tables if not re.match(r".*\n\|[-|]+\n", table)] == []
+
+
 def test_every_source_cited_by_key_has_an_entry():
     cited = {key for file in FILES for key in CITATION.findall(file.read_text(encoding="utf-8"))}
     assert cited <= anchors(REFERENCES)

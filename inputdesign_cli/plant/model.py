@@ -109,7 +109,7 @@ class Model(Protocol):
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest.
 
         Args:
-            step: time between samples of a plant in continuous time; others know theirs.
+            step: time between samples of a plant in continuous time; sampled plants ignore it.
         """
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:

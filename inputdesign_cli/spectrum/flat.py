@@ -62,7 +62,7 @@ class FlatBasis(DensityFamily):
         return integrate_band(source, sums, singularities, self.band)
 
     def coarser(self) -> list[FlatBasis]:
-        """Return no coarser basis."""
+        """Return an empty list, since no basis is coarser."""
         return []
 
     def first_face(self, price: Functional) -> Face:

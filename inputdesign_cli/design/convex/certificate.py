@@ -48,9 +48,9 @@ class Certificate:
 
     `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
     on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
-    the inequality is tightest (see `spectrum.Pricing`). `costs` weigh the costs of which the
-    largest is paid. `form` (m, r, r) is the price of the amplitude, a form of the
-    lags of the excitation; signals within the amplitude take at most `form_share` of it.
+    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs whose
+    maximum is minimised. `form` (m, r, r) is the price of the amplitude, a form of the lags of the
+    excitation, which is at most `form_share` for signals within the amplitude.
     """
 
     bound: float

@@ -137,10 +137,9 @@ def alternate(
 ) -> Autocorrelations:
     """Run the alternation of [eckhard-mse], Section 4.2: fix R11 and solve, fix Z and solve, repeat.
 
-    With Z = R11^-1 R12 fixed, R is generally only free to scale: for m >= 2 the shape of R11 stays as at its
-    start. It is here so that one can see that; its gap comes from the proof of the others.
-
-    A target that the present shape misses is approached by reducing the bias alone.
+    With Z = R11^-1 R12 fixed, generally only the scale of R is free: for m >= 2 the shape of R11 never
+    changes. The gap of its answer, proved as for the other methods, shows this. If the present shape misses
+    the target, the bias alone is reduced.
     """
     shape = start
     for _ in range(_MAX_ROUNDS):
