@@ -14,7 +14,7 @@ import numpy as np
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
-from inputdesign_cli.specification.fading_noise import discrete
+from inputdesign_cli.specification.fading_noise import WHITE, discrete
 from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 _DRIFTING = 0.2  # the step of a drift from one sample to the next, of the deviation of white noise
 _LASTING = r"(?:fad|chang)\w*(?: slowly)?(?: in| within)?|correlation time|lasts|slow(?:ly)?"
 _FADING = 0.2  # of the time constant of the plant: how long noise lasts of which nothing is said
-_WHITE_IN = 0.2  # samples: noise that fades faster is white
 _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
@@ -62,7 +61,8 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     level = None if text.lower() in AS_LOGGED and explored else _stated(text, folder, plant.sample_time)
     moved = moves or (level is not None and level.drifts)
     drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moved})
-    if explored is not None and (level is None or level.fades is None):
+    regressed = explored is not None and explored.plant.kind == "polynomial" and len(explored.plant.A) > 1
+    if explored is not None and (level is None or level.fades is None or regressed):  # A colours noise, too
         return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
     assert level is not None
     fades, pole, why = level.fades, level.pole, level.why
@@ -169,7 +169,7 @@ def _colour(said: Phrase, step: float) -> float | None:
     fades = said.after(_LASTING, "time")
     if fades is None:
         return None
-    if needed(fades, "noise", "the time in which it fades") < _WHITE_IN * step:
+    if needed(fades, "noise", "the time in which it fades") < WHITE * step:
         why = f"noise that fades in {short(fades)} s is white in samples {short(step)} s apart"
         raise bad_answer("noise", f'{why}: write "white"')
     return fades

@@ -157,9 +157,6 @@ def _integrating(
     below = "[time_constant, 1, 0]" if "time_constant" in values else "[1, 0]"
     delay = ", delay: dead_time" if "dead_time" in values else ""
     settings = f"Kp: {short(1.0 / (values['slope'] * _SLOWER * late))}, Ti: {short(4.0 * _SLOWER * late)}"
-    holds = (
-        f"a plant that integrates needs a controller meanwhile: PI {{{settings}}} is taken; name yours (loop)"
-    )
     return PlantAnswer(
         (
             head,
@@ -174,7 +171,7 @@ def _integrating(
         sampling=_round_step(late / 2.0),
         why_sampling="half of dead time and lag, or a little less",
         tunable=True,
-        heard=(*heard, holds.replace(": {", " {")),
+        heard=heard,
     )
 
 
