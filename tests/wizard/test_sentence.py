@@ -144,7 +144,7 @@ def test_a_range_says_what_moves_and_in_which_unit(text, found):
     ("answers", "channels"),
     [
         ({"plant": "gain 2 degC/%, time constant 180 s"}, {"u1": {"unit": "%"}, "y1": {"unit": "degC"}}),
-        ({"names": "valve in %, outlet temperature [degC]"},
+        ({"names": "valve in %, outlet temperature in degC"},
          {"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "outlet temperature", "unit": "degC"}}),
         ({}, {}),
     ],
