@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.specification.models.realisation import Signal
 from inputdesign_cli.wizard.composing import Conversation, compose
 from inputdesign_cli.wizard.grammar import Phrase
 from inputdesign_cli.wizard.plants import plant_of_words
@@ -82,6 +83,12 @@ def test_an_answer_to_one_question_is_no_sentence(text):
     assert in_sentence(text) == {}
 
 
+def test_a_log_may_stand_in_a_sentence():
+    found = in_sentence("PI loop with 6 dB, log a.csv columns u=OP [%], y=PV, valve 45 +- 8 %")
+    assert found["plant"] == "log a.csv columns u=OP [%], y=PV"
+    assert set(found) == {"wish", "plant", "range"}
+
+
 def test_a_clause_that_answers_nothing_is_not_lost():
     with pytest.raises(SpecError, match="the moon is full"):
         in_sentence(EXCHANGER + " The moon is full.".lower())
@@ -153,6 +160,11 @@ def test_channels_have_the_names_and_units_that_were_said(answers, channels, tmp
     spec = compose(ENGINEER | {"plant": "gain 2, time constant 180 s"} | answers, "x", tmp_path).spec()
     found = {name: one.model_dump(exclude_none=True) for name, one in (spec.channels or {}).items()}
     assert found == channels
+
+
+def test_a_record_that_is_to_return_says_so(tmp_path):
+    draft = compose(ENGINEER | {"return": "yes"}, "x", tmp_path)
+    assert ("return: true" in draft.text) == ("return" in Signal.model_fields)
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 3.0])
