@@ -187,7 +187,7 @@ def asked(one, step, estimate, values):
 
 def measure(name, runs):
     one, rng = TEMPLATES[name], np.random.default_rng(5)
-    answers = {"plant": name, **one.answers, "noise": f"standard deviation {one.answers['noise']}"}
+    answers = {"plant": name, **one.answers, "noise": f"standard deviation {one.answers['noise']}, white"}
     spec = compose(answers, "x", Path()).spec()
     changes = {"solver.any_spectrum": False, "signal.candidates": 1}
     if spec.uncertainty is not None:

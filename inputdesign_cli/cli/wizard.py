@@ -138,7 +138,7 @@ def _piped(asks: str) -> str | None:
     """Return the next line of stdin, or None at its end."""
     line = ""
     with suppress(OSError, ValueError):  # it is closed, or no text
-        line = sys.stdin.readline() if sys.stdin is not None else ""
+        line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
         typer.echo(f"{asks} {line.strip()}", err=True)
     return line.strip() if line else None

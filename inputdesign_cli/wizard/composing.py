@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -46,6 +47,8 @@ _ORDERS, _LINES = (20, 40), (60, 120, 240)
 _ENOUGH = 1.02  # of the bound over every spectrum
 _LEAST_GAP = 1e-3  # smaller gaps are written as this
 _RETURNS = "return" in Signal.model_fields  # records can end at the operating point
+_POSITIONS = 10  # the fewest of an input that keeps them
+_PERIODS = 5  # of a record for a Bode plot
 _BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
 
 Solve = Callable[[Spec], Result]
@@ -115,17 +118,33 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     if there < LEAST * step:
         short_of = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
         raise bad_answer("time", short_of)
+    hold = dwell(said["hold"], step)
     duration = min(there, _MOST * step)
     control = controller(said["loop"], plant)
     asked = wished(said["wish"], plant, control is not None, duration)
     # Lines of a response are one over the time apart: it takes all of it.
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"])
-    made, hold = asking.chosen("signals", said["signals"], _TYPES), dwell(said["hold"], step)
+    duration = there if nonparametric else duration
+    if hold > 1:  # a record holds whole positions
+        whole = hold * step * (_PERIODS if nonparametric else 1)
+        duration = whole * math.floor(duration / whole * (1.0 + 1e-9))
+        if duration < _POSITIONS * hold * step:
+            raise bad_answer(
+                "hold", f"in the time that there is, the input has less than {_POSITIONS} positions"
+            )
+    made = asking.chosen("signals", said["signals"], _TYPES)
+    two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
     unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
+    heard = list(plant.heard)
+    if "slope" in plant.values and control is not None and control == plant.controller:
+        heard.append(
+            f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"
+        )
     facts = {
         "said": said,
         "plant": plant,
+        "heard": heard,
         "why_sampling": why,
         "noise": noise_lines(said["noise"], said["drift"], folder, plant),
         "unused": _UNUSED * unused,
@@ -134,10 +153,11 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "span": span,
         "rate": rate,
         "output": output,
-        "duration": there if nonparametric else duration,
+        "duration": duration,
+        "periods": _PERIODS,
         "there": there,
         "most": _MOST,
-        "made": "binary" if made == "multisine" and hold > 1 and control is None else made,
+        "made": "binary" if two_levels else made,
         "converter": quantisation(said["converter"], span),
         "hold": hold,
         "returns": asking.chosen("return", said["return"], {"yes": _RETURNS, "no": False}),
@@ -145,7 +165,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
     spectrum = None if nonparametric else "{type: fir, order: 20}"
-    notes = (*plant.heard, *against, *[_UNUSED] * unused)
+    notes = (*heard, *against, *[_UNUSED] * unused)
     return Draft(facts, plant.files, spectrum, folder, said, there, notes)
 
 

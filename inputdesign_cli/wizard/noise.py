@@ -8,24 +8,20 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
-from inputdesign_cli.specification.fading_noise import discrete
+from inputdesign_cli.specification.fading_noise import WHITE, discrete
 from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
-if TYPE_CHECKING:
-    from inputdesign_cli.records.sheet import Sheet
-
 _DRIFTING = 0.2  # the step of a drift from one sample to the next, of the deviation of white noise
 _LASTING = r"(?:fad|chang)\w*(?: slowly)?(?: in| within)?|correlation time|lasts|slow(?:ly)?"
 _FADING = 0.2  # of the time constant of the plant: how long noise lasts of which nothing is said
-_WHITE_IN = 0.2  # samples: noise that fades faster is white
 _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
@@ -62,7 +58,8 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     level = None if text.lower() in AS_LOGGED and explored else _stated(text, folder, plant.sample_time)
     moved = moves or (level is not None and level.drifts)
     drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moved})
-    if explored is not None and (level is None or level.fades is None):
+    regressed = explored is not None and explored.plant.kind == "polynomial" and len(explored.plant.A) > 1
+    if explored is not None and (level is None or level.fades is None or regressed):  # A colours noise, too
         return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
     assert level is not None
     fades, pole, why = level.fades, level.pole, level.why
@@ -143,7 +140,15 @@ def _stated(text: str, folder: Path, step: float) -> _Level:
     if rests := re.fullmatch(r"(?:rest|as in)\s+(.*)", text, re.I):
         return _at_rest(folder / rests[1].strip(), step)
     said = Phrase(text, "noise")
-    fades, drifts = _colour(said, step), said.take(r"\bdrift\w*") is not None
+    white, drifts = said.take(r"\bwhite\b") is not None, said.take(r"\bdrift\w*") is not None
+    fades = 0.0 if white else said.after(_LASTING, "time")
+    if (
+        fades is not None
+        and not white
+        and needed(fades, "noise", "the time in which it fades") < WHITE * step
+    ):
+        why = f"noise that fades in {short(fades)} s is white in samples {short(step)} s apart"
+        raise bad_answer("noise", f'{why}: write "white"')
     rounding = _resolution(said)
     deviation = said.after("standard deviation|deviation|std|noise", named=True)
     if deviation is None and not re.fullmatch(rf"\s*{NUMBER}\s*", text):
@@ -153,26 +158,15 @@ def _stated(text: str, folder: Path, step: float) -> _Level:
     if not sizes:
         raise bad_answer("noise", "it does not say a standard deviation or a resolution")
     said.finish("that which it noise has slow slowly")
-    why = [f"standard deviation {short(deviation)}"] if deviation is not None else []
+    because = [f"standard deviation {short(deviation)}"] if deviation is not None else []
     if rounding is not None:
-        least = "" if why else ": the least that noise can be"
-        why.append(f"rounding to {short(rounding)} has a variance of its square over 12{least}")
+        least = "" if because else ": the least that noise can be"
+        because.append(f"rounding to {short(rounding)} has a variance of its square over 12{least}")
     size = math.hypot(deviation or 0.0, (rounding or 0.0) / math.sqrt(12.0))
     guessed = fades is None and deviation is not None
-    return _Level(size, "; ".join(why), fades, guessed=guessed, rounded=rounding is not None, drifts=drifts)
-
-
-def _colour(said: Phrase, step: float) -> float | None:
-    """Return the seconds in which noise fades, 0 if it is white; None if the answer leaves it open."""
-    if said.take(r"\bwhite\b") is not None:
-        return 0.0
-    fades = said.after(_LASTING, "time")
-    if fades is None:
-        return None
-    if needed(fades, "noise", "the time in which it fades") < _WHITE_IN * step:
-        why = f"noise that fades in {short(fades)} s is white in samples {short(step)} s apart"
-        raise bad_answer("noise", f'{why}: write "white"')
-    return fades
+    return _Level(
+        size, "; ".join(because), fades, guessed=guessed, rounded=rounding is not None, drifts=drifts
+    )
 
 
 def _resolution(said: Phrase) -> float | None:
@@ -196,13 +190,19 @@ def _at_rest(path: Path, step: float) -> _Level:
     """
     from inputdesign_cli.questions.building.tables import read_samples
     from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
 
     file_of("noise", path)
     with in_their_words({}, "noise"):
         sheet = read_sheet(path, key="noise")
         wanted = {"y": "y"} | {name: name for name in sheet.header if name.lower() in ("u", "u1")}
-        found, apart = read_samples(path, wanted, key="noise"), _seconds_apart(sheet) or step
-    y = found.pop("y")
+        found, apart = read_samples(path, wanted, key="noise"), 0.0
+        for name in time_columns(sheet)[:1]:
+            unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
+            apart = (
+                float(np.median(np.diff(columns_of(sheet, {"time": name})["time"]))) * SCALES["time"][unit]
+            )
+    y, apart = found.pop("y"), apart if apart > 0.0 else step
     if any(np.ptp(u) > 0.0 for u in found.values()):
         raise bad_answer("noise", f'u in {path.name} moves: name its plant, too, as "log {path.name}"')
     if y.size < _FEWEST:
@@ -219,15 +219,3 @@ def _at_rest(path: Path, step: float) -> _Level:
     pole = min(rho if same else max(rho, 0.0) ** (step / apart), _STRONGEST)
     why = f"{seen}, correlation {rho:.2g} from one to the next"
     return _Level(math.sqrt(power), why, pole=pole)
-
-
-def _seconds_apart(sheet: Sheet) -> float | None:
-    """Return the time between the rows of a file; None without a column of times that grow."""
-    from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
-
-    name = next(iter(time_columns(sheet)), None)
-    if name is None:
-        return None
-    unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
-    apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"]))) * SCALES["time"][unit]
-    return apart if apart > 0.0 else None

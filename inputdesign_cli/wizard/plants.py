@@ -6,21 +6,20 @@ What cannot be used is a SpecError `bad-answer`, or a DataError about a file.
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification import Spec
-from inputdesign_cli.wizard.grammar import ABOUT, LARGEST, VAGUE, Phrase, needed, short
+from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification.models import fields
+from inputdesign_cli.wizard.grammar import ABOUT, VAGUE, Phrase, needed, short
 from inputdesign_cli.wizard.questions import bad_answer, file_of, in_their_words, package_data
 
 if TYPE_CHECKING:
@@ -35,6 +34,7 @@ _QUANTITIES = {
     "dead_time": ("dead time|delay", "time"),
 }
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
+_SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
 _NEARLY = 2.0  # points of fit that a model may lose which rules of tuning know
 _LEAST_ROWS = 10  # of a step response
 _LONGER = 2.0  # a time constant of more records than this is none
@@ -62,7 +62,7 @@ class PlantAnswer:
     tunable: bool = False  # whether rules of tuning know it
     channels: int = 1  # the larger number of its inputs and outputs
     explored: Spec | None = None  # the model of a log, which has its noise
-    called: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # channels: names and units in a log
+    called: Mapping[str, str] = field(default_factory=dict)  # names of channels in a log
     source: str = ""  # the name of the data file
     against: tuple[str, ...] = ()  # what the data say against the model, a sentence each
     heard: tuple[str, ...] = ()  # how the answer was taken, a sentence each
@@ -125,12 +125,13 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     if values.get("dead_time", 0.0) < 0.0:
         raise bad_answer("plant", "the dead time is negative")
     values = {name: value for name, value in values.items() if value}
-    if part is None and len(own) == 1 and list(own) == list(values)[-1:]:
+    vague = [name for name in values if name not in own and (whole or found[name][2])]
+    if part is None and len(own) == 1 and list(own) == list(values)[-1:] and not vague:
         part, own = own.popitem()[1], {}  # a share at the end is that of all quantities
     shares = own if part is None else dict.fromkeys(values, part) | own
     if not all(0.0 < share < 0.9 for share in shares.values()):
         raise bad_answer("plant", "within must be more than 0 and less than 90 %")
-    vague = [name for name in values if name not in shares and (whole or found[name][2])]
+    vague = [name for name in vague if name not in shares]
     around = _around(values, shares | dict.fromkeys(vague, VAGUE))
     ends = (
         f"{name.replace('_', ' ')} {short(around[name][0])} to {short(around[name][1])}" for name in vague
@@ -157,9 +158,6 @@ def _integrating(
     below = "[time_constant, 1, 0]" if "time_constant" in values else "[1, 0]"
     delay = ", delay: dead_time" if "dead_time" in values else ""
     settings = f"Kp: {short(1.0 / (values['slope'] * _SLOWER * late))}, Ti: {short(4.0 * _SLOWER * late)}"
-    holds = (
-        f"a plant that integrates needs a controller meanwhile: PI {{{settings}}} is taken; name yours (loop)"
-    )
     return PlantAnswer(
         (
             head,
@@ -174,7 +172,7 @@ def _integrating(
         sampling=_round_step(late / 2.0),
         why_sampling="half of dead time and lag, or a little less",
         tunable=True,
-        heard=(*heard, holds.replace(": {", " {")),
+        heard=heard,
     )
 
 
@@ -201,66 +199,44 @@ def _template(
 TEMPLATES = {name: _template(name, **entry) for name, entry in package_data("known_plants.yaml").items()}
 
 
-_Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]  # NaN is in no interval
-
-
-class System(BaseModel):
-    """Holds a system of python-control as JSON describes it."""
-
-    model_config = ConfigDict(extra="forbid")
-    num: list[_Number]
-    den: list[_Number]
-    delay: _Number = 0.0
-    dt: object = None
-
-
 def system_of(path: Path) -> PlantAnswer:
     """Return the plant of a JSON file with num and den in s, and a delay."""
     try:
-        found = System.model_validate(json.loads(read_regular(path)))
+        found = json.loads(read_regular(path))
     except (OSError, ValueError, RecursionError) as error:
-        why = str(error)
-        if isinstance(error, ValidationError):
-            first = error.errors()[0]
-            why = ": ".join(filter(None, (".".join(map(str, first["loc"])), first["msg"])))
-        why = f'{path.name} does not hold {{"num": [2], "den": [180, 1], "delay": 25}} or the like: {why}'
-        raise DataError(bad_answer("plant", why).diagnostics) from None
-    num, den = (np.trim_zeros(part, "f") for part in (found.num, found.den))
-    _refuse(
-        {
-            f"the system of {path.name} is sampled (dt), and is to be in s": bool(found.dt),
-            f"num of {path.name} is zero": not num,
-            f"den of {path.name} is zero": not den,
-            f"num of {path.name} has more entries than den": len(num) > len(den),
-            f"the delay in {path.name} is negative": found.delay < 0.0,
-        }
-    )
+        raise DataError(bad_answer("plant", f"{path.name} is not JSON: {error}").diagnostics) from None
+    parts = [found.get("num"), found.get("den")] if isinstance(found, dict) else []
+    if not parts or not all(fields.depth(part) == 1 for part in parts) or found.keys() - _SYSTEM:
+        why = f'{path.name} does not hold {{"num": [2], "den": [180, 1], "delay": 25}} or the like'
+        raise bad_answer("plant", why)
+    if found.get("dt"):
+        raise bad_answer("plant", f"the system of {path.name} is sampled (dt), and is to be in s")
+    num, den = (np.trim_zeros(part, "f") or part for part in parts)
+    late = found.get("delay", 0.0)
+    with in_their_words({}, "plant"):  # it says what no plant can have
+        continuous = {"numerator": num, "denominator": den, "delay": late}
+        Spec.from_dict({"plant": {"continuous": continuous, "sample": "zoh"}}, design=False)
     while num[-1] == den[-1] == 0.0:  # a zero at zero that cancels a pole
         num, den = num[:-1], den[:-1]
     integrates, poles = den[-1] == 0.0, np.roots(den)
     decays = -poles.real[poles.real < 0]
-    if not decays.size and not (integrates and found.delay):
+    if not decays.size and not (integrates and late):
         hint = ': write its dead time ("delay": 5), however small, or the lag of its actuator into den'
         why = f"the system of {path.name} has no stable pole, which would show how fast it is to be sampled"
         raise bad_answer("plant", why + hint * integrates)
-    delay = f", delay: {short(found.delay)}" if found.delay else ""
+    delay = f", delay: {short(late)}" if late else ""
     values: Mapping[str, float] = {}
     lines = [f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}"]
     if integrates:
-        values, lines = _named(num, den, found.delay)
+        values, lines = _named(num, den, late)
     return PlantAnswer(
         (f"plant:  # from {path.name}", *lines, "  sample: zoh"),
-        float(1.0 / decays.min()) if decays.size else found.delay,
+        float(1.0 / decays.min()) if decays.size else late,
         values=values,
-        sampling=None if decays.size else _round_step(found.delay / 2.0),
+        sampling=None if decays.size else _round_step(late / 2.0),
         why_sampling="half the dead time, or a little less, for it has no time constant",
         tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
     )
-
-
-def _refuse(faults: Mapping[str, bool]) -> None:
-    if fault := next((text for text, holds in faults.items() if holds), None):
-        raise bad_answer("plant", fault)
 
 
 def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dict[str, float], list[str]]:
@@ -282,7 +258,7 @@ def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dic
 
 def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     """Estimate gain, time constant and dead time from a record that begins at rest."""
-    from inputdesign_cli import parse_spec, questions
+    from inputdesign_cli import questions
     from inputdesign_cli.questions.building.tables import read_columns
     from inputdesign_cli.records import Preparation
 
@@ -294,13 +270,13 @@ def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     begun, last = int(np.argmax(moved > 0.5 * np.max(moved))), slice(-max(t.size // 20, 1), None)
     moves, answers = float(np.mean(u[last] - u[0])), float(np.mean(y[last]) - y[0])
     strays = abs(moves) < 0.5 * np.max(moved)
-    _refuse(
-        {
-            f"the input in {path.name} does not step": not np.any(moved) or begun + 5 >= t.size,
-            f"the input in {path.name} does not stay where it has stepped to": bool(strays),
-            f"the output in {path.name} does not answer the step": not answers,
-        }
-    )
+    for fault, holds in (
+        (f"the input in {path.name} does not step", not np.any(moved) or begun + 5 >= t.size),
+        (f"the input in {path.name} does not stay where it has stepped to", strays),
+        (f"the output in {path.name} does not answer the step", not answers),
+    ):
+        if holds:
+            raise bad_answer("plant", fault)
     rise = (y - y[0]) / answers
     late, slow = (max(float(t[int(np.argmax(rise > part))] - t[begun]), step) for part in (0.05, 0.632))
     start = f"gain: {answers / moves!r}, time_constant: {slow!r}, dead_time: {late!r}"
@@ -336,8 +312,7 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
 
     A gain, a lag and a dead time, which rules of tuning know, are taken where they do nearly as well.
     """
-    from inputdesign_cli import parse_spec, questions
-    from inputdesign_cli.questions.building.controllers import process_of
+    from inputdesign_cli import questions
     from inputdesign_cli.records import Preparation
 
     named, name = Preparation(columns=columns), f"{stem}-model.yaml"
@@ -346,26 +321,18 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         why = "; ".join(found.reasons) or "no model deserves trust"
         raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
 
-    def read(one: Exploration) -> tuple[Spec, int, bool]:
-        spec = parse_spec(one.results.files["model.yaml"].decode(), name, design=False)
-        assert spec.plant.kind != "regression"
-        try:
-            process_of(spec)
-        except SpecError:
-            return spec, max(spec.plant.inputs, spec.plant.outputs), False
-        return spec, max(spec.plant.inputs, spec.plant.outputs), True
-
-    heard: tuple[str, ...] = ()
-    spec, channels, tunable = read(found)
+    spec, tunable = _read(found, name)
+    assert spec.plant.kind != "regression"
+    channels, heard = max(spec.plant.inputs, spec.plant.outputs), ""
     if channels == 1 and not tunable:
         simple = questions.explore([path], named, structure="fopdt")
-        if "model.yaml" in simple.results.files and not simple.reasons and _as_good(simple, found):
-            found, (spec, channels, tunable) = simple, read(simple)
-            heard = (f"another structure fits {path.name} a little better than gain, lag and dead time do",)
+        fits = [
+            one.results.result.get("validation", {}).get("simulation_fit_percent") for one in (simple, found)
+        ]
+        if "model.yaml" in simple.results.files and not simple.reasons and fits[0] >= fits[1] - _NEARLY:
+            found, (spec, tunable) = simple, _read(simple, name)
+            heard = f"another structure fits {path.name} a little better than gain, lag and dead time do"
     text = found.results.files["model.yaml"].decode()
-    shown = {
-        channel: re.match(r"(.*?)\s*(?:[\[(](.*)[\])])?$", header) for channel, header in columns.items()
-    }
     return PlantAnswer(
         (f"include: [{name}]  # the plant, explored in {path.name}",),
         20.0 * spec.sample_time,
@@ -375,19 +342,20 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         tunable=tunable,
         channels=channels,
         explored=spec,
-        called={
-            channel: (one[1], one[2] or "") for channel, one in shown.items() if one and channel != "time"
-        },
+        called={channel: header for channel, header in columns.items() if channel != "time"},
         source=path.name,
         against=found.against,
-        heard=heard,
+        heard=(heard,) if heard else (),
     )
 
 
-def _as_good(simple: Exploration, best: Exploration) -> bool:
-    """Return whether a model simulates and predicts the data that judge nearly as well as the best."""
-    fits = [one.results.result.get("validation") or {} for one in (simple, best)]
-    return all(
-        key in fits[1] and fits[0].get(key, -math.inf) >= fits[1][key] - _NEARLY
-        for key in ("simulation_fit_percent", "prediction_fit_percent")
-    )
+def _read(found: Exploration, name: str) -> tuple[Spec, bool]:
+    """Return the model of an exploration as a spec, and whether rules of tuning know its plant."""
+    from inputdesign_cli.questions.building.controllers import process_of
+
+    spec = parse_spec(found.results.files["model.yaml"].decode(), name, design=False)
+    try:
+        process_of(spec)
+    except SpecError:
+        return spec, False
+    return spec, True

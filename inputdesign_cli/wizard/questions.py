@@ -39,6 +39,7 @@ KEYS = tuple(question.key for question in QUESTIONS)
 _FAULTS = package_data("faults.yaml")
 _ALL = f"the questions are {', '.join(KEYS)}"
 AS_LOGGED = ("as the log", "as in the log", "as in this log")
+_COLUMNS = re.compile(r'--columns "([^"]*)"')
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 
 
@@ -211,6 +212,8 @@ def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     elif one.code == "too-few-lines":
         enough = _LONG_ENOUGH.search(one.hint)
         remedy = f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
+    elif asked.key == "plant" and (named := _COLUMNS.search(one.hint)):
+        remedy = f"write behind the file: columns {named[1]}"
     elif one.code == "infinite-information" and asked.key != "loop":  # a controller holds it already
         remedy = ""
     hint = "; ".join(filter(None, (remedy, f"allowed: {asked.allowed}")))

@@ -9,9 +9,9 @@ from inputdesign_cli.wizard.questions import bad_answer
 
 # The question that a clause answers: the first of which it has a word.
 _WORDS = {
-    "wish": r"\b(?:loop|predict\w*|parameters?|bode|frequency response)\b",
+    "wish": r"\b(?:loop|margin|Kp|Ti|Td|predict\w*|parameters?|bode|frequency response)\b",
     "noise": r"\b(?:nois\w*|fad\w*|white|drift\w*|standard deviation|std|sensor|lasts)\b|\brest \S+\.\w+",
-    "plant": r"\b(?:gain|time constant|dead time|delay|lag|integrat\w*|each)\b|\b(?:step|log) \S+\.\w+",
+    "plant": r"\b(?:gain|time constant|dead time|delay|lag|integrat\w*|each)\b",
     "hold": r"\b(?:keeps?|holds?|dwell\w*|at least|shortest)\b",
     "converter": r"\b(?:steps?|bits|resolution)\b",
     "return": r"\b(?:returns?|back|ends? where)\b",
@@ -21,6 +21,7 @@ _WORDS = {
 }
 # What is taken of a clause where it is not all.
 _PART = {"hold": AMOUNT, "time": AMOUNT, "converter": r"(?:\b\d+ bits|\bsteps?|\bresolution)\b.*"}
+_FILE = re.compile(r"\s*(?:(?:time|[uy]\d*)\s*=|(?:step|log)\s+\S*\.\w)", re.I)  # and its columns
 _LASTS = re.compile(rf"\s*\b(?:for|in|within|during)\s+({AMOUNT})\s*$", re.I)
 _ENDS = re.compile(r"([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 
@@ -34,7 +35,8 @@ def in_sentence(text: str) -> dict[str, str]:
     found: dict[str, list[str]] = {}
     pieces, unread = _ENDS.split(text.strip()), []
     for clause, end in zip(pieces[::2], [*pieces[1::2], ""], strict=True):
-        key = next((key for key, words in _WORDS.items() if re.search(words, clause, re.I)), None)
+        words = _WORDS if not _FILE.match(clause) else {"plant": ""}
+        key = next((key for key, known in words.items() if re.search(known, clause, re.I)), None)
         lasts = _LASTS.search(clause) if key in ("wish", "range") else None
         if lasts is not None:
             clause = clause[: lasts.start()]

@@ -72,18 +72,16 @@ def input_range(text: str) -> Range:
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
     """Return names and units of the channels: as told, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
-    text = said["names"]
-    if text.lower() != "as said":
-        parts = [
-            re.match(r"(.*?)(?:\s+in\s+(.*)|\s*[\[(](.*)[\])])?$", one.strip()) for one in text.split(",")
-        ]
-        if len(parts) != len(names) or not all(one and one[1] for one in parts):
-            raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
-        told = {name: (one[1], one[2] or one[3] or "") for name, one in zip(names, parts, strict=True) if one}
-    else:
+    if said["names"].lower() == "as said":
         ratio = re.search(rf"\bgain\b\D*{NUMBER}\s*(\S+)/([^\s,;/]+)", said["plant"])
         output, unit = (ratio[2].strip("()"), ratio[3]) if ratio else ("", "")
-        told = {"u1": (span.name, span.unit or unit), "y1": ("", output)} | dict(plant.called)
+        told = {"u1": (span.name, span.unit or unit), "y1": ("", output)}
+        told |= {channel: (header, "") for channel, header in plant.called.items()}
+    else:
+        parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
+        if len(parts) != len(names) or not all(name for name, _, _ in parts):
+            raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
+        told = {name: (called, unit.strip()) for name, (called, _, unit) in zip(names, parts, strict=True)}
     rows = {name: {"name": called, "unit": unit} for name, (called, unit) in told.items()}
     return {name: kept for name, row in rows.items() if (kept := {k: v for k, v in row.items() if v})}
 

@@ -1,5 +1,6 @@
 """`idesign wizard`, without a terminal and in one, and with answers in a file."""
 
+import io
 import os
 import pty
 import re
@@ -130,6 +131,32 @@ def test_answers_make_a_spec_that_is_accepted(run, tmp_path):
     assert (code, "output-exists" in err) == (2, True)
     code, _, err = run("wizard", *options, "-o", "other.yaml", "--answer", "time=soon")
     assert (code, "bad-answer" in err, "How much time" in err) == (2, True, True)
+
+
+SENTENCE = (
+    "Own loop with 6 dB, Kp 1.5, Ti 180; gain 2 degC/%, time constant 180 s, dead time 25 s, "
+    "valve 40 +- 5 %, 20 min, noise of 0.1 degC, white"
+)
+
+
+def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
+    """A line that is not understood is asked for again; the rest has its default where the lines end."""
+    monkeypatch.setattr("sys.stdin", io.StringIO("soon\n1 min\nsteps of 0.1\n"))
+    code, out, err = run("wizard", SENTENCE, "-o", "mine.yaml")
+    assert (code, err.count("error[bad-answer]")) == (0, 1)
+    assert "How long must the actuator keep each position? (Enter: no) 1 min" in err
+    assert "mine.yaml: written" in out
+    written = yaml.safe_load((tmp_path / "mine.yaml").read_text())
+    assert written["channels"] == {"u1": {"name": "valve", "unit": "%"}, "y1": {"unit": "degC"}}
+    assert (written["signal"]["hold"], written["limits"]["duration"]) == (12, 1200)
+    assert written["signal"]["quantisation"] == {"bits": 10, "range": 51.2}
+    assert run("validate", "mine.yaml")[0] == 0
+
+
+def test_lines_that_end_too_early_are_told(run, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("gain 2, time constant 180 s\n"))
+    code, _, err = run("wizard")
+    assert (code, "(wish): there is no answer" in err) == (2, True)
 
 
 def test_a_trade_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):

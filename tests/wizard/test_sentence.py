@@ -1,0 +1,221 @@
+"""From one sentence to a spec: what is heard, said back, asked beyond it, and asked again."""
+
+import re
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.specification.models.realisation import Signal
+from inputdesign_cli.wizard.composing import Conversation, compose
+from inputdesign_cli.wizard.grammar import Phrase
+from inputdesign_cli.wizard.plants import plant_of_words
+from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
+from inputdesign_cli.wizard.sentence import in_sentence
+from inputdesign_cli.wizard.wishes import input_range
+from tests.support.wishes import ENGINEER
+
+EXCHANGER = (
+    "I want a PI loop with a safe margin for a heat exchanger: gain about 1.72 degC/%, "
+    "time constant about 262 s, dead time 31 s, noise of 0.1 degC that fades in a minute, "
+    "valve 45 +- 8 %, one shift."
+)
+MOTOR = (
+    "PI loop with 6 dB for a motor with friction: gain about 10 (rad/s)/V, time constant about 0.5 s, "
+    "dead time about 0.02 s; the voltage may move +-5 V around 10 V for 20 s; noise 1 rad/s, white"
+)
+TANK = (
+    "PI loop with a safe margin for a tank level: it integrates about 1.2 %/min per %, "
+    "dead time about 10 s, the valve may move +-10 around 50 %, one hour, noise 0.2 %, fades in 5 s"
+)
+ROOM = (
+    "Predict the room temperature within 5 % up to 0.001 rad/s; radiator valve 50 +- 20 %, "
+    "gain about 0.15 degC/%, time constant about 3 h, dead time about 10 min, two days, "
+    "noise 0.05 degC that fades in half an hour"
+)
+
+
+def heard(sentence, folder, *more):
+    """The draft after a sentence and the answers to what is asked beyond it."""
+    talk = Conversation({}, "x", folder)
+    for text in (sentence, *more):
+        assert talk.answer(text) is None
+    assert talk.question is None
+    return talk.draft
+
+
+@pytest.mark.parametrize(
+    ("sentence", "facts"),
+    [
+        (EXCHANGER, {"gain": 1.72, "offset": 45, "amplitude": 8, "duration": 28800, "correlation_time": 60,
+                     "max_sensitivity_db": 6, "hold": 6, "sample_time": 10}),
+        (MOTOR, {"gain": 10, "offset": 10, "amplitude": 5, "duration": 20, "variance": 1}),
+        (TANK, {"slope": 0.02, "offset": 50, "duration": 3600, "standard_deviation": 0.2,
+                "correlation_time": 5}),
+        (ROOM, {"time_constant": 10800, "dead_time": 600, "amplitude": 20, "correlation_time": 1800,
+                "relative": 0.05}),
+    ],
+)  # fmt: skip
+def test_a_sentence_and_three_answers_are_a_spec(sentence, facts, tmp_path):
+    """The fastest plant cannot wait a minute."""
+    draft = heard(sentence, tmp_path, "no" if sentence is MOTOR else "1 min", "steps of 0.1", "no")
+    for name, value in facts.items():
+        assert float(re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", draft.text)[1]) == pytest.approx(value), name
+    assert parse_spec(draft.text).uncertainty.intervals
+    assert "about" in draft.notes[0]
+
+
+def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
+    talk = Conversation({}, "x", tmp_path)
+    assert talk.answer(EXCHANGER.replace("valve 45 +- 8 %, ", "")) is None
+    asked = []
+    while talk.question is not None:
+        asked.append(talk.question.key)
+        assert talk.answer({"range": "40 +- 5"}.get(asked[-1], "no")) is None
+    assert asked == ["range", "hold", "converter", "return"]
+
+
+@pytest.mark.parametrize(
+    "text", ["gain 2, time constant 180 s, dead time 25 s, each within 30 %", "heater", ""]
+)
+def test_an_answer_to_one_question_is_no_sentence(text):
+    assert in_sentence(text) == {}
+
+
+def test_a_log_may_stand_in_a_sentence():
+    found = in_sentence("PI loop with 6 dB, log a.csv columns u=OP [%], y=PV, valve 45 +- 8 %")
+    assert found["plant"] == "log a.csv columns u=OP [%], y=PV"
+    assert set(found) == {"wish", "plant", "range"}
+
+
+def test_a_clause_that_answers_nothing_is_not_lost():
+    with pytest.raises(SpecError, match="the moon is full"):
+        in_sentence(EXCHANGER + " The moon is full.".lower())
+
+
+def test_a_sentence_stands_behind_other_answers_and_has_their_place(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text(f'time: 2 h\nplant: "{EXCHANGER}"\n')
+    said = read_answers(file)
+    assert said.spread()
+    assert (said.texts["time"], said.texts["range"]) == ("2 h", "valve 45 +- 8 %")
+    assert said.places["range"].line == 2
+
+
+@pytest.mark.parametrize("word", ["about", "roughly", "circa", "ca.", "~", "approximately"])
+def test_about_is_within_a_fifth_and_said_back(word):
+    plant = plant_of_words(f"dead time {word} 35 s within 10 %, gain {word} 1.6, time constant 240 s")
+    assert plant.intervals == {"gain": pytest.approx((1.28, 1.92)), "dead_time": pytest.approx((31.5, 38.5))}
+    (said,) = plant.heard
+    assert "gain 1.28 to 1.92" in said
+    assert "dead time" not in said
+    assert plant_of_words(f"gain {word} 1.6, time constant 9, each within 5 %").heard == ()
+
+
+def test_a_plant_that_integrates_is_held_by_a_stable_loop(tmp_path):
+    """1/(1 + C G) of Skogestad's settings has a peak below 6 dB, evaluated in continuous time."""
+    answers = ENGINEER | {"plant": "integrates 1.2 %/min per %, dead time 10 s", "time": "1 h"}
+    spec = compose(answers, "x", tmp_path).spec()
+    pid = spec.experiment.controller.pid
+    s = 1j * np.geomspace(1e-4, 3, 3000)
+    loop = pid.Kp * (1 + 1 / (pid.Ti * s)) * 0.02 / s * np.exp(-10 * s)
+    assert np.max(1 / np.abs(1 + loop)) < 2.0
+    open_loop = compose(answers | {"loop": "PI Kp 1, Ti 300"}, "x", tmp_path)
+    assert not any("controller" in note for note in open_loop.notes)
+    for wrong in (
+        "integrates 0.02",
+        "integrates 0, dead time 5 s",
+        "gain 2, integrates 3, time constant 9 s",
+    ):
+        with pytest.raises(SpecError):
+            plant_of_words(wrong)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("valve 45 +- 8 %", (8, 45, "valve", "%")),
+        ("may move +-8", (8, 0, "", "")),
+        ("the steam valve may move by 8 % around 45 %", (8, 45, "steam valve", "%")),
+        ("heater from 35 V to 45 V", (5, 40, "heater", "V")),
+        ("the input may be moved ±8 around 45", (8, 45, "", "")),
+    ],
+)
+def test_a_range_says_what_moves_and_in_which_unit(text, found):
+    span = input_range(text)
+    assert (span.amplitude, span.offset, span.name, span.unit) == found
+
+
+@pytest.mark.parametrize(
+    ("answers", "channels"),
+    [
+        ({"plant": "gain 2 degC/%, time constant 180 s"}, {"u1": {"unit": "%"}, "y1": {"unit": "degC"}}),
+        ({"names": "valve in %, outlet temperature in degC"},
+         {"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "outlet temperature", "unit": "degC"}}),
+        ({}, {}),
+    ],
+)  # fmt: skip
+def test_channels_have_the_names_and_units_that_were_said(answers, channels, tmp_path):
+    spec = compose(ENGINEER | {"plant": "gain 2, time constant 180 s"} | answers, "x", tmp_path).spec()
+    found = {name: one.model_dump(exclude_none=True) for name, one in (spec.channels or {}).items()}
+    assert found == channels
+
+
+def test_a_record_that_is_to_return_says_so(tmp_path):
+    draft = compose(ENGINEER | {"return": "yes"}, "x", tmp_path)
+    assert ("return: true" in draft.text) == ("return" in Signal.model_fields)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 3.0])
+def test_every_level_is_a_multiple_of_the_step(step, tmp_path):
+    spec = compose(ENGINEER | {"converter": f"steps of {step} %"}, "x", tmp_path).spec()
+    converter = spec.signal.quantisation
+    assert 2 * converter.range / 2**converter.bits == pytest.approx(step)
+    assert converter.range >= 45.0
+
+
+def test_a_drift_moves_as_fast_whatever_the_colour(tmp_path):
+    """The long-run steps of (1 + c q^-1)/(1 - a q^-1) e have the deviation (1 + c)/(1 - a) of that of e."""
+    steps = []
+    for colour in ("white", "fades in 20 s", "fades in 60 s"):
+        noise = compose(ENGINEER | {"noise": f"0.2 degC, {colour}, drifting"}, "x", tmp_path).spec().noise
+        pole = -noise.D[1] if len(noise.D) > 1 else 0.0
+        steps.append((1.0 + noise.C[1]) / (1.0 - pole) * np.sqrt(noise.variance))
+        assert noise.drift
+    assert steps == pytest.approx([0.2 * 0.2] * 3, rel=1e-4)
+
+
+def test_a_log_in_which_the_input_moves_is_no_record_at_rest(tmp_path):
+    for moves in (0.0, 1.0):
+        rows = np.c_[np.arange(100) % 2 * moves, np.random.default_rng(1).standard_normal(100)]
+        np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="u,y", comments="")
+        if moves:
+            with pytest.raises(SpecError, match="moves: name its plant"):
+                compose(ENGINEER | {"noise": "as in log.csv"}, "x", tmp_path)
+        else:
+            compose(ENGINEER | {"noise": "as in log.csv"}, "x", tmp_path)
+
+
+def test_every_refusal_names_three_answers(tmp_path):
+    for one in QUESTIONS:
+        with pytest.raises(SpecError) as caught:
+            compose(ENGINEER | {one.key: "a kettle"}, "x", tmp_path)
+        (told,) = caught.value.diagnostics
+        assert told.key == one.key
+        assert len(re.findall(r'"[^"]+"', told.hint)) >= min(3, 2 + (one.key != "return")), one.key
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("one shift", 28800), ("two days", 172800), ("half an hour", 1800), ("a minute", 60), ("1.5 h", 5400)],
+)
+def test_times_are_read_as_they_are_spoken(text, seconds):
+    assert Phrase(text, "time").seconds() == seconds
+
+
+def test_dwells_are_at_least_as_long_as_said(tmp_path):
+    draft = compose(ENGINEER | {"hold": "57 s"}, "x", tmp_path)
+    spec = draft.spec()
+    assert (spec.signal.hold - 1) * spec.sample_time < 57 <= spec.signal.hold * spec.sample_time
+    assert spec.signal.type == "binary"
