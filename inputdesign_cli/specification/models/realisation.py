@@ -23,6 +23,7 @@ from inputdesign_cli.specification.models.section import (
 )
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.wording import unknown_word
+from inputdesign_cli.specification.yaml.plain import Plain
 
 Samples = Annotated[fields.Count, SIZES["signal.samples"]]
 _GROUP = "idesign.signals"
@@ -132,8 +133,9 @@ class Signal(Section):
 
 
 # `return` is a word of Python, which no attribute of a class body can be named.
+_RETURN: Plain = fields.Flag | None
 Signal.model_fields["return"] = FieldInfo.from_annotated_attribute(
-    fields.Flag | None, optional("Whether the record ends at the operating point.")
+    _RETURN, optional("Whether the record ends at the operating point.")
 )
 
 
