@@ -55,6 +55,20 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
 
 @finding(
     NOTE,
+    "short-record",
+    "Take a longer record for smaller ones. Accuracy is judged by the scatter of the simulated estimates.",
+)
+def scattered(kind: FindingKind, factor: float, runs: int) -> list[Finding]:
+    """The errors of the estimate are larger than first-order theory states, as the record is short.
+
+    Records of the estimated model were simulated and estimated again; their scatter is taken instead.
+    """
+    fact = f"{factor:.3g} times as large by {runs} simulated records"
+    return [kind.found(fact, factor=factor, runs=runs)]
+
+
+@finding(
+    NOTE,
     "start-estimated",
     "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
 )

@@ -222,7 +222,7 @@ def identify(
 
 
 def fit_batch(
-    model: Model, u: ArrayLike, y: ArrayLike, step: float = 1.0, *, start: ArrayLike
+    model: Model, u: ArrayLike, y: ArrayLike, step: float = 1.0, *, start: ArrayLike, free: bool = False
 ) -> BatchEstimate:
     """Estimate many records in one pass, each from a single start, without checks.
 
@@ -231,17 +231,24 @@ def fit_batch(
         u: (N, r) common to all runs, or (runs, N, r).
         y: (runs, N, p).
         start: (k,) for all runs, or (runs, k).
+        free: whether each record begins in an unknown state about an unknown level, not at rest about zero.
     """
     kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.model.names)))
+    if free:
+        return _each_fitted(kind, inputs, outputs, np.array(begin), free=True)
     return _fitted(kind, inputs, outputs, np.array(begin))
 
 
 @singledispatch
 def _fitted(kind: Kind, u: Array, y: Array, start: Array) -> BatchEstimate:
     """Return the estimates of records (runs, N, r), (runs, N, p) from starts (runs, k)."""
-    records = tuple(Records(kind, (run,)) for run in zip(u, y, strict=True))
+    return _each_fitted(kind, u, y, start, free=False)
+
+
+def _each_fitted(kind: Kind, u: Array, y: Array, start: Array, *, free: bool) -> BatchEstimate:
+    records = tuple(Records(kind, (run,), free=free) for run in zip(u, y, strict=True))
     found = minimise(RecordProblem(records), start)
     points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
     noise = np.array([noise_of(*each) for each in zip(records, points, strict=True)])

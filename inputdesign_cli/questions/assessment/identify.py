@@ -52,6 +52,7 @@ from inputdesign_cli.questions.assessment.outcome import (
     information_entry,
     model_text,
 )
+from inputdesign_cli.questions.assessment.spread import as_simulated
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.foresight import Foreseen, Knowledge, that_agrees
 from inputdesign_cli.records import Preparation, Record, read_data
@@ -139,6 +140,7 @@ class Identified:
         loop_told: whether a note says already that inputs answer the outputs.
         noise_refuted: the probability of the residuals with the noise of the spec, where a larger one was
             estimated in its place.
+        scatter: what simulated records say of the errors of the estimate.
     """
 
     estimate: Estimate
@@ -150,6 +152,7 @@ class Identified:
     ruled_out: tuple[Rival, ...] = ()
     loop_told: bool = False
     noise_refuted: float | None = None
+    scatter: tuple[Finding, ...] = ()
 
     def asked_by(self, task: Identification, source: str) -> Identified:
         """Return the estimate with the question that the spec asks at it, where it can be asked."""
@@ -166,11 +169,27 @@ def identified(
     """Return the estimate from the data in `paths`, jointly, and the question that it answers.
 
     The nominal parameters are one of the starts. Where the residuals refute the noise of the spec, a larger
-    one, C and D of small orders more, is estimated along.
+    one, C and D of small orders more, is estimated along. The errors of an estimate from one short record in
+    open loop are those of simulated records.
 
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
     """
+    task, found = _with_enough_noise(task, paths, preparation)
+    units, data = task.header.units, found.data
+    if units.closed_loop or found.estimate.prior is not None or len(data.lengths) > 1:
+        return task, found
+    estimate, scatter = as_simulated(found.model, found.estimate, data.u, units.step)
+    if not scatter:
+        return task, found
+    found = replace(found, estimate=estimate, scatter=tuple(scatter))
+    return task, found.asked_by(task, f"{paths[0].name} (estimate)")
+
+
+def _with_enough_noise(
+    task: Identification, paths: Sequence[Path], preparation: Preparation
+) -> tuple[Identification, Identified]:
+    """Return the estimate with the noise of the spec, or with the larger one that the residuals ask for."""
     known = {**task.operating_point, **preparation.operating_point}
     taken = replace(preparation, operating_point=known)
     found = estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
@@ -254,6 +273,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
     return [
         *unsettled(model, estimate),
         *larger_noise(model, found.noise_refuted),
+        *found.scatter,
         *started(estimate),
         *on_the_circle(model, estimate),
         # Faults of measurement stand alone, as they upset other tests.

@@ -17,9 +17,11 @@ from inputdesign_cli.specification.models.section import (
     pick,
     tag,
 )
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
 from inputdesign_cli.specification.yaml.plain import Plain
 
+_LONGEST = SIZES["signal.samples"].most
 _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 
 
@@ -84,7 +86,7 @@ class AmplitudeLimit(Section, some_of=(("input", "output"),)):
 class MovesLimit(Section, one_of=(("count", "per_hour"),)):
     """The largest number of changes of the inputs, in all or an hour."""
 
-    count: fields.Count | None = optional("In the whole record.")
+    count: Annotated[fields.Count, SIZES["signal.samples"]] | None = optional("In the whole record.")
     per_hour: fields.Positive | None = optional("An hour.")
 
 
@@ -102,9 +104,10 @@ class Limits(Section):
     rate: fields.PerChannel[fields.Cap] | None = optional(
         "Largest change of u from one sample to the next; a number or one per input."
     )
-    moves: Annotated[MovesLimit, Shorthand("count", {"type": "integer", "exclusiveMinimum": 0})] | None = (
-        optional("Largest number of changes of the inputs in the record: a number, or {per_hour}.")
-    )
+    moves: (
+        Annotated[MovesLimit, Shorthand("count", {"type": "integer", "minimum": 1, "maximum": _LONGEST})]
+        | None
+    ) = optional("Largest number of changes of the inputs in the record: a number, or {per_hour}.")
     energy: fields.Cap | None = optional("Power summed over the samples (trace R).")
     band: fields.Band | None = optional("The excitation vanishes outside these frequencies.")
     spectrum: Annotated[SpectrumLimit, Shorthand("max", {"type": "number", "exclusiveMinimum": 0})] | None = (

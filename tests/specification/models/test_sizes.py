@@ -66,7 +66,9 @@ CHECKED = {
     ),
     "factors, whose product has a limit": re.compile(r".*denominator"),
     "harmonics of a period, which has a limit": re.compile(r"signal\.lines"),
-    "a handful of words, files or keys": re.compile(r"signal\.also|include|sweep\.set(\[\])?|channels"),
+    "a handful of words, files or keys": re.compile(
+        r"signal\.(also|export)|include|sweep\.set(\[\])?|channels"
+    ),
 }
 
 
