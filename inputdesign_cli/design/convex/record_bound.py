@@ -28,7 +28,7 @@ from inputdesign_cli.spectrum.held import HeldLines
 
 # Windows grow by so many values until the bound gains less than the share.
 _FIRST, _MORE, _GAIN = 4, 4, 1e-3
-_MOST_STATES = 2**13
+_MOST_BITS = 13  # of the number of states
 _TOLERANCE = 1e-4
 _INPUTS = ("input", "excitation")
 
@@ -88,9 +88,8 @@ def bound_over_records(
     relaxed = replace(problem, limits=kept, densities=(), side=(), floors_fixed=False, finer=None)
     polytope, found = LagPolytope(Windows.within(amplitude, 2), hold), None
     values = samples // hold if problem.goal != "samples" else windows
-    for length in (*range(_FIRST, windows, _MORE), windows):
-        if length > values or 2.0 ** (inputs * (length - 1)) > _MOST_STATES:
-            break
+    longest = min(windows, values, 1 + _MOST_BITS // inputs)
+    for length in (*range(_FIRST, longest, _MORE), longest) if longest > 1 else ():
         polytope = polytope.longer(length)
         limited = replace(relaxed.on(basis), polytope=polytope)
         try:
