@@ -59,12 +59,11 @@ def test_stated_errors_grow_by_what_simulated_records_show(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("samples", "least"), [(25, 0.86), (50, 0.88)])
-def test_regions_hold_the_truth_as_often_as_stated(tmp_path, samples, least):
-    """The 95 % regions of 60 records; by first-order theory they hold it in 75 to 85 of 100."""
+def test_regions_hold_the_truth_as_often_as_stated(tmp_path):
+    """The 95 % regions of 60 records of 50 samples; by first-order theory they hold it in 82 %."""
     truth, held, tried = np.array([B, D, F]), 0, 0
     for seed in range(60):
-        results = identify(spec(), recorded(tmp_path / f"{seed}.csv", samples, seed)).result
+        results = identify(spec(), recorded(tmp_path / f"{seed}.csv", 50, seed)).result
         if results["status"] != "identified":
             continue
         theta = results["identification"]["theta"]
@@ -72,4 +71,4 @@ def test_regions_hold_the_truth_as_often_as_stated(tmp_path, samples, least):
         information = np.linalg.inv(np.array(results["information"]["covariance"]))
         held += away @ information @ away <= scipy.stats.chi2.ppf(0.95, 3)
         tried += 1
-    assert held / tried >= least
+    assert held / tried >= 0.88
