@@ -14,7 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
-from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept
+from inputdesign_cli.findings.designs import limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
@@ -156,8 +156,7 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
         times = terms.periods.blocks * terms.periods.each(plan.length)
         found += record_of_whole_periods(plan.length, terms.asked, times, terms.grid.period)
     if terms.goal == "given":
-        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
-        found += limits_not_kept(stated, plan.length, power, None)
+        found += limits_not_kept(terms.limits, terms.most_samples, plan.length, power)
     return out.Outcome(
         title=terms.header.title,
         status=delivery.proof_status(plan.design.gap, terms.tolerance) if designed else met,
