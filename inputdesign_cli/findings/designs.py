@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
@@ -15,6 +13,7 @@ from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, fi
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Powers, Signal
 from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.signal.limits import Bounds
 
 _ROUNDING = 1e-9
 # An input with less than this share of the power has none.
@@ -104,30 +103,24 @@ LIMIT_NOT_KEPT = doubt(
 )
 
 
-@dataclass(frozen=True)
-class StatedLimits:
-    """What an experiment may not exceed: powers, single samples (a number or one a channel), its length."""
-
-    powers: tuple[PowerLimit, ...]
-    input: ArrayLike | None
-    output: ArrayLike | None
-    rate: ArrayLike | None
-    samples: int | None
-
-
 def limits_not_kept(
-    limits: StatedLimits, samples: int, power: Powers, signal: Signal | None
+    limits: Sequence[PowerLimit],
+    longest: int | None,
+    samples: int,
+    power: Powers,
+    signal: Signal | None = None,
+    bounds: Bounds = Bounds(),
 ) -> Iterator[Finding]:
     """Yield a finding for each limit that the excitation does not keep.
 
     Args:
-        limits: the limits in the spec.
-        samples: the length of the experiment.
+        limits: on powers.
+        samples: the length of the experiment, at most `longest`.
         power: of the excitation, by channel.
-        signal: the statements about its record; None without one.
+        signal: the statements about its record, whose samples have the `bounds`; None without one.
     """
     channels = {"input": power.input, "output": power.output, "excitation": power.excitation}
-    for limit in limits.powers:
+    for limit in limits:
         found, most = channels[limit.kind] or (), limit.bound
         value, of = sum(found), str(limit.kind)
         if limit.channel is not None:
@@ -137,17 +130,16 @@ def limits_not_kept(
         if beyond > 1.0 + _ROUNDING:
             yield _broken(limit.key, fact, value=value, limit=most)
     for key, bound, peaks in (
-        ("limits.amplitude.input", limits.input, None if signal is None else signal.input_peak),
-        ("limits.amplitude.output", limits.output, None if signal is None else signal.output_peak),
-        ("limits.rate", limits.rate, None if signal is None else signal.input_move),
+        ("limits.amplitude.input", bounds.amplitude, None if signal is None else signal.input_peak),
+        ("limits.amplitude.output", bounds.output, None if signal is None else signal.output_peak),
+        ("limits.rate", bounds.rate, None if signal is None else signal.input_move),
     ):
-        bounds = [] if bound is None or peaks is None else np.broadcast_to(bound, len(peaks)).tolist()
-        for channel, (value, most) in enumerate(zip(peaks or (), bounds, strict=False), start=1):
-            of = f" in channel {channel}" if len(bounds) > 1 else ""
+        each = [] if bound is None or peaks is None else bound.tolist()
+        for channel, (value, most) in enumerate(zip(peaks or (), each, strict=False), start=1):
+            of = f" in channel {channel}" if len(each) > 1 else ""
             if value > most * (1.0 + _ROUNDING):
                 fact = f"the record reaches {value:.6g}{of}, above {most:.6g}"
                 yield _broken(key, fact, value=value, limit=most, channel=channel)
-    longest = limits.samples
     if longest is not None and samples > longest:
         fact = f"the experiment has {samples} samples, more than {longest}"
         yield _broken("limits.samples", fact, value=samples, limit=longest)

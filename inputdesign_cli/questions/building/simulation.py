@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.system import build_cost, build_loop, build_model, held_plant
 from inputdesign_cli.questions.common.confidence import SimulatedEstimates
-from inputdesign_cli.questions.common.simulation import Simulation, TrueSystem
+from inputdesign_cli.questions.common.simulation import Simulation
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.specification.models.experiment import Noise
 
@@ -22,7 +24,8 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
     return Simulation(
         units=build_units(spec),
         nominal=nominal,
-        truth=_true_system(spec),
+        truth=_true_system(spec, nominal),
+        relative_noise=None if study.noise is None else study.noise.relative_std,
         runs=study.runs,
         seed=study.seed,
         renewed=study.excitation == "new",
@@ -41,8 +44,8 @@ def build_simulator(spec: Spec, nominal: Experiment) -> SimulatedEstimates | Non
     return SimulatedEstimates(nominal, stated.runs, build_units(spec).step)
 
 
-def _true_system(spec: Spec) -> TrueSystem | None:
-    """Return the system that `simulation` states, or None; `SpecError` if its loop is unstable."""
+def _true_system(spec: Spec, nominal: Experiment) -> Experiment | None:
+    """Return the experiment on the system of `simulation`, or None; `SpecError` if its loop is unstable."""
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):
         return None
@@ -63,4 +66,4 @@ def _true_system(spec: Spec) -> TrueSystem | None:
         message = f"with the true plant {found.message}"
         hint = "give a true plant that the controller stabilises as well"
         raise bad_spec(found.code, message, hint=hint, key="simulation.plant") from error
-    return TrueSystem(model, loop, None if study.noise is None else study.noise.relative_std)
+    return replace(nominal, model=model, loop=loop)

@@ -113,14 +113,13 @@ def build_campaign(spec: Spec) -> CampaignTask:
     """Return the design of the whole experiment, and the study of whole campaigns; see `build_rules`."""
     rules, planner = build_rules(spec), build_planner(spec)
     design, study = build_convex(spec), build_simulation(spec, planner.nominal)
-    truth = planner.nominal.model if study.truth is None else study.truth.model
-    loop = planner.nominal.loop if study.truth is None else study.truth.loop
+    truth = study.truth or planner.nominal
     return CampaignTask(
         design=design,
         study=CampaignStudy(
             planner=planner,
             rules=rules,
-            true=replace(planner.nominal, model=truth, loop=loop),
+            true=replace(planner.nominal, model=truth.model, loop=truth.loop),
             runs=study.runs,
             seed=study.seed,
             white="white" in study.compare,

@@ -114,13 +114,13 @@ def make_record(
     # In the coordinates of this design, which its requirements use too.
     experiment = replace(problem.experiment, samples=experiment_samples)
     samples = request.length(experiment_samples)
-    feasible = request.feasible(experiment_samples, least_period(experiment.inputs))
-    if not design.result.x.any() or not feasible:
+    if not (design.result.x.any() and request.feasible(experiment_samples, least_period(experiment.inputs))):
         return None
     bounds = _with_powers(request.bounds, design)
     meets = problem.goal != "factor" and request.meets
     plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
+    bounding = [_least_ratio(scenario.requirements) for scenario in problem.scenarios]
     spectrum = spectrum_of(request, design.result.basis, design.result.x)
 
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
@@ -140,9 +140,14 @@ def make_record(
     def together(which: Sequence[int]) -> FiniteRecords:
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
+    def at_worst(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
+        return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+
+    cost, bounded = design_cost(design, request.cost), partial(at_worst, bounding) if meets else None
+    target = Target(partial(at_worst, scores), meets, request.cost, cost, bounded)
     while True:
-        at, target = together(numbers), _target(request, design, scores, numbers, meets=meets)
-        record = best_record(generator, at, target, bounds, first=first, limiting=together(limiting))
+        at, limits = together(numbers), together(limiting)
+        record = best_record(generator, at, target, bounds, first=first, limiting=limits)
         least = max(record.worst_ratio, MET) if meets else record.worst_ratio
         left = [n for n in range(len(plants)) if n not in numbers]
         missed = _worst_few({n: ratio_at(others[n], scores[n], record.samples) for n in left}, least)
@@ -240,26 +245,6 @@ def of_samples(search: LevelSearch, record: Record, samples: Array) -> Record:
     return replace(record, samples=samples, worst_ratio=worst)
 
 
-def _target(
-    request: RecordRequest,
-    design: Design,
-    scores: Sequence[Callable[[Array], float]],
-    numbers: Sequence[int],
-    *,
-    meets: bool,
-) -> Target:
-    """Return the score that ranks records: at the worst of the plants with these numbers."""
-    scenarios = design.problem.scenarios
-    bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in scenarios]
-
-    def largest(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
-        return max([of[n](M) for n, M in zip(numbers, informations, strict=True)])
-
-    least = partial(largest, bounding) if meets else None
-    cost = design_cost(design, request.cost)
-    return Target(partial(largest, scores), meets, request.cost, cost, least)
-
-
 def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:
     """Return the numbers of the few largest above `most`: a record for these serves most of the others."""
     return sorted((n for n, figure in figures.items() if figure > most), key=lambda n: -figures[n])[:FEW]
@@ -307,7 +292,7 @@ def ratio_before(design: Design, step: float) -> float:
     ratios = []
     for scenario in design.problem.scenarios:
         silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)
-        score = _largest(scenario.requirements, lambda r, M: r.least(M))
+        score = _least_ratio(scenario.requirements)
         try:
             ratios.append(score(silent.information(np.zeros((1, scenario.experiment.inputs)))))
         except np.linalg.LinAlgError:
@@ -362,6 +347,10 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
     It raises `LinAlgError` if rounding would decide: the record hardly determines all parameters.
     """
     return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
+
+
+def _least_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
+    return _largest(requirements, lambda requirement, information: requirement.least(information))
 
 
 def _largest(

@@ -29,7 +29,7 @@ from inputdesign_cli.outcome import Powers, Simulation as Studied, curves as plo
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.plant import Loop, Model, close_loop
+from inputdesign_cli.plant import Loop, close_loop
 from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.delivery import Delivered, with_study
 from inputdesign_cli.signal.kinds import kind_of
@@ -165,43 +165,35 @@ def covariance_in_theory(information: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class TrueSystem:
-    """Holds the plant and the noise that the runs meet, and the loop around them.
-
-    With `relative_noise` the standard deviation of the noise is that share of the weakest output's.
-    """
-
-    model: Model
-    loop: Loop | None
-    relative_noise: float | None = None
-
-    def experiment(self, nominal: Experiment, output_power: Sequence[float]) -> Experiment:
-        """Return the nominal experiment on this system; `output_power` (p,) is that of the design."""
-        model = self.model
-        if self.relative_noise is not None:
-            variance = self.relative_noise**2 * min(output_power)
-            model = model.at(model.theta, variance * np.eye(model.outputs))
-        loop = None if self.loop is None else close_loop(model, self.loop.controller)
-        return replace(nominal, model=model, loop=loop, factor=None)
-
-
-@dataclass(frozen=True)
 class Simulation:
     """Describes the trial of an experiment: on the nominal one in raw parameters, or on the `truth`.
 
+    With `relative_noise` the standard deviation of the noise there is that share of the weakest output's.
     With `renewed` each run realises the spectrum anew. At equal power flat signals of the kinds in `compare`
     are tried, too. For `entries` see `ModelQuestion`.
     """
 
     units: Units
     nominal: Experiment
-    truth: TrueSystem | None
+    truth: Experiment | None
+    relative_noise: float | None
     runs: int
     seed: int
     renewed: bool
     compare: Sequence[str]
     cost: Mapping[PowerKind, Weight]
     entries: Sequence[ModelError]
+
+    def on_truth(self, nominal: Experiment, output_power: Sequence[float]) -> Experiment:
+        """Return a nominal experiment on the true system; `output_power` (p,) is that of the design."""
+        if self.truth is None:
+            return nominal
+        model, loop = self.truth.model, self.truth.loop
+        if self.relative_noise is not None:
+            variance = self.relative_noise**2 * min(output_power)
+            model = model.at(model.theta, variance * np.eye(model.outputs))
+        loop = None if loop is None else close_loop(model, loop.controller)
+        return replace(nominal, model=model, loop=loop, factor=None)
 
 
 @time_limit(inf)  # that of the solver is for the design
@@ -218,7 +210,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     assert outcome.samples is not None
     excitations = _excitations(plan, delivered, delivered.record)
     nominal = replace(plan.nominal, samples=len(delivered.record))
-    true = nominal if plan.truth is None else plan.truth.experiment(nominal, outcome.power.output or ())
+    true = plan.on_truth(nominal, outcome.power.output or ())
     trying = partial(tried_on, runs=plan.runs, seed=plan.seed, step=units.step, executor=executor)
     counted, simulated = outcome.samples, len(delivered.record)
     foretold = results.curves if counted == simulated else delivered.of_length(simulated)

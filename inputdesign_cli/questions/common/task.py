@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -96,8 +96,9 @@ class SpectrumTask(ABC):
     def to_be_tried(
         self,
         results: Results,
-        record: Array,
-        renewed: Excitation | None,
+        seconds: dict[str, float],
+        record: Record | None,
+        renewed: Callable[[int], Excitation | None],
         alpha: float,
         informed: Informed,
         experiment: Experiment,
@@ -105,10 +106,15 @@ class SpectrumTask(ABC):
         *,
         flat: bool = True,
     ) -> Delivered:
-        """Return the design with a record (n, r) for a trial; the curves show its information."""
+        """Return the answer with its times and its record for a trial; the curves show its information."""
+        results = replace(results, outcome=replace(results.outcome, timing_s=seconds))
+        if record is None:
+            return Delivered(results, None, None, alpha)
         of_length = partial(informed.of_length, experiment, self.ellipses, flat=flat)
-        search = None if self.foresight is None else partial(self.foresight.tried, record, requirements)
-        return Delivered(results, record, renewed, alpha, of_length, search)
+        search = (
+            None if self.foresight is None else partial(self.foresight.tried, record.samples, requirements)
+        )
+        return Delivered(results, record.samples, renewed(len(record.samples)), alpha, of_length, search)
 
 
 def growth_by_start(

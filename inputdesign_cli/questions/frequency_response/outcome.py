@@ -14,7 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
-from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept
+from inputdesign_cli.findings.designs import limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
@@ -173,9 +173,8 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
     if terms.goal != "samples":
         times = terms.periods.blocks * each
         found += record_of_whole_periods(plan.length, terms.asked, times, terms.grid.period)
-    if not designed:
-        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
-        found += limits_not_kept(stated, plan.length, power, None)
+    if terms.goal == "given":
+        found += limits_not_kept(terms.limits, terms.most_samples, plan.length, power)
     return out.Outcome(
         title=terms.header.title,
         status=proof_status(plan.design.gap, terms.tolerance) if designed else met,

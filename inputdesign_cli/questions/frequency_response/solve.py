@@ -69,7 +69,7 @@ class ResponseTask:
         begun = time.perf_counter()
         nominal, power = terms.experiment, results.outcome.power
         if study.truth is not None and power is not None:
-            nominal = study.truth.experiment(nominal, power.output or ())
+            nominal = study.on_truth(nominal, power.output or ())
         tried = partial(study_response, runs=study.runs, seed=study.seed, executor=executor)
         at = terms.periods, terms.grid.excited
         designed = tried(nominal.model, plan.record.samples, *at)

@@ -8,7 +8,6 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec, refuse
-from inputdesign_cli.findings.designs import StatedLimits
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import InPhase
 from inputdesign_cli.questions.building.header import build_header, build_units
@@ -56,7 +55,6 @@ def build_given(spec: Spec) -> GivenTask:
     requirements = build_requirements(spec, experiment)
     experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
     check_pairs(spec, experiment.model.names)
-    amplitude = spec.limits.amplitude
     return GivenTask(
         experiment=experiment,
         excitation=_excitation(spec, spec.spectrum, experiment),
@@ -66,13 +64,7 @@ def build_given(spec: Spec) -> GivenTask:
         alpha=model_error_alpha(spec, experiment.model),
         calibration=build_calibration(spec),
         simulator=build_simulator(spec, experiment),
-        limits=StatedLimits(
-            powers=tuple(build_power_limits(spec)),
-            input=None if amplitude is None else amplitude.input,
-            output=None if amplitude is None else amplitude.output,
-            rate=spec.limits.rate,
-            samples=spec.limits.samples,
-        ),
+        limits=build_power_limits(spec),
         plants=_build_plants(spec, experiment),
         header=build_header(spec),
         record=build_record_request(spec, experiment.size),

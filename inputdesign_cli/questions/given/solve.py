@@ -15,10 +15,11 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.findings.designed_records import too_long
-from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept, met_within_table
+from inputdesign_cli.findings.designs import limits_not_kept, met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, spectral_information
 from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectrum, White
@@ -151,7 +152,7 @@ class GivenTask(SpectrumTask):
     alpha: float
     calibration: Calibration | None
     simulator: SimulatedEstimates | None
-    limits: StatedLimits
+    limits: Sequence[PowerLimit]
     plants: Plants | None
 
     def delivered(self) -> Delivered:
@@ -181,19 +182,15 @@ class GivenTask(SpectrumTask):
             found = too_long(self.record.length(experiment.samples), self.record.longest)
         else:
             signal, found = signal_of(self.record, experiment, record, requirements), []
-        found += limits_not_kept(self.limits, experiment.samples, Powers.of(excitation.power), signal)
+        power, stated = Powers.of(excitation.power), (self.limits, self.record.most_samples)
+        found += limits_not_kept(*stated, experiment.samples, power, signal, self.record.bounds)
         if record is None or signal is None:
             results = adding(results, results.outcome, found)
         else:
             results = self.applied(results, experiment, record, signal, requirements, found)
         seconds = {"analysis": time.perf_counter() - started}
-        results = adding(results, replace(results.outcome, timing_s=seconds))
-        if record is None:
-            return Delivered(results, None, None, confidence.alpha)
-        renewed = self._renewed(len(record.samples))
-        return self.to_be_tried(
-            results, record.samples, renewed, confidence.alpha, informed, experiment, requirements
-        )
+        asked, alpha = (experiment, requirements), confidence.alpha
+        return self.to_be_tried(results, seconds, record, self._renewed, alpha, informed, *asked)
 
     def _report(
         self,

@@ -80,13 +80,12 @@ class ConvexTask(SpectrumTask):
             "check": checked - solved,
             "signal": time.perf_counter() - checked,
         }
-        results = replace(results, outcome=replace(results.outcome, timing_s=seconds))
-        if record is None:
-            return Delivered(results, None, None, done.confidence.alpha)
+        of_design = made.design.result
         return self.to_be_tried(
             results,
-            record.samples,
-            redrawn(made.request, made.design.result.basis, made.design.result.x, len(record.samples)),
+            seconds,
+            record,
+            partial(redrawn, made.request, of_design.basis, of_design.x),
             done.confidence.alpha,
             informed,
             done.experiment,
