@@ -134,7 +134,7 @@ class Identified:
     """Holds an estimate, its data, and the accuracy asked of it.
 
     Attributes:
-        question: None where it cannot be asked of this estimate; `unasked` says why.
+        question: None if it cannot be asked of this estimate; `unasked` says why.
         ruled_out: other minima, which knowledge of the plant rules out.
         loop_told: whether a note says already that inputs answer the outputs.
         noise_refuted: the probability of the residuals with the noise of the spec, where a larger one was

@@ -127,7 +127,7 @@ def fit_of(
 
     Args:
         errors: (samples, p) of the prediction.
-        simulated: of every output the fit of the simulation, None where there is none, and its samples.
+        simulated: of every output the fit of the simulation, None if there is none, and its samples.
         time: instants of the samples; None: the sample time makes them.
     """
     even = units.sample_time * np.arange(len(data.y), dtype=np.float64)
