@@ -19,7 +19,7 @@ from pathlib import Path
 from inputdesign_cli import load_spec, parse_spec
 from inputdesign_cli.outcome import plain
 from inputdesign_cli.questions.campaign.build import build_campaign, build_planner
-from inputdesign_cli.questions.campaign.study import oracle_of, tried, way_entry, ways_of
+from inputdesign_cli.questions.campaign.study import way_entry
 from inputdesign_cli.specification import Spec
 
 ILL1 = (
@@ -88,13 +88,13 @@ def flexible_transmission() -> Spec:
 
 def measured(name: str, spec: Spec, runs: int) -> dict[str, object]:
     """What a campaign and the experiment in one shot give."""
-    study = build_campaign(spec.with_(**{"simulation.runs": runs, "simulation.seed": 1})).study
-    oracle, ways = oracle_of(study), ways_of(study)
+    task = build_campaign(spec.with_(**{"simulation.runs": runs, "simulation.seed": 1}))
+    oracle = task.oracle()
     assert oracle is not None  # the plants of this table can be asked
     found: dict[str, object] = {"case": name, "runs": runs, "oracle": asdict(oracle)}
     for way in ("campaign", "one_shot"):
         started = time.process_time()
-        entry = plain(way_entry(tried(study, ways[way]), oracle))
+        entry = plain(way_entry(task.tried(way), oracle))
         found[way] = entry | {"seconds_a_run": (time.process_time() - started) / runs}
         low, high = entry.get("within_r_adm_true_limits", (0, 1))
         print(

@@ -40,14 +40,14 @@ def campaign_in_a_loop(folder: Path) -> None:
     spec, run = SPECS / "flexible_transmission.yaml", folder / "campaign"
     asked = ["campaign={block: 100, power_cap: 0.6, max_samples: 3000}", "signal.seed=0"]
     idesign("campaign", str(spec), *(f"--set={one}" for one in asked), "-o", str(run))
-    study = build_campaign(load_spec(spec, asked)).study
-    noise = np.sqrt(study.true.model.covariance[0, 0]) * np.random.default_rng(8).standard_normal((3000, 1))
+    task = build_campaign(load_spec(spec, asked))
+    noise = np.sqrt(task.true.model.covariance[0, 0]) * np.random.default_rng(8).standard_normal((3000, 1))
     r = np.zeros((0, 1))
     while (run / "signal.csv").exists():
         signal = csv_columns((run / "signal.csv").read_bytes())
         part = signal["r1"][:, None]
         r = np.concatenate([r, part])
-        y, u = (x[-len(part) :, 0] for x in study.true.loop.signals(r, noise[: len(r)]))
+        y, u = (x[-len(part) :, 0] for x in task.true.loop.signals(r, noise[: len(r)]))
         path = folder / f"part_{len(r)}.csv"
         path.write_text(csv_text(Table(signal | {"u1": u, "y1": y})), encoding="utf-8")
         idesign("next", str(run), str(path))
@@ -56,13 +56,13 @@ def campaign_in_a_loop(folder: Path) -> None:
         told = [number, one["samples"], f"{one['worst_ratio']:.3g}"]
         told += [plan.get(name, "") for name in ("samples", "planned_samples", "capped", "part_cost")]
         sys.stdout.write(f"| {' | '.join(map(str, told))} |\n")
-    at_the_truth = replace(study.true, samples=len(r))
-    question = study.planner.question(
-        study.true.model, FiniteRecord(at_the_truth, len(r), study.planner.step).information(r)
+    at_the_truth = replace(task.true, samples=len(r))
+    question = task.planner.question(
+        task.true.model, FiniteRecord(at_the_truth, len(r), task.planner.step).information(r)
     )
     ratio = question.ratio(question.information)
-    energy = len(r) * study.planner.cost_of(study.true, r)
-    share = energy / study.planner.knowing(study.true.model)[0]
+    energy = len(r) * task.planner.cost_of(task.true, r)
+    share = energy / task.planner.knowing(task.true.model)[0]
     sys.stdout.write(f"true ratio {ratio:.3f}, energy over that of knowing the plant {share:.3f}\n")
     shutil.copy(run / "campaign.png", IMAGES / "campaign_flexible.png")
 

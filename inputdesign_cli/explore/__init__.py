@@ -2,7 +2,6 @@
 
 from inputdesign_cli.explore.drift import levelled as levelled
 from inputdesign_cli.explore.fits import (
-    NOT_COMPUTED as NOT_COMPUTED,
     Fits as Fits,
     Parts as Parts,
     by_chance as by_chance,
@@ -22,7 +21,6 @@ from inputdesign_cli.explore.relation import (
 )
 from inputdesign_cli.explore.search import (
     Candidate as Candidate,
-    Chosen as Chosen,
     Family as Family,
     explore_structure as explore_structure,
 )

@@ -14,7 +14,6 @@ from inputdesign_cli.questions.campaign.build import build_campaign, build_plann
 from inputdesign_cli.questions.campaign.directory import continued
 from inputdesign_cli.questions.campaign.plans import standing
 from inputdesign_cli.questions.campaign.schedule import Standing
-from inputdesign_cli.questions.campaign.study import ways_of
 from inputdesign_cli.records import Record
 from tests.support.campaigns import SPEC, planner, record
 
@@ -238,7 +237,7 @@ def test_simulated_campaigns_end_where_the_structure_is_refuted():
 
 def test_ways_have_the_same_pilot():
     spec = parse_spec(SPEC, overrides=["campaign={block: 50, pilot: {samples: 30, power: 0.1}}"])
-    ways = ways_of(build_campaign(spec).study)
+    ways = build_campaign(spec).ways
     assert ways["one_shot"].schedule.parts == (30, 200)
     assert ways["campaign"].schedule.samples == 230
 

@@ -37,6 +37,7 @@ from inputdesign_cli.questions.assessment.identify import (
     told,
 )
 from inputdesign_cli.questions.assessment.outcome import response_without_model
+from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.least_cost.outcome import requirement_met
 from inputdesign_cli.records import Preparation
 
@@ -166,10 +167,8 @@ def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     tables, curves, lines = response_without_model(units, found.model, found.data)
     if lines is None:
         return judged
-    outcome = _assessed(judged, frequency_response=lines).outcome.saying(response_note(lines))
-    return replace(
-        judged, outcome=outcome, tables={**judged.tables, **tables}, curves={**judged.curves, **curves}
-    )
+    outcome = _assessed(judged, frequency_response=lines).outcome
+    return adding(judged, outcome, response_note(lines), tables, curves)
 
 
 def _topped_up(

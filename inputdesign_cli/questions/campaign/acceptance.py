@@ -206,7 +206,7 @@ def accepted(
 
     Args:
         kind: of the excitation: "u", or "r", the reference of a loop.
-        given: the name of the user's file; `table`: its `data` as they are kept.
+        given: the name of the user's file; `table`: its `data` in the form that is kept.
         unlike: whether to take a record of something else.
 
     Raises:

@@ -16,7 +16,7 @@ from inputdesign_cli.questions.building.uncertainty import farthest_radius
 from inputdesign_cli.questions.campaign.directory import Rounds
 from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
-from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
+from inputdesign_cli.questions.campaign.study import CampaignTask, ways_of
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Campaign, Pilot
@@ -113,19 +113,17 @@ def build_campaign(spec: Spec) -> CampaignTask:
     """Return the design of the whole experiment, and the study of whole campaigns; see `build_rules`."""
     rules, planner = build_rules(spec), build_planner(spec)
     design, study = build_convex(spec), build_simulation(spec, planner.nominal)
-    truth = study.truth or planner.nominal
+    truth = planner.nominal.model if study.truth is None else study.truth.model
+    loop = planner.nominal.loop if study.truth is None else study.truth.loop
+    uncertain = spec.uncertainty is not None or rules.pilot_power is not None
     return CampaignTask(
         design=design,
-        study=CampaignStudy(
-            planner=planner,
-            rules=rules,
-            true=replace(planner.nominal, model=truth.model, loop=truth.loop),
-            runs=study.runs,
-            seed=study.seed,
-            white="white" in study.compare,
-            uncertain=spec.uncertainty is not None or rules.pilot_power is not None,
-            has_prior=spec.experiment.prior is not None,
-        ),
+        planner=planner,
+        ways=ways_of(rules, uncertain=uncertain, white="white" in study.compare),
+        true=replace(planner.nominal, model=truth, loop=loop),
+        runs=study.runs,
+        seed=study.seed,
+        has_prior=spec.experiment.prior is not None,
     )
 
 

@@ -201,7 +201,7 @@ def _decided(
         time_of, *signals = table.columns.values()
         named = dict(zip(header.units.excitations, signals, strict=True))
         curves["signal"] = SignalCurves(time_of, named)
-        if part.kind not in ("pilot", "stopgap") and campaign.first_cost is None:
+        if part.design is not None and campaign.first_cost is None:
             campaign = replace(campaign, first_cost=part.cost)
     campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=found.state)
     campaign = replace(campaign, digests=digests(campaign, files))

@@ -138,7 +138,7 @@ class Planned:
         power: of the record; `cost`: of a sample of the design at the estimate.
         kind: the purpose; a `stopgap` is white noise if there is no design.
         capped: whether the cap or limits make it miss the accuracy that is asked.
-        claim: returns what is proved of the design; None for white noise.
+        claim: returns what is proved of the design, whose first plan sets the cap; None for white noise.
         why: the reason why there is no design.
         share: of its power that the next part has, which would cost more than the cap otherwise.
         part_cost: of a sample of the next part at the plant that it is planned for, with the effects of
@@ -157,11 +157,6 @@ class Planned:
     share: float = 1.0
     part_cost: float = 0.0
     beyond: bool = False
-
-    @property
-    def designed(self) -> bool:
-        """Return whether the plan comes from a design, so that the first such plan sets the cap."""
-        return self.kind not in ("pilot", "stopgap")
 
     @property
     def applied(self) -> Array:

@@ -34,6 +34,7 @@ from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.campaign.plans import Planner, standing
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule, Standing
+from inputdesign_cli.questions.common.delivery import with_study
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 
 Ending = Literal["stopped", "missed", "undecided", "unplanned"]
@@ -53,27 +54,6 @@ class Oracle:
 
     cost: float
     record: float | None = None
-
-
-@dataclass(frozen=True)
-class CampaignStudy:
-    """Holds a study of whole campaigns.
-
-    Attributes:
-        true: the experiment on the true system, of the planned length.
-        white: whether to compare with white excitation that suffices at the estimate.
-        uncertain: whether the spec or a pilot bounds the error of the first estimate.
-        has_prior: whether the spec states information that runs would have to draw.
-    """
-
-    planner: Planner
-    rules: Rules
-    true: Experiment
-    runs: int
-    seed: int
-    white: bool
-    uncertain: bool
-    has_prior: bool
 
 
 @dataclass(frozen=True)
@@ -101,10 +81,21 @@ class Ended:
 
 @dataclass(frozen=True)
 class CampaignTask:
-    """Solves a spec with a campaign as one experiment in one shot, and simulates it in parts."""
+    """Solves a spec with a campaign as one experiment in one shot, and simulates it in parts.
+
+    Attributes:
+        ways: the rules of the campaign, and of experiments in one shot to compare with.
+        true: the experiment on the true system, of the planned length.
+        has_prior: whether the spec states information that runs would have to draw.
+    """
 
     design: ConvexTask
-    study: CampaignStudy
+    planner: Planner
+    ways: Mapping[str, Rules]
+    true: Experiment
+    runs: int
+    seed: int
+    has_prior: bool
 
     def solve(self) -> Results:
         """Design the whole experiment at the plant of the spec, see `ConvexTask.solve`."""
@@ -119,8 +110,8 @@ class CampaignTask:
         Raises:
             SpecError: `not-supported` for prior information without data.
         """
-        study, model = self.study, self.study.true.model
-        if study.has_prior:
+        model, samples = self.true.model, self.true.samples
+        if self.has_prior:
             raise bad_spec(
                 "not-supported",
                 "simulated campaigns begin without data: information that is known before would have to be "
@@ -131,62 +122,56 @@ class CampaignTask:
         results = self.design.solve()
         started = time.perf_counter()
         with time_limit(inf):  # that of the solver is for the design
-            oracle = oracle_of(study)
-            ways = {name: tried(study, rules, executor) for name, rules in ways_of(study).items()}
+            oracle = self.oracle()
+            ways = {name: self.tried(name, executor) for name in self.ways}
         record = None if oracle is None else oracle.record
         simulation = Simulation(
-            runs=study.runs,
-            seed=study.seed,
-            samples=study.true.samples,
+            runs=self.runs,
+            seed=self.seed,
+            samples=samples,
             true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
             true_variance=float(model.covariance[0, 0])
             if model.outputs == 1
             else tuple(map(tuple, model.covariance.tolist())),
             inputs={name: way_entry(ended, oracle) for name, ended in ways.items()},
-            oracle_cost=None if oracle is None else oracle.cost / study.true.samples,
-            oracle_record_cost=None if record is None else record / study.true.samples,
+            oracle_cost=None if oracle is None else oracle.cost / samples,
+            oracle_record_cost=None if record is None else record / samples,
             others={"numbers": {"way": list(ways), "status": list(_ENDINGS)}},
         )
         tables, curves = campaigns_curves(ways, oracle)
-        timing = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - started}
-        return replace(
-            results,
-            outcome=replace(results.outcome, simulation=simulation, timing_s=timing),
-            tables={**results.tables, **tables},
-            curves={**results.curves, **curves},
-        )
+        return with_study(results, simulation, started, (), tables, curves)
+
+    def oracle(self) -> Oracle | None:
+        """Return the cost of an experiment that knows the plant; None if the true plant has no design."""
+        try:
+            cost, record = self.planner.knowing(self.true.model)
+        except IdesignError:
+            return None
+        energy = 0.0 if record is None else len(record) * self.planner.cost_of(self.true, record)
+        return Oracle(cost, energy or None)
+
+    def tried(self, way: str, executor: Executor | None = None) -> Sequence[Ended]:
+        """Return the runs of one way of experimenting."""
+        # One run a batch: all ways meet the same noise in the same run.
+        run = partial(_ended, self.planner, self.ways[way], self.true)
+        return run_batches(run, runs=self.runs, size=1, seed=self.seed, executor=executor)
 
 
-def oracle_of(study: CampaignStudy) -> Oracle | None:
-    """Return the cost of an experiment that knows the plant; None if the true plant has no design."""
-    try:
-        cost, record = study.planner.knowing(study.true.model)
-    except IdesignError:
-        return None
-    energy = 0.0 if record is None else len(record) * study.planner.cost_of(study.true, record)
-    return Oracle(cost, energy or None)
+def ways_of(rules: Rules, *, uncertain: bool, white: bool) -> dict[str, Rules]:
+    """Return the rules of the campaign, and of the same length in one shot after a pilot of white noise.
 
-
-def ways_of(study: CampaignStudy) -> dict[str, Rules]:
-    """Return the rules of the campaign, and of the same length in one shot after a pilot of white noise."""
-    rules = study.rules
+    Args:
+        uncertain: whether the spec or a pilot bounds the error of the first estimate.
+        white: whether to compare with white excitation that suffices at the estimate.
+    """
     whole = rules.schedule.samples
     pilot = rules.schedule.parts[:1] if rules.pilot_power is not None else ()
-    parts = (*pilot, whole - sum(pilot))
-    one = replace(
-        rules, schedule=Schedule(parts, whole, whole, whole), power_cap=None, stops=False, robust_last=False
-    )
+    once = Schedule((*pilot, whole - sum(pilot)), whole, whole, whole)
+    one = replace(rules, schedule=once, power_cap=None, stops=False, robust_last=False)
     ways = {"campaign": rules, "one_shot": one}
-    if study.uncertain:
+    if uncertain:
         ways["one_shot_robust"] = replace(one, robust_last=True)
-    return ways | ({"white": replace(one, white=True)} if study.white else {})
-
-
-def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
-    """Return the runs of one way of experimenting."""
-    # One run a batch: all ways meet the same noise in the same run.
-    run = partial(_ended, replace(study, rules=rules))
-    return run_batches(run, runs=study.runs, size=1, seed=study.seed, executor=executor)
+    return ways | ({"white": replace(one, white=True)} if white else {})
 
 
 def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
@@ -271,16 +256,18 @@ def campaigns_curves(
     return tables, curves
 
 
-def _ended(study: CampaignStudy, _one: int, rng: np.random.Generator) -> Ended:
+def _ended(planner: Planner, rules: Rules, true: Experiment, _one: int, rng: np.random.Generator) -> Ended:
     """Run a campaign from rest to its end."""
-    return _Run(study, rng).end()
+    return _Run(planner, rules, true, rng).end()
 
 
 @dataclass
 class _Run:
     """Runs one campaign. The noise of all samples is drawn first, so that other ways meet the same noise."""
 
-    study: CampaignStudy
+    planner: Planner
+    rules: Rules
+    true: Experiment
     rng: np.random.Generator
     known: Standing | None = None
     first: float | None = None
@@ -288,25 +275,24 @@ class _Run:
     shrunk: set[int] = field(default_factory=set)  # parts, by their numbers
 
     def __post_init__(self) -> None:
-        true = self.study.true
-        size = (self.study.rules.schedule.most, true.model.outputs)
-        self.e = self.rng.standard_normal(size) @ np.linalg.cholesky(true.model.covariance).T
-        self.r: Array = np.zeros((0, true.inputs))
-        self.sound = self.last = self.study.planner.nominal.model
+        size = (self.rules.schedule.most, self.true.model.outputs)
+        self.e = self.rng.standard_normal(size) @ np.linalg.cholesky(self.true.model.covariance).T
+        self.r: Array = np.zeros((0, self.true.inputs))
+        self.sound = self.last = self.planner.nominal.model
 
     def end(self) -> Ended:
         """Run the campaign from its first plan to its end."""
-        rules, planner = self.study.rules, self.study.planner
+        rules, planner = self.rules, self.planner
         while True:
             seed = int(self.rng.integers(_SEEDS))
             try:
                 plan = planner.plan(rules, self.known, len(self.r), seed, self.first, self.r)
             except (InfeasibleError, InaccurateError, SpecError):
                 return self._ended("unplanned")
-            if self.first is None and plan.designed:
+            if self.first is None and plan.claim is not None:
                 self.first = plan.cost
             self.r = np.concatenate([self.r, plan.applied])
-            signals = responses(self.study.true, self.r[None], self.e[None, : len(self.r)], planner.step)
+            signals = responses(self.true, self.r[None], self.e[None, : len(self.r)], planner.step)
             u, y = (total[0] for _, total in signals)
             self.parts += 1
             model, found = self.last, None
@@ -334,7 +320,7 @@ class _Run:
 
     def _identified(self, u: Array, y: Array, *, near: bool = False) -> Estimate | None:
         """Return the estimate near the last one, or from several starts; this one is built on from now on."""
-        model, step, feedback = self.last, self.study.planner.step, self.study.true.loop is not None
+        model, step, feedback = self.last, self.planner.step, self.true.loop is not None
         try:
             found = identify(model, u, y, step, start=model.theta, feedback=feedback, rest=True, near=near)
         except SpecError:  # too little is known yet
@@ -350,13 +336,13 @@ class _Run:
         known = self.known
         if known is None or not known.met:  # more parameters miss it all the more
             return False
-        question = self.study.planner.question(known.model, known.information)
+        question = self.planner.question(known.model, known.information)
         errors = model_errors(question.requirements)
         return bool(mattering(neglected(known.model, full, errors, question.information)))
 
     def _stand(self, estimate: Model, u: Array, y: Array) -> None:
-        informed = partial(information_of_data, u=u, y=y, step=self.study.planner.step)
-        stands = standing(self.study.planner, estimate, informed, self.sound)
+        informed = partial(information_of_data, u=u, y=y, step=self.planner.step)
+        stands = standing(self.planner, estimate, informed, self.sound)
         if stands is None:
             return
         self.known, self.last = stands, stands.model
@@ -368,21 +354,21 @@ class _Run:
 
     def _ended(self, status: Ending) -> Ended:
         """Return the end of the run, judged on the true plant."""
-        study, samples, energy, ratio = self.study, len(self.r), 0.0, None
+        samples, energy, ratio = len(self.r), 0.0, None
         if samples:
-            energy = samples * study.planner.cost_of(study.true, self.r)
-        if samples and study.true.model.names == self.last.names:
-            true = replace(study.true, samples=samples)
-            information = FiniteRecord(true, samples, study.planner.step).information(self.r)
+            energy = samples * self.planner.cost_of(self.true, self.r)
+        if samples and self.true.model.names == self.last.names:
+            true = replace(self.true, samples=samples)
+            information = FiniteRecord(true, samples, self.planner.step).information(self.r)
             with suppress(IdesignError, np.linalg.LinAlgError):
-                question = study.planner.question(true.model, information)
+                question = self.planner.question(true.model, information)
                 ratio = question.ratio(question.information)
         within = {of: self._within(of) for of in _REFERENCES}
         return Ended(status, samples, energy, ratio, within, self.parts, len(self.shrunk))
 
     def _within(self, of: Reference) -> bool | None:
         """Return whether |G_hat - G_0| <= r_adm of the truth, the estimate or the spec at all frequencies."""
-        planner, true = self.study.planner, self.study.true.model
+        planner, true = self.planner, self.true.model
         model = {"true": true, "estimate": self.last, "design": planner.nominal.model}[of]
         try:
             errors = model_errors(planner.question(model, np.eye(len(model.names))).requirements)

@@ -32,6 +32,7 @@ from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
 from inputdesign_cli.questions.assessment.outcome import fit_of, response_without_model
+from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.exploration.build import build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import (
     exploration_notes,
@@ -99,15 +100,12 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
         title=f"What {names} {'tells' if len(paths) == 1 else 'tell'}",
         exploration=exploration_of(log, found, loops, reasons, lines, silent),
         validation=validation_of(found.validation),
-    ).saying(replace(one, message=f"no trust: {one.message}") for one in doubts)
-    outcome = outcome.saying(() if lines is None else response_note(lines))
-    results = replace(
-        results,
-        outcome=outcome.saying(silent_lines_answer(silent)),
-        resolved_spec=spec_text(log, found, paths, reasons, loop=looped),
-        tables={**results.tables, **tables},
-        curves={**results.curves, **structure_curves(found), **curves},
     )
+    findings = [replace(one, message=f"no trust: {one.message}") for one in doubts]
+    findings += () if lines is None else response_note(lines)
+    findings += silent_lines_answer(silent)
+    results = replace(results, resolved_spec=spec_text(log, found, paths, reasons, loop=looped))
+    results = adding(results, outcome, findings, tables, {**structure_curves(found), **curves})
     against = [*shifted_levels(found.estimate, data, log.time_unit)]
     against += refutations(found.model, found.estimate)
     return Exploration(results, reasons, tuple(one.message for one in against))

@@ -79,8 +79,8 @@ def test_right_models_are_seldom_refuted_at_any_part():
     from inputdesign_cli.identification import identify
     from inputdesign_cli.questions.campaign.build import build_campaign
 
-    study = build_campaign(parse_spec(SPEC, overrides=["campaign.block=20"])).study
-    model, rules = study.true.model, study.rules
+    task = build_campaign(parse_spec(SPEC, overrides=["campaign.block=20"]))
+    model, rules = task.true.model, task.ways["campaign"]
     assert rules.schedule.looks == 30
     refuted = 0
     for seed in range(60):
