@@ -18,7 +18,7 @@ from inputdesign_cli.explore import (
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.rivals import most_apart
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.response_chance import driven_by_nothing
+from inputdesign_cli.identification.response_chance import like_nothing
 from inputdesign_cli.outcome.shares import chance
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
@@ -162,7 +162,7 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
 @finding(DOUBT, "inputs-unrelated", "Move the inputs by steps of your own, which nothing else follows.")
 def _unrelated(kind: FindingKind, found: Found) -> list[Finding]:
     """The inputs do not help to predict an output. Signals that wander or drift agree without any link."""
-    idle = set(driven_by_nothing(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
+    idle = set(like_nothing(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
     worse = {i for i, fit in enumerate(found.estimate.simulation.fit) if fit is not None and fit <= 0.0}
     idle |= {i for i in worse if not found.wanders[i]}
     names = [signal_name("y", i, found.model.outputs) for i in sorted(idle)]

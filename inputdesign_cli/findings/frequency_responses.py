@@ -185,7 +185,9 @@ def distorted(
         shares: by the power at silent lines.
         of_cube: shares by the cubes of the outputs that have a one in (p,).
     """
-    power, like = (_of_any(probability) for probability in (silent["odd"].probability, cube.probability))
+    # That noise alone has as much at any output, in either test.
+    each = silent["odd"].probability, cube.probability
+    power, like = (min(_WAYS * float(one.min()) * one.size, 1.0) for one in each)
     alike = _WAYS * cube.probability.size * cube.probability < _DOUBT
     cubed = of_cube(alike.astype(float))
     both = np.maximum(np.where(power < _DOUBT, shares, 0.0), cubed) if alike.any() else shares
@@ -197,11 +199,6 @@ def distorted(
     found = Distorted(np.asarray(both), min(power, like), signal)
     small = min(_chance(silent, "odd"), like) < _SPEAKS
     return found if (min(power, like) < _DOUBT if found.matters else small) else None
-
-
-def _of_any(probability: Array) -> float:
-    """Return the probability that noise alone has as much at any output, in either test."""
-    return min(_WAYS * float(probability.min()) * probability.size, 1.0)
 
 
 def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:

@@ -36,20 +36,10 @@ def like_nothing_elsewhere(
     return found
 
 
-def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
-    """Return the outputs (from zero) of a model whose row of G does not differ from zero significantly."""
-    return _like_nothing(model, estimate, step, axis=2)
-
-
-def driving_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
-    """Return the inputs (from zero) of a model whose column of G does not differ from zero significantly."""
-    return _like_nothing(model, estimate, step, axis=3)
-
-
-def _like_nothing(model: Model, estimate: Estimate, step: float, axis: int) -> list[int]:
-    """Return the rows or columns of G not significantly different from zero, and not known to be zero."""
+def like_nothing(model: Model, estimate: Estimate, step: float = 1.0, *, inputs: bool = False) -> list[int]:
+    """Return the outputs (from zero), or `inputs`, whose part of G may be zero, and is not known to be."""
     gradient, G = _response(model, step)
-    found = []
+    found, axis = [], 3 if inputs else 2
     for number in range(gradient.shape[axis]):
         change = np.take(gradient, number, axis)
         chance = _chance(estimate, change, np.take(G, number, axis - 1), wholly=True)
