@@ -48,7 +48,7 @@ def said(part: str, outcome: Outcome, **more: object) -> list[str]:
 
 
 def facts(outcome: Outcome, time_unit: str = "", part: str = "facts") -> list[Fact]:
-    """Return the cost of an experiment and the accuracy that it gives, as far as they are in the result.
+    """Return the cost of an experiment and the accuracy that it gives, if the result has them.
 
     Args:
         time_unit: of frequencies.

@@ -1,4 +1,4 @@
-"""The points of a sweep: each is computed once, and what it leaves stands in the directory of the sweep.
+"""The points of a sweep: each is computed once, and its files stand in the directory of the sweep.
 
     sweep.yaml           the spec with its `sweep` block: `idesign sweep` on it repeats the sweep
     sweep.json           the grid of the sweep, and the status of its points
