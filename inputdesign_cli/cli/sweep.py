@@ -141,9 +141,8 @@ def show_trade(
     with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
         from inputdesign_cli.figures.sweep import draw_into, draw_trade
         from inputdesign_cli.figures.sweep_table import read_sweep
-        from inputdesign_cli.sweeps.plan import build_plan
+        from inputdesign_cli.sweeps.plan import build_plan, trade_of, trade_settings
         from inputdesign_cli.sweeps.running import SweepRun
-        from inputdesign_cli.sweeps.trade import trade_of, trade_settings
 
         settings = [*(changes.overrides or []), *trade_settings(spec, words)]
         SweepRun(

@@ -139,7 +139,7 @@ def tried_on(
 
     Args:
         model: whose structure is estimated.
-        seed: the same for every excitation, so that they meet the same noise.
+        seed: one for all excitations, so that they meet the same noise.
         step: time between samples in the unit of the experiment's frequencies.
         executor: where the batches of runs are computed (default: in this process); the result does not
             depend on it.

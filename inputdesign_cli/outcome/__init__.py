@@ -1,6 +1,5 @@
 """Typed results of a question, and their form as JSON."""
 
-from inputdesign_cli.outcome.campaign import Campaign as Campaign
 from inputdesign_cli.outcome.codec import (
     OutcomeError as OutcomeError,
     plain as plain,
@@ -26,13 +25,10 @@ from inputdesign_cli.outcome.design import (
 )
 from inputdesign_cli.outcome.estimate import (
     Assessment as Assessment,
-    Exploration as Exploration,
     Identification as Identification,
     MeasuredLines as MeasuredLines,
     Neglected as Neglected,
     Nominal as Nominal,
-    Validation as Validation,
 )
 from inputdesign_cli.outcome.results import Outcome as Outcome
-from inputdesign_cli.outcome.robust import Robust as Robust
 from inputdesign_cli.outcome.simulation import Simulation as Simulation
