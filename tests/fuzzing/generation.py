@@ -1,203 +1,160 @@
-"""Specs made from nothing, by hypothesis: plants from their poles, loops, questions, spectra, signals."""
+"""Specs made from nothing, at random: plants from their poles, loops, questions, spectra, signals."""
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
-from hypothesis import HealthCheck, Phase, given, seed as seeded, settings, strategies as st
-
-# The first examples of hypothesis are the simplest; the last one of so many is anything.
-_EXAMPLES = 6
-
-
-def generated(number: int) -> dict:
-    """The spec of a number."""
-    found: list[dict] = []
-
-    @seeded(number)
-    @settings(
-        max_examples=_EXAMPLES,
-        phases=[Phase.generate],
-        database=None,
-        deadline=None,
-        suppress_health_check=list(HealthCheck),
-    )
-    @given(specs())
-    def collect(spec):
-        found.append(spec)
-
-    collect()
-    return found[-1]
-
-
-def weighted(*choices):
-    """One of the strategies, each as often as its number says."""
-    return st.sampled_from([one for many, one in choices for _ in range(many)]).flatmap(lambda one: one)
-
-
-def between(low, high):
-    """Numbers as a person writes them: with four decimals."""
-    return st.floats(low, high).map(lambda value: round(value, 4))
-
-
-def logarithmic(low, high):
-    return st.floats(np.log(low), np.log(high)).map(lambda value: float(f"{np.exp(value):.4g}"))
-
-
-magnitudes = weighted((8, logarithmic(0.05, 20)), (2, logarithmic(1e-4, 1e4)), (1, logarithmic(1e-9, 1e9)))
-# Distances to the unit circle of poles: comfortable, slow, on the edge of what digits tell, none.
-real_poles = weighted(
-    (20, between(-0.9, 0.95)),
-    (4, logarithmic(1e-6, 0.05).map(lambda d: 1.0 - d)),
-    (4, st.just(1.0)),
-    (1, st.sampled_from([1.0 - 1e-9, 1.0 + 1e-9, 0.9999998])),
-    (1, between(1.01, 1.5)),
-)
-steady_poles = weighted((12, between(-0.9, 0.95)), (1, logarithmic(1e-3, 0.05).map(lambda d: 1.0 - d)))
-angles = between(0.05, 3.1)
-radii = weighted(
-    (6, between(0.1, 0.95)), (2, logarithmic(1e-4, 0.05).map(lambda d: 1.0 - d)), (1, st.just(1.0))
-)
-
-
-@st.composite
-def polynomials(draw, most, poles=steady_poles):
-    """1 + c1 q^-1 + .. with so many roots at the most, its coefficients as a person writes them."""
-    c = np.ones(1)
-    for _ in range(draw(st.integers(0, most))):
-        c = np.convolve(c, [1.0, -draw(poles)])
-    if draw(st.booleans()) and most > 1:
-        radius, angle = draw(radii if poles is real_poles else between(0.1, 0.97)), draw(angles)
-        c = np.convolve(c, [1.0, -2.0 * radius * np.cos(angle), radius**2])
-    return [float(f"{value:.8g}") for value in c]
-
-
-@st.composite
-def numerators(draw):
-    delay = draw(weighted((6, st.just(1)), (1, st.just(0)), (1, st.integers(2, 5))))
-    size = draw(st.integers(1, 3))
-    gains = [draw(between(-2.0, 2.0)) for _ in range(size)]
-    scale = draw(magnitudes)
-    first = [float(f"{scale * (gain or 1.0):.6g}") for gain in gains]
-    return [0.0] * delay + first
-
-
-@st.composite
-def plants(draw, outputs, inputs):
-    family = draw(st.sampled_from(["ARX", "OE", "ARMAX", "BJ"]))
-    single = outputs * inputs == 1
-    poles = draw(weighted((3, st.just(steady_poles)), (2, st.just(real_poles))))
-
-    def matrix(entries):
-        return draw(entries) if single else [[draw(entries) for _ in range(inputs)] for _ in range(outputs)]
-
-    def rows(entries):
-        return draw(entries) if single or draw(st.booleans()) else [draw(entries) for _ in range(outputs)]
-
-    most = 3 if single else 1
-    plant, noise = {"B": matrix(numerators())}, {}
-    if family in ("ARX", "ARMAX"):
-        plant["A"] = rows(polynomials(most, poles))
-    if family in ("OE", "BJ"):
-        plant["F"] = matrix(polynomials(most, poles))
-    if family in ("ARMAX", "BJ"):
-        noise["C"] = rows(polynomials(1))
-    if family == "BJ":
-        noise["D"] = rows(polynomials(1))
-    noise["variance"] = draw(magnitudes)
-    if not single:
-        root = np.array([[draw(between(-1.0, 1.0)) for _ in range(outputs)] for _ in range(outputs)])
-        noise["variance"] = (noise["variance"] * (root @ root.T + 0.1 * np.eye(outputs))).round(12).tolist()
-    return {"plant": plant, "noise": noise}
-
 
 _GAINS = (0.005, 0.02, 0.1, 0.3, 1.0)
 _FORMS = (([1.0], [1.0]), ([1.0], [1.0, -0.2]), ([1.0, -0.9], [1.0, -1.0]))  # the last one integrates
 
 
-def controllers(plant, outputs, inputs):
-    """Feedback with or without an integrator; that of one input and output is stable where possible."""
-    if outputs * inputs > 1:
-        return st.builds(_decentralised, st.just((inputs, outputs)), *map(st.sampled_from, (_GAINS, _FORMS)))
-    B = np.array(plant["plant"]["B"])
-    below = np.convolve(plant["plant"].get("A", [1.0]), plant["plant"].get("F", [1.0]))
-    size = np.abs(B).sum() or 1.0
-    tried = [
-        {"numerator": [float(f"{gain * c / size:.6g}") for c in form[0]], "denominator": form[1]}
-        for gain in (*_GAINS, *(-gain for gain in _GAINS))
-        for form in _FORMS
-    ]
-    return st.sampled_from([one for one in tried if _stable(B, below, one)] or tried)
+class Draw(random.Random):
+    """Numbers as a person writes them."""
 
+    def weighted(self, *choices):
+        """One of the choices, each as often as its number says; called, if it can be."""
+        (found,) = self.choices([one for _, one in choices], [many for many, _ in choices])
+        return found() if callable(found) else found
 
-def _decentralised(shape, gain, form):
-    own = [gain * c for c in form[0]]
-    rows = [[own if i == j else [0.0] for j in range(shape[1])] for i in range(shape[0])]
-    return {"numerator": rows, "denominator": form[1]}
+    def flag(self, share):
+        return self.random() < share
 
+    def between(self, low, high):
+        return round(self.uniform(low, high), 4)
 
-def _stable(above, below, controller):
-    opened, fed_back = (
-        np.convolve(below, controller["denominator"]),
-        np.convolve(above, controller["numerator"]),
-    )
-    closed = np.polynomial.polynomial.polyadd(opened, fed_back)
-    return bool(np.all(np.abs(np.roots(closed)) < 0.9999))
+    def logarithmic(self, low, high):
+        return float(f"{np.exp(self.uniform(np.log(low), np.log(high))):.4g}")
 
+    def magnitude(self):
+        return self.logarithmic(*self.weighted((8, (0.05, 20)), (2, (1e-4, 1e4)), (1, (1e-9, 1e9))))
 
-@st.composite
-def bands(draw):
-    low = draw(weighted((1, st.just(0.0)), (2, logarithmic(1e-3, 0.5))))
-    return [low, draw(weighted((2, between(0.6, 3.0)), (1, st.just(3.14159))))]
-
-
-@st.composite
-def model_errors(draw):
-    error = {draw(st.sampled_from(["relative", "absolute"])): draw(logarithmic(0.005, 1.0))}
-    error |= draw(
-        st.sampled_from([{"confidence": 0.95}, {"alpha": 2.45}, {"confidence": 0.99}, {"alpha": 1.0}])
-    )
-    if draw(weighted((2, st.just(False)), (1, st.just(True)))):
-        error["band"] = draw(bands())
-    return error
-
-
-@st.composite
-def questions(draw, outputs, inputs):
-    """What is asked, within which limits."""
-    power = {"input_power": draw(magnitudes)}
-    asked = draw(
-        st.sampled_from(["cost", "cost", "cost", "limited", "best", "shortest", "criterion", "variance"])
-    )
-    spec: dict = {"accuracy": {"model_error": draw(model_errors())}}
-    if asked == "limited":
-        spec["limits"] = draw(st.sampled_from([power, {"output_power": power["input_power"]}]))
-        spec["cost"] = draw(
-            st.sampled_from(
-                [{"input_power": 1}, {"output_power": 1}, {"input_power": 1, "output_power": 0.1}]
-            )
+    def steady_pole(self):
+        return self.weighted(
+            (12, lambda: self.between(-0.9, 0.95)), (1, lambda: 1.0 - self.logarithmic(1e-3, 0.05))
         )
-    elif asked in ("best", "shortest"):
-        spec["objective"] = {"best": "best_accuracy", "shortest": "shortest_experiment"}[asked]
-        spec["limits"] = power
-    elif asked == "criterion":
-        spec = {"accuracy": {"criterion": draw(st.sampled_from("DAET"))}, "limits": power}
-    elif asked == "variance":
-        relative = draw(st.booleans())
-        spec["accuracy"] = {"weighted_variance": {"max": draw(logarithmic(1e-4, 1.0)), "relative": relative}}
-    if draw(weighted((5, st.just(False)), (1, st.just(True)))):
-        spec.setdefault("limits", {})["amplitude"] = draw(logarithmic(0.3, 30))
+
+    def real_pole(self):
+        """Distances to the unit circle: comfortable, slow, none, on the edge of what digits tell, outside."""
+        return self.weighted(
+            (20, lambda: self.between(-0.9, 0.95)),
+            (4, lambda: 1.0 - self.logarithmic(1e-6, 0.05)),
+            (4, 1.0),
+            (1, lambda: self.choice([1.0 - 1e-9, 1.0 + 1e-9, 0.9999998])),
+            (1, lambda: self.between(1.01, 1.5)),
+        )
+
+    def radius(self):
+        return self.weighted(
+            (6, lambda: self.between(0.1, 0.95)), (2, lambda: 1.0 - self.logarithmic(1e-4, 0.05)), (1, 1.0)
+        )
+
+
+def generated(number: int) -> dict:
+    """The spec of a number: with all its sections, well posed or not."""
+    draw = Draw(number)
+    size = draw.weighted((6, (1, 1)), (2, (2, 2)), (0.5, (1, 2)), (0.5, (2, 1)))
+    spec = _system(draw, *size)
+    spec["experiment"] = {"samples": draw.choice([100, 500, 2000, 10_000])}
+    if draw.flag(0.4) or _unstable(spec):
+        spec["experiment"]["controller"] = _controller(draw, spec, *size)
+    spec |= _question(draw)
+    spec["spectrum"] = draw.choice(
+        [
+            {"type": "white"},
+            *({"type": "fir", "order": order} for order in (1, 4, 4, 12)),
+            {"type": "free"},
+            {"type": "multisine", "lines": 20},
+            {"type": "polynomial", "order": 3, "band": [0.0, 1.0]},
+        ]
+    )
+    spec["signal"] = draw.weighted(
+        (3, {"samples": 64}),
+        (1, {"type": "multisine", "samples": 128}),
+        (1, {"type": "binary", "samples": 128}),
+    )
+    if draw.flag(0.25):
+        spec["sample_time"] = draw.logarithmic(1e-3, 1e3)
+    spec["solver"] = {"time_limit": 20}
     return spec
 
 
-spectra = st.sampled_from(
-    [
-        {"type": "white"},
-        *({"type": "fir", "order": order} for order in (1, 4, 4, 12)),
-        {"type": "free"},
-        {"type": "multisine", "lines": 20},
-        {"type": "polynomial", "order": 3, "band": [0.0, 1.0]},
+def _polynomial(draw, most, pole, radius):
+    """1 + c1 q^-1 + .. with so many real roots at the most, and perhaps a pair."""
+    c = np.ones(1)
+    for _ in range(draw.randint(0, most)):
+        c = np.convolve(c, [1.0, -pole()])
+    if draw.flag(0.5) and most > 1:
+        modulus = radius()
+        c = np.convolve(c, [1.0, -2.0 * modulus * np.cos(draw.between(0.05, 3.1)), modulus**2])
+    return [float(f"{value:.8g}") for value in c]
+
+
+def _numerator(draw):
+    delay = draw.weighted((6, 1), (1, 0), (1, lambda: draw.randint(2, 5)))
+    scale = draw.magnitude()
+    gains = [draw.between(-2.0, 2.0) or 1.0 for _ in range(draw.randint(1, 3))]
+    return [0.0] * delay + [float(f"{scale * gain:.6g}") for gain in gains]
+
+
+def _system(draw, outputs, inputs):
+    family, single = draw.choice(["ARX", "OE", "ARMAX", "BJ"]), outputs * inputs == 1
+    real = draw.flag(0.4)
+    pole = draw.real_pole if real else draw.steady_pole
+    radius = draw.radius if real else lambda: draw.between(0.1, 0.97)
+
+    def matrix(entry):
+        return entry() if single else [[entry() for _ in range(inputs)] for _ in range(outputs)]
+
+    def rows(entry):
+        return entry() if single or draw.flag(0.5) else [entry() for _ in range(outputs)]
+
+    def of_plant():
+        return _polynomial(draw, 3 if single else 1, pole, radius)
+
+    def of_noise():
+        return _polynomial(draw, 1, draw.steady_pole, draw.radius)
+
+    plant, noise = {"B": matrix(lambda: _numerator(draw))}, {}
+    if family in ("ARX", "ARMAX"):
+        plant["A"] = rows(of_plant)
+    else:
+        plant["F"] = matrix(of_plant)
+    if family in ("ARMAX", "BJ"):
+        noise["C"] = rows(of_noise)
+    if family == "BJ":
+        noise["D"] = rows(of_noise)
+    noise["variance"] = draw.magnitude()
+    if not single:
+        root = np.array([[draw.between(-1.0, 1.0) for _ in range(outputs)] for _ in range(outputs)])
+        noise["variance"] = (noise["variance"] * (root @ root.T + 0.1 * np.eye(outputs))).round(12).tolist()
+    return {"plant": plant, "noise": noise}
+
+
+def _controller(draw, spec, outputs, inputs):
+    """Feedback with or without an integrator; that of one input and output is stable where possible."""
+    if outputs * inputs > 1:
+        gain, (above, below) = draw.choice(_GAINS), draw.choice(_FORMS)
+        own = [gain * c for c in above]
+        rows = [[own if i == j else [0.0] for j in range(outputs)] for i in range(inputs)]
+        return {"numerator": rows, "denominator": below}
+    B = np.array(spec["plant"]["B"])
+    below = np.convolve(spec["plant"].get("A", [1.0]), spec["plant"].get("F", [1.0]))
+    tried = [
+        {"numerator": [float(f"{gain * c / (np.abs(B).sum() or 1.0):.6g}") for c in form[0]]}
+        | {"denominator": form[1]}
+        for gain in (*_GAINS, *(-gain for gain in _GAINS))
+        for form in _FORMS
     ]
-)
+    return draw.choice([one for one in tried if _stable(B, below, one)] or tried)
+
+
+def _stable(above, below, controller):
+    opened = np.convolve(below, controller["denominator"])
+    fed_back = np.convolve(above, controller["numerator"])
+    closed = np.polynomial.polynomial.polyadd(opened, fed_back)
+    return bool(np.all(np.abs(np.roots(closed)) < 0.9999))
 
 
 def _unstable(spec):
@@ -209,24 +166,34 @@ def _unstable(spec):
     return bool(np.any(np.abs(poles) > 1.0 - 1e-9))
 
 
-@st.composite
-def specs(draw):
-    """A spec with all its sections, well posed or not."""
-    size = draw(weighted((6, st.just((1, 1))), (2, st.just((2, 2))), (1, st.sampled_from([(1, 2), (2, 1)]))))
-    spec = draw(plants(*size))
-    spec["experiment"] = {"samples": draw(st.sampled_from([100, 500, 2000, 10_000]))}
-    if draw(weighted((3, st.just(False)), (2, st.just(True)))) or _unstable(spec):
-        spec["experiment"]["controller"] = draw(controllers(spec, *size))
-    spec |= draw(questions(*size))
-    spec["spectrum"] = draw(spectra)
-    spec["signal"] = draw(
-        weighted(
-            (3, st.just({"samples": 64})),
-            (1, st.just({"type": "multisine", "samples": 128})),
-            (1, st.just({"type": "binary", "samples": 128})),
+def _model_error(draw):
+    error = {draw.choice(["relative", "absolute"]): draw.logarithmic(0.005, 1.0)}
+    error |= draw.choice([{"confidence": 0.95}, {"alpha": 2.45}, {"confidence": 0.99}, {"alpha": 1.0}])
+    if draw.flag(1 / 3):
+        low = draw.weighted((1, 0.0), (2, lambda: draw.logarithmic(1e-3, 0.5)))
+        error["band"] = [low, draw.weighted((2, lambda: draw.between(0.6, 3.0)), (1, 3.14159))]
+    return error
+
+
+def _question(draw):
+    """What is asked, within which limits."""
+    power = {"input_power": draw.magnitude()}
+    asked = draw.choice(["cost"] * 3 + ["limited", "best", "shortest", "criterion", "variance"])
+    spec: dict = {"accuracy": {"model_error": _model_error(draw)}}
+    if asked == "limited":
+        spec["limits"] = draw.choice([power, {"output_power": power["input_power"]}])
+        spec["cost"] = draw.choice(
+            [{"input_power": 1}, {"output_power": 1}, {"input_power": 1, "output_power": 0.1}]
         )
-    )
-    if draw(weighted((3, st.just(False)), (1, st.just(True)))):
-        spec["sample_time"] = draw(logarithmic(1e-3, 1e3))
-    spec["solver"] = {"time_limit": 20}
+    elif asked in ("best", "shortest"):
+        spec["objective"] = {"best": "best_accuracy", "shortest": "shortest_experiment"}[asked]
+        spec["limits"] = power
+    elif asked == "criterion":
+        spec = {"accuracy": {"criterion": draw.choice("DAET")}, "limits": power}
+    elif asked == "variance":
+        spec["accuracy"] = {
+            "weighted_variance": {"max": draw.logarithmic(1e-4, 1.0), "relative": draw.flag(0.5)}
+        }
+    if draw.flag(1 / 6):
+        spec.setdefault("limits", {})["amplitude"] = draw.logarithmic(0.3, 30)
     return spec

@@ -25,18 +25,14 @@ from inputdesign_cli.plant import (
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 from inputdesign_cli.spectrum import FirBasis, FlatBasis, LinesBasis
 from tests.support.convex_designs import around, moved
-from tests.support.plants import arrays, arx, box_jenkins, paper_experiment, two_by_two
+from tests.support.plants import arrays, arx, box_jenkins, every_polynomial, paper_experiment, two_by_two
 from tests.support.random_plants import random_case
 
 W = np.array([0.1, 0.9, 2.2])
 
 
 def single() -> Experiment:
-    """One input and one output, every polynomial present."""
-    model = PolynomialModel.single(
-        [0, 2.0, 0.3], A=[1, -0.5], C=[1, 0.2], D=[1, 0.6], F=[1, -0.1, 0.4], variance=0.7
-    )
-    return Experiment(model, 50)
+    return Experiment(every_polynomial(), 50)
 
 
 def as_matrices(density, inputs):
@@ -209,9 +205,6 @@ def test_they_are_the_sums_over_outputs(frequencies, inputs, silent):
     np.testing.assert_allclose(got, np.einsum("nkpa,kl,nlpb->nab", F.conj(), Y, F), atol=1e-12)
 
 
-EVERY = PolynomialModel.single(
-    [0, 2.0, 0.3], A=[1, -0.5], C=[1, 0.2], D=[1, 0.6], F=[1, -0.1, 0.4], variance=0.7
-)
 OUTPUT_ERROR = PolynomialModel.single([0, 0.5], F=[1, -0.8])
 SLOW, INTEGRATING = ([0.4], [1, -0.95]), ([0.2], [1, -1])
 
@@ -222,7 +215,7 @@ def controlled(model, controller):
 
 
 CASES = {
-    "every polynomial": Experiment(EVERY, 50),
+    "every polynomial": single(),
     "output error": Experiment(OUTPUT_ERROR, 50),
     "in a loop": Experiment(OUTPUT_ERROR, 50, loop=controlled(OUTPUT_ERROR, SLOW)),
     "under integral action": Experiment(OUTPUT_ERROR, 50, loop=controlled(OUTPUT_ERROR, INTEGRATING)),

@@ -14,7 +14,7 @@ from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatri
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.multisine import multisine_record
 from inputdesign_cli.spectrum import FirBasis
-from tests.support.plants import arrays, arx, paper_experiment
+from tests.support.plants import arrays, arx, paper_experiment, polynomials
 from tests.support.random_plants import random_case
 
 
@@ -22,35 +22,16 @@ from tests.support.random_plants import random_case
 def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
     """Finite differences of epsilon = (D/C)(A y - (B/F) u) on noise-free data, open and closed loop."""
     case = random_case(seed)
-    model, loop = case.model, case.loop
-    A, B, C, D, F = model.A[0], model.B[0][0], model.C[0], model.D[0], model.F[0][0]
-    r = np.random.default_rng(seed).normal(size=50)
-    u, y = np.zeros(50), np.zeros(50)
-    above, below = ([0.0], [1.0])
-    if loop is not None:
-        above, below = loop.controller.numerator[0, 0], loop.controller.denominator[0]
-    plant = np.convolve(A, F)
-    feedback = np.zeros(50)
-    for t in range(50):  # the loop, sample by sample
-        y[t] = sum(B[i] * u[t - i] for i in range(1, len(B)) if t >= i) - sum(
-            plant[i] * y[t - i] for i in range(1, len(plant)) if t >= i
-        )
-        feedback[t] = sum(above[i] * y[t - i] for i in range(len(above)) if t >= i) - sum(
-            below[i] * feedback[t - i] for i in range(1, len(below)) if t >= i
-        )
-        u[t] = r[t] - feedback[t]
+    model, loop, r = case.model, case.loop, np.random.default_rng(seed).normal(size=(1, 50, 1))
+    y, u = loop.signals(r, 0 * r) if loop else (model.simulate(r[0], 0 * r[0], 1.0)[0][None], r)
 
     def residual(theta):
-        values = dict(zip(model.names, theta, strict=True))
-        p = {
-            letter: [values.get(f"{letter.lower()}{lag}", c) for lag, c in enumerate(own)]
-            for letter, own in {"A": A, "B": B, "C": C, "D": D, "F": F}.items()
-        }
-        clean = scipy.signal.lfilter(p["A"], [1.0], y) - scipy.signal.lfilter(p["B"], p["F"], u)
-        return scipy.signal.lfilter(p["D"], p["C"], clean)
+        A, B, C, D, F = polynomials(model, theta).values()
+        clean = scipy.signal.lfilter(A, [1.0], y[0, :, 0]) - scipy.signal.lfilter(B, F, u[0, :, 0])
+        return scipy.signal.lfilter(D, C, clean)
 
     experiment = case.experiment(50)
-    found = FiniteRecord(experiment, 50).gradient(r[:, None])[:, :, 0] * np.sqrt(model.covariance[0, 0])
+    found = FiniteRecord(experiment, 50).gradient(r[0])[:, :, 0] * np.sqrt(model.covariance[0, 0])
     h = 1e-6
     for k in range(len(model.names)):
         if model.names[k][0] in "cd":

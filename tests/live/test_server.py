@@ -284,6 +284,7 @@ def test_what_the_user_writes_is_text_on_the_page():
 
 @needs_browser
 @pytest.mark.browser
+@pytest.mark.slow
 def test_a_browser_follows_by_itself(spec, tmp_path):
     with watching(spec, "-o", tmp_path / "run", "--no-figures") as address, started() as browser:
         page = browser.new_page(viewport={"width": 1400, "height": 900})

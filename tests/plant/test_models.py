@@ -14,10 +14,12 @@ from tests.support.plants import (
     arx,
     box_jenkins,
     descending,
+    every_polynomial,
     in_words,
     known,
     lag_of,
     late_entries,
+    polynomials,
     process,
     two_by_two,
 )
@@ -31,7 +33,6 @@ COMMON = ContinuousModel.monic(
     np.eye(2),
     common=True,
 )
-SINGLE = PolynomialModel.single([0, 2.0, 0.3], A=[1, -0.5], C=[1, 0.2], D=[1, 0.6], F=[1, -0.1, 0.4])
 
 
 def late(tau) -> ContinuousModel:
@@ -39,7 +40,7 @@ def late(tau) -> ContinuousModel:
 
 
 POLYNOMIALS = {
-    "one channel": SINGLE,
+    "one channel": every_polynomial(),
     "arx": arx(),
     "common arx": arx(per_output=False),
     "box-jenkins": box_jenkins(),
@@ -49,7 +50,7 @@ POLYNOMIALS = {
 }
 MODELS = {
     **POLYNOMIALS,
-    "coloured": Coloured(SINGLE, (np.array([1.0, 0.5, 0.2]),), (np.array([1.0, -0.7]),)),
+    "coloured": Coloured(every_polynomial(), (np.array([1.0, 0.5, 0.2]),), (np.array([1.0, -0.7]),)),
     "continuous": two_by_two(),
     "common continuous": COMMON,
     "sampled": SampledModel(two_by_two(), 0.4),
@@ -84,16 +85,6 @@ def test_plant_gradients_are_differences(name):
         found = slope(lambda x, unit=unit: model.at(theta + x * unit).plant_at(W))
         np.testing.assert_allclose(exact[:, k], found, atol=1e-7 * max(1.0, np.abs(exact[:, k]).max()))
         assert model.in_plant[k] == np.any(found != 0.0)
-
-
-def polynomials(model, theta=None):
-    """A, B, C, D and F by letter, with the values of `theta` by the names of its parameters."""
-    values = dict(zip(model.names, model.theta if theta is None else theta, strict=True))
-    own = {"A": model.A[0], "B": model.B[0][0], "C": model.C[0], "D": model.D[0], "F": model.F[0][0]}
-    return {
-        letter: [values.get(f"{letter.lower()}{lag}", c) for lag, c in enumerate(p)]
-        for letter, p in own.items()
-    }
 
 
 def bode(polynomials, w):

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +50,15 @@ SWEEPS = {
 }
 
 
-NAMES = [*KINDS, *SWEEPS, "open", "closed", "assessed", "explored", "campaign", "campaign begun"]
-NAMES += ["waiting", "wrong"]
+MESSAGES = {
+    "waiting": message_page("sweep", "3 points have a result so far.", "shows what comes"),
+    "wrong": WRONG.page,
+}
+OF_RECORDS = {
+    "assessed": lambda record: assess(parse_spec(SPEC % ""), record).results,
+    "explored": lambda record: explore([record]).results,
+}
+NAMES = ["open", "closed", *KINDS, *SWEEPS, *OF_RECORDS, "campaign", "campaign begun", *MESSAGES]
 
 
 @pytest.fixture(scope="module")
@@ -65,31 +73,37 @@ def record(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def places(runs, record, tmp_path_factory):
-    """Directories by the kind of their page."""
+def place(runs, record, tmp_path_factory):
+    """The directory that a page is of, by its kind: made when it is first asked for."""
     folder = tmp_path_factory.mktemp("pages")
-    made = {"open": runs / "open", "closed": runs / "closed"}
-    for name, (verb, spec, overrides) in KINDS.items():
-        made[name] = folder / name
-        write_run(verb(load_spec(SPECS / f"{spec}.yaml", overrides)), made[name])
-    for name, found in (
-        ("assessed", assess(parse_spec(SPEC % ""), record).results),
-        ("explored", explore([record]).results),
-    ):
-        made[name] = folder / name
-        write_run(found, made[name])
-    for name, (settings, rows) in SWEEPS.items():
-        made[name] = folder / name
-        run_sweep(runs / "open.yaml", settings, directory=made[name])
-        table = made[name] / "sweep.csv"
+
+    def sweep(name):
+        settings, rows = SWEEPS[name]
+        run_sweep(runs / "open.yaml", settings, directory=folder / name)
+        table = folder / name / "sweep.csv"
         lines = table.read_text().splitlines()[rows]
         pending = ",".join(["800", "pending", *[""] * (lines[0].count(",") - 1)])
         table.write_text("\n".join([*lines, *[pending] * (rows.stop is not None), ""]))
-    made["campaign begun"], made["campaign"] = folder / "begun", folder / "campaign"
-    for place in (made["campaign begun"], made["campaign"]):
-        idesign("campaign", SPECS / "campaign.yaml", "-o", place, "--no-figures", "-q")
-    part = applied(made["campaign"], folder / "part.csv")
-    idesign("next", made["campaign"], part, "--no-figures", "-q")
+
+    def campaign(name):
+        idesign("campaign", SPECS / "campaign.yaml", "-o", folder / name, "--no-figures", "-q")
+        if name == "campaign":
+            part = applied(folder / name, folder / "part.csv")
+            idesign("next", folder / name, part, "--no-figures", "-q")
+
+    @cache
+    def made(name):
+        if name in ("open", "closed"):
+            return runs / name
+        if name in KINDS:
+            verb, spec, overrides = KINDS[name]
+            write_run(verb(load_spec(SPECS / f"{spec}.yaml", overrides)), folder / name)
+        elif name in OF_RECORDS:
+            write_run(OF_RECORDS[name](record), folder / name)
+        else:
+            (sweep if name in SWEEPS else campaign)(name)
+        return folder / name
+
     return made
 
 
@@ -98,16 +112,17 @@ def idesign(*words):
 
 
 @pytest.fixture(scope="module")
-def pages(places, tmp_path_factory):
+def address(place, tmp_path_factory):
+    """Where a browser finds a page, by its kind."""
     folder = tmp_path_factory.mktemp("html")
-    for name, place in places.items():
-        (folder / f"{name}.html").write_text(report_text(place))
-    for name, text in (
-        ("waiting", message_page("sweep", "3 points have a result so far.", "shows what comes")),
-        ("wrong", WRONG.page),
-    ):
-        (folder / f"{name}.html").write_text(text)
-    return folder
+
+    @cache
+    def of(name):
+        path = folder / f"{name}.html"
+        path.write_text(MESSAGES[name] if name in MESSAGES else report_text(place(name)))
+        return path.as_uri()
+
+    return of
 
 
 @pytest.fixture(scope="module")
@@ -116,13 +131,12 @@ def browser():
         yield found
 
 
+@pytest.mark.first(2)
+@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize(
-    ("width", "scheme"), [(400, "dark"), pytest.param(1400, "light", marks=pytest.mark.slow)]
-)
-def test_a_page_is_accessible_and_nothing_is_clipped(pages, browser, name, scheme, width):
+def test_a_page_is_accessible_and_nothing_is_clipped(address, browser, name, scheme, width):
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-    page.goto((pages / f"{name}.html").as_uri())
+    page.goto(address(name))
     assert violations(page) == []
     assert clipped(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
@@ -138,9 +152,9 @@ def small_text(page):
         .map((e) => e.src.slice(0, 22)).filter((kind) => kind !== "data:image/svg+xml;bas")""")
 
 
-def test_the_contents_lead_to_headings_by_keyboard(pages, browser):
+def test_the_contents_lead_to_headings_by_keyboard(address, browser):
     page = browser.new_page()
-    page.goto((pages / "open.html").as_uri())
+    page.goto(address("open"))
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     assert page.url.endswith("#the-question")
@@ -149,12 +163,12 @@ def test_the_contents_lead_to_headings_by_keyboard(pages, browser):
     assert missing == []
 
 
-def test_values_are_told_where_one_points_and_by_the_arrow_keys(pages, browser, runs):
+def test_values_are_told_where_one_points_and_by_the_arrow_keys(address, browser, runs):
     """They are those of bound.csv, to the digits that are shown, at the frequency that is shown."""
     table = np.genfromtxt(runs / "open" / "bound.csv", delimiter=",", names=True)
     w, r_u = table[table.dtype.names[0]], table["r_u"]
     page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto((pages / "open.html").as_uri())
+    page.goto(address("open"))
     plot = page.locator("[role=slider]").first
     told = plot.locator("xpath=following-sibling::p")
     box = plot.bounding_box()
@@ -173,6 +187,7 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(pages, browser, 
     assert violations(page) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "told", "figure"),
     [
@@ -183,9 +198,9 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(pages, browser, 
         ("assessed", ["time", "predicted one step ahead"], 0),
     ],
 )
-def test_every_kind_of_curve_tells_its_values(pages, browser, name, told, figure):
+def test_every_kind_of_curve_tells_its_values(address, browser, name, told, figure):
     page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto((pages / f"{name}.html").as_uri())
+    page.goto(address(name))
     plot = page.locator("figure").nth(figure).locator("[role=slider]")
     answer = plot.locator("xpath=following-sibling::p")
     box = plot.bounding_box()
@@ -200,12 +215,13 @@ def test_every_kind_of_curve_tells_its_values(pages, browser, name, told, figure
     assert violations(page) == []
 
 
-def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(pages, browser, places):
+@pytest.mark.slow
+def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(address, browser, place):
     """What is said at the ring is C G at the frequency that is said, by nyquist.csv."""
-    table = np.genfromtxt(places["loop"] / "nyquist.csv", delimiter=",", names=True)
+    table = np.genfromtxt(place("loop") / "nyquist.csv", delimiter=",", names=True)
     w, loop = table[table.dtype.names[0]], table["CG_re"] + 1j * table["CG_im"]
     page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto((pages / "loop.html").as_uri())
+    page.goto(address("loop"))
     plot = page.locator("figure").nth(1).locator("[role=slider]")
     box = plot.bounding_box()
     for across, down in ((0.5, 0.5), (0.6, 0.7), (0.4, 0.6)):
@@ -218,16 +234,16 @@ def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(pages, bro
         assert complex(real, imaginary) == pytest.approx(loop[np.abs(w - at).argmin()], abs=0.02)
 
 
-def test_a_page_without_scripts_shows_the_same_pictures(pages, browser):
+def test_a_page_without_scripts_shows_the_same_pictures(address, browser):
     page = browser.new_context(java_script_enabled=False).new_page()
-    page.goto((pages / "open.html").as_uri())
+    page.goto(address("open"))
     assert page.locator("figure img").count() >= 4
     assert page.locator("[role=slider]").count() == 0
 
 
-def test_all_numbers_are_folded_until_they_are_asked_for(pages, browser):
+def test_all_numbers_are_folded_until_they_are_asked_for(address, browser):
     page = browser.new_page()
-    page.goto((pages / "open.html").as_uri())
+    page.goto(address("open"))
     cell = page.get_by_text("objective.lower_bound", exact=True)
     assert not cell.is_visible()
     page.locator("summary").click()

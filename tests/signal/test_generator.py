@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.convex.designs import solve_design
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.common.record import worst_ratio
 from inputdesign_cli.signal.evaluation import Target
@@ -16,6 +14,7 @@ from inputdesign_cli.signal.multisine import gaussian_record
 from inputdesign_cli.signal.selection import best_record
 from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from tests.support.convex_designs import solve
 from tests.support.random_plants import random_case
 from tests.support.signals import COLOURED, block_spectrum, of_two_inputs
 
@@ -159,10 +158,9 @@ def test_given_lines_are_made_as_they_are_given(first_order):
 def test_random_designs(seed, samples, method):
     """The design of a random case, its record, and what that attains, all recomputed."""
     case = random_case(seed)
-    question = Question(
-        case.experiment(samples), FirBasis(1, case.order), "cost", [case.requirement], cost=case.cost
+    design = solve(
+        case.experiment(samples), "cost", [case.requirement], case.order, cost=case.cost, tolerance=1e-6
     )
-    design = solve_design(question, tolerance=1e-6)
     problem, x = design.problem, design.result.x
     designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
     target = Target(worst_ratio(problem.requirements), True, case.cost, designed)

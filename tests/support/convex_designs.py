@@ -28,12 +28,12 @@ def solve(*args, tolerance=1e-7, **more):
     return solve_design(asked(*args, **more), tolerance=tolerance)
 
 
-def relative(fraction=0.01, alpha=2.45, band=BAND, kind=ModelError):
-    """The maker of a bound on the error of G, relative to the |G| of the plant that it is made for."""
+def relative(fraction=0.01, alpha=2.45, band=BAND, kind=ModelError, admissible=None):
+    """The maker of a bound on the error of G, by default relative to the |G| of the plant it is made for."""
 
     def make(experiment):
-        admissible = Relative(experiment.model, fraction, (0, 0))
-        return kind(experiment=experiment, band=band, entry=(0, 0), admissible=admissible, alpha=alpha)
+        most = admissible or Relative(experiment.model, fraction, (0, 0))
+        return kind(experiment=experiment, band=band, entry=(0, 0), admissible=most, alpha=alpha)
 
     return [make]
 

@@ -51,6 +51,23 @@ def in_words(model) -> Reparametrised:
     return Reparametrised(model, at)
 
 
+def every_polynomial() -> PolynomialModel:
+    """One input and one output, every polynomial present."""
+    return PolynomialModel.single(
+        [0, 2.0, 0.3], A=[1, -0.5], C=[1, 0.2], D=[1, 0.6], F=[1, -0.1, 0.4], variance=0.7
+    )
+
+
+def polynomials(model, theta=None):
+    """A, B, C, D and F by letter, with the values of `theta` by the names of its parameters."""
+    values = dict(zip(model.names, model.theta if theta is None else theta, strict=True))
+    own = {"A": model.A[0], "B": model.B[0][0], "C": model.C[0], "D": model.D[0], "F": model.F[0][0]}
+    return {
+        letter: [values.get(f"{letter.lower()}{lag}", c) for lag, c in enumerate(p)]
+        for letter, p in own.items()
+    }
+
+
 def two_by_two() -> ContinuousModel:
     """The nominal plant of the spectral design paper."""
     return ContinuousModel.monic(
