@@ -23,7 +23,7 @@ _WORDS = {
 _PART = {"hold": AMOUNT, "time": AMOUNT, "converter": r"(?:\b\d+ bits|\bsteps?|\bresolution)\b.*"}
 _FILE = re.compile(r"\s*(?:(?:time|[uy]\d*)\s*=|(?:step|log)\s+\S*\.\w)", re.I)  # and its columns
 _LASTS = re.compile(rf"\s*\b(?:for|in|within|during)\s+({AMOUNT})\s*$", re.I)
-_ENDS = re.compile(r"([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
+_ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 
 
 def in_sentence(text: str) -> dict[str, str]:

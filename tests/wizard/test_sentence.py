@@ -84,6 +84,7 @@ def test_an_answer_to_one_question_is_no_sentence(text):
 
 
 def test_a_log_may_stand_in_a_sentence():
+    assert in_sentence("PI loop with 6 dB, gain ca. 2")["plant"] == "gain ca. 2"
     found = in_sentence("PI loop with 6 dB, log a.csv columns u=OP [%], y=PV, valve 45 +- 8 %")
     assert found["plant"] == "log a.csv columns u=OP [%], y=PV"
     assert set(found) == {"wish", "plant", "range"}
