@@ -40,13 +40,14 @@ def wizard(
     line an answer. What is written is an ordinary spec.
     """
     from inputdesign_cli.wizard.questions import needed_of, read_answers
+    from inputdesign_cli.wizard.sentence import spread
 
     if answers is not None and output.exists() and output.samefile(answers):
         hint = "choose another name for the spec with -o"
         raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
     refuse_existing(output, overwrite)
     said = read_answers(answers, [*([f"plant={sentence}"] if sentence else []), *(given or [])])
-    brief = said.spread()
+    brief = spread(said)
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     draft = None
     if (brief or needed_of(said.texts)) and (terminal or answers is None):

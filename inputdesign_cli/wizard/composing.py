@@ -118,29 +118,16 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     if there < LEAST * step:
         short_of = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
         raise bad_answer("time", short_of)
-    hold = dwell(said["hold"], step)
-    duration = min(there, _MOST * step)
-    control = controller(said["loop"], plant)
-    asked = wished(said["wish"], plant, control is not None, duration)
-    # Lines of a response are one over the time apart: it takes all of it.
+    hold, control = dwell(said["hold"], step), controller(said["loop"], plant)
+    asked = wished(said["wish"], plant, control is not None, min(there, _MOST * step))
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"])
-    duration = there if nonparametric else duration
-    if hold > 1:  # a record holds whole positions
-        whole = hold * step * (_PERIODS if nonparametric else 1)
-        duration = whole * math.floor(duration / whole * (1.0 + 1e-9))
-        if duration < _POSITIONS * hold * step:
-            raise bad_answer(
-                "hold", f"in the time that there is, the input has less than {_POSITIONS} positions"
-            )
     made = asking.chosen("signals", said["signals"], _TYPES)
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
     unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
     heard = list(plant.heard)
     if "slope" in plant.values and control is not None and control == plant.controller:
-        heard.append(
-            f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"
-        )
+        heard += [f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"]
     facts = {
         "said": said,
         "plant": plant,
@@ -153,7 +140,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "span": span,
         "rate": rate,
         "output": output,
-        "duration": duration,
+        "duration": _duration(there, step, hold, nonparametric=nonparametric),
         "periods": _PERIODS,
         "there": there,
         "most": _MOST,
@@ -167,6 +154,18 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     spectrum = None if nonparametric else "{type: fir, order: 20}"
     notes = (*heard, *against, *[_UNUSED] * unused)
     return Draft(facts, plant.files, spectrum, folder, said, there, notes)
+
+
+def _duration(there: float, step: float, hold: int, *, nonparametric: bool) -> float:
+    """Return the seconds of a record in whole positions of the input, each of `hold` samples."""
+    # Lines of a response are one over the time apart: it takes all of it.
+    most = there if nonparametric else min(there, _MOST * step)
+    if hold == 1:
+        return most
+    whole = hold * step * (_PERIODS if nonparametric else 1)
+    if most < _POSITIONS * whole:
+        raise bad_answer("hold", f"in the time that there is, the input has less than {_POSITIONS} positions")
+    return whole * math.floor(most / whole * (1.0 + 1e-9))
 
 
 def with_spectrum(draft: Draft, solve: Solve) -> Draft:

@@ -105,23 +105,6 @@ class Answers:
     texts: dict[str, str] = field(default_factory=dict)
     places: dict[str, Location] = field(default_factory=dict)
 
-    def spread(self) -> bool:
-        """Put the answers of a sentence in the place of the plant; return whether it is one.
-
-        Raises:
-            SpecError: `bad-answer` for a clause that answers no question.
-        """
-        from inputdesign_cli.wizard.sentence import in_sentence
-
-        with self.located():
-            found = in_sentence(self.texts.get("plant", ""))
-        if found:
-            del self.texts["plant"]
-            for key, text in found.items():
-                if self.texts.setdefault(key, text) is text and "plant" in self.places:
-                    self.places[key] = self.places["plant"]
-        return bool(found)
-
     @contextmanager
     def located(self) -> Iterator[None]:
         """Give errors inside the place of the answer that they are about."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from inputdesign_cli.wizard.grammar import AMOUNT, NUMBER, PLUS_MINUS
-from inputdesign_cli.wizard.questions import bad_answer
+from inputdesign_cli.wizard.questions import Answers, bad_answer
 
 # The question that a clause answers: the first of which it has a word.
 _WORDS = {
@@ -23,7 +23,7 @@ _WORDS = {
 _PART = {"hold": AMOUNT, "time": AMOUNT, "converter": r"(?:\b\d+ bits|\bsteps?|\bresolution)\b.*"}
 _FILE = re.compile(r"\s*(?:(?:time|[uy]\d*)\s*=|(?:step|log)\s+\S*\.\w)", re.I)  # and its columns
 _LASTS = re.compile(rf"\s*\b(?:for|in|within|during)\s+({AMOUNT})\s*$", re.I)
-_ENDS = re.compile(r"([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
+_ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 
 
 def in_sentence(text: str) -> dict[str, str]:
@@ -55,3 +55,19 @@ def in_sentence(text: str) -> dict[str, str]:
             "no" if re.search(r"\b(?:not?|never)\b", " ".join(found["return"]), re.I) else "yes"
         ]
     return {key: ", ".join(parts).strip() for key, parts in found.items()}
+
+
+def spread(answers: Answers) -> bool:
+    """Put the answers of a sentence in the place of the plant; return whether there is one.
+
+    Raises:
+        SpecError: `bad-answer` for a clause that answers no question.
+    """
+    with answers.located():
+        found = in_sentence(answers.texts.get("plant", ""))
+    if found:
+        del answers.texts["plant"]
+    for key, text in found.items():
+        if answers.texts.setdefault(key, text) is text and "plant" in answers.places:
+            answers.places[key] = answers.places["plant"]
+    return bool(found)

@@ -12,7 +12,7 @@ from inputdesign_cli.wizard.composing import Conversation, compose
 from inputdesign_cli.wizard.grammar import Phrase
 from inputdesign_cli.wizard.plants import plant_of_words
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
-from inputdesign_cli.wizard.sentence import in_sentence
+from inputdesign_cli.wizard.sentence import in_sentence, spread
 from inputdesign_cli.wizard.wishes import input_range
 from tests.support.wishes import ENGINEER
 
@@ -84,6 +84,7 @@ def test_an_answer_to_one_question_is_no_sentence(text):
 
 
 def test_a_log_may_stand_in_a_sentence():
+    assert in_sentence("PI loop with 6 dB, gain ca. 2")["plant"] == "gain ca. 2"
     found = in_sentence("PI loop with 6 dB, log a.csv columns u=OP [%], y=PV, valve 45 +- 8 %")
     assert found["plant"] == "log a.csv columns u=OP [%], y=PV"
     assert set(found) == {"wish", "plant", "range"}
@@ -98,7 +99,7 @@ def test_a_sentence_stands_behind_other_answers_and_has_their_place(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text(f'time: 2 h\nplant: "{EXCHANGER}"\n')
     said = read_answers(file)
-    assert said.spread()
+    assert spread(said)
     assert (said.texts["time"], said.texts["range"]) == ("2 h", "valve 45 +- 8 %")
     assert said.places["range"].line == 2
 
