@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli import analyse, assess, identify, load_spec
 from inputdesign_cli.identification import Rival
-from inputdesign_cli.questions.common.knowledge import that_agrees
+from inputdesign_cli.questions.common.foresight import that_agrees
 from tests.questions.test_foresight import HEATER, VARIANCE, H, plainly
 from tests.support.heater import said
 
