@@ -46,8 +46,8 @@ class _Level:
 def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list[str]:
     """Return the lines of `noise` from the answers, and from the model of a log where they leave it open.
 
-    Of noise whose colour nobody knows a colour is taken. It costs a parameter. White noise in the spec of
-    noise that lasts would make `assess` blame the plant.
+    Of noise whose colour nobody knows a colour is taken, which costs a parameter. Noise that lasts has more
+    power where plants answer than white noise of its size, so that white noise would promise too much.
 
     Raises:
         SpecError: `bad-answer`.
@@ -66,7 +66,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     colour = f"fades in {short(fades)} s, as you said" if fades else "white"
     if level.guessed and not drifts:
         fades = float(f"{max(_FADING * plant.slow, 2.0 * plant.sample_time):.1g}")
-        colour = "a guess: if the noise lasts and the spec calls it white, assess blames the plant"
+        colour = "a guess, for noise is seldom white; called white it would promise too much accuracy"
     variance = level.deviation**2 * (1.0 - pole**2)
     if fades:
         variance, pole = discrete(level.deviation, fades, plant.sample_time)
