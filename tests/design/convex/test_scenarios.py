@@ -7,6 +7,7 @@ from math import comb
 import cvxpy as cp
 import numpy as np
 import pytest
+import scipy.optimize
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import Criterion
@@ -216,3 +217,19 @@ def test_nothing_is_said_by_too_few():
     assert risk_before(5, 1e-3, 7) == risk_after(3, 1e-3, 3) == 1.0
     risks = [risk_after(100, 1e-3, k) for k in range(8)]
     assert risks == sorted(risks)
+
+
+@pytest.mark.slow
+def test_random_programs_keep_the_risk():
+    """min c x subject to a x >= 1 for a on the unit circle's upper right: the violation is known exactly."""
+    rng = np.random.default_rng(1)
+    beta, number, broken = 0.05, 60, 0
+    for _ in range(300):
+        angles = rng.uniform(0.0, 0.5 * np.pi, number)
+        rows = np.column_stack([np.cos(angles), np.sin(angles)])
+        x = scipy.optimize.linprog([1.0, 1.0], A_ub=-rows, b_ub=-np.ones(number)).x
+        support = int(np.sum(np.abs(rows @ x - 1.0) < 1e-9))
+        phi = np.linspace(0.0, 0.5 * np.pi, 4001)
+        violated = np.mean(np.cos(phi) * x[0] + np.sin(phi) * x[1] < 1.0)
+        broken += violated > risk_after(number, beta, support)
+    assert broken <= 300 * beta
