@@ -18,11 +18,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.header import build_header
-from inputdesign_cli.questions.building.model_error import (
-    build_calibration,
-    model_error_alpha,
-    unstated_errors,
-)
+from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
 from inputdesign_cli.questions.building.parameters import build_earlier, stated_prior
 from inputdesign_cli.questions.building.rebuild import restated
 from inputdesign_cli.questions.building.requirements import build_requirements
@@ -33,7 +29,6 @@ from inputdesign_cli.questions.building.uncertainty import (
     build_knowledge,
     build_nominal_covariance,
 )
-from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
 
@@ -136,8 +131,7 @@ def question_at(stated: Spec, model: Model, samples: int, factor: Array, source:
         return replace(task, foresight=replace(task.foresight, earlier=earlier)).solve()
 
     requirements = [make(experiment) for make in build_requirements(spec, raw)]
-    usual, information = model_error_alpha(spec, raw.model), np.eye(experiment.size)
-    confidence = Confidence.of(build_calibration(spec), requirements, information, usual)
+    confidence = build_confidence(spec, raw).of(requirements, np.eye(experiment.size))
     return ModelQuestion(
         experiment=experiment,
         confidence=confidence,

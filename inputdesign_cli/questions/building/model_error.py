@@ -21,6 +21,7 @@ from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_loop
 from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
+from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 
@@ -43,10 +44,14 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
     return confidence_factor(probability, int(np.sum(model.in_plant)))
 
 
-def build_calibration(spec: Spec) -> Calibration | None:
-    """Return the calibration of alpha for `confidence: {exact: ..}`; None without it."""
-    stated = None if (error := spec.accuracy.error) is None else error.calibrated
-    return None if stated is None or stated.exact is None else Calibration(stated.exact, stated.draws)
+def build_confidence(spec: Spec, nominal: Experiment) -> Confidence:
+    """Return the chi-squared alpha of r_u, and what calibrates it for `confidence: {exact: ..}`."""
+    alpha, error = model_error_alpha(spec, nominal.model), spec.accuracy.error
+    stated = None if error is None else error.calibrated
+    if stated is None or stated.exact is None:
+        return Confidence(alpha, alpha)
+    simulator = SimulatedEstimates(nominal, stated.runs, build_units(spec).step) if stated.runs else None
+    return Confidence(alpha, alpha, Calibration(stated.exact, stated.draws), simulator=simulator)
 
 
 def required_band(

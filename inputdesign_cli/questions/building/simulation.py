@@ -9,7 +9,6 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.system import build_cost, build_loop, build_model, held_plant
-from inputdesign_cli.questions.common.confidence import SimulatedEstimates
 from inputdesign_cli.questions.common.simulation import Simulation
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.specification.models.experiment import Noise
@@ -33,15 +32,6 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
         cost=build_cost(spec),
         entries=unstated_errors(spec, nominal),
     )
-
-
-def build_simulator(spec: Spec, nominal: Experiment) -> SimulatedEstimates | None:
-    """Return the simulator of experiments for an exact confidence; None if asymptotic theory decides."""
-    error = spec.accuracy.error
-    stated = None if error is None else error.calibrated
-    if stated is None or not stated.runs:
-        return None
-    return SimulatedEstimates(nominal, stated.runs, build_units(spec).step)
 
 
 def _true_system(spec: Spec, nominal: Experiment) -> Experiment | None:

@@ -89,32 +89,33 @@ class SimulatedEstimates:
 
 @dataclass(frozen=True)
 class Confidence:
-    """Holds alpha of r_u; where calibrated also the way, the chi-squared one (`usual`) and the coverage."""
+    """Holds alpha of r_u; where calibrated also the way, the chi-squared one (`usual`) and the coverage.
+
+    The `simulator` makes the estimates that alpha is calibrated to; asymptotic theory decides without one.
+    """
 
     alpha: float
     usual: float
     calibration: Calibration | None = None
     coverage: Coverage | None = None
+    simulator: SimulatedEstimates | None = None
 
-    @classmethod
     def of(
-        cls,
-        calibration: Calibration | None,
+        self,
         requirements: Sequence[Requirement],
         information: Array,
-        usual: float,
         simulated: SimulatedEstimates | None = None,
     ) -> Confidence:
         """Return alpha of an experiment of this information (k, k), in the requirements' coordinates."""
-        errors = bounded_errors(requirements)
+        errors, calibration = bounded_errors(requirements), self.calibration
         if calibration is None or not errors:
-            return cls(usual, usual)
+            return self
         if simulated is not None:
             calibration = simulated.corrected(calibration, errors, information)
         alpha, coverage = calibration.alpha(errors, information), calibration.coverage(errors, information)
         if simulated is not None:
             coverage = simulated.checked(coverage, errors, 1.0)
-        return cls(alpha, usual, calibration, coverage)
+        return Confidence(alpha, self.usual, calibration, coverage)
 
     @property
     def reported(self) -> Reported | None:

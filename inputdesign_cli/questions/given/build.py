@@ -12,14 +12,10 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import InPhase
 from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits
-from inputdesign_cli.questions.building.model_error import (
-    build_calibration,
-    model_error_alpha,
-    unstated_errors,
-)
+from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
 from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
-from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
+from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.spectra import read_given_spectrum
 from inputdesign_cli.questions.building.system import (
     build_cost,
@@ -61,9 +57,7 @@ def build_given(spec: Spec) -> GivenTask:
         requirements=requirements,
         criterion=build_criterion(spec, experiment),
         cost=build_cost(spec),
-        alpha=model_error_alpha(spec, experiment.model),
-        calibration=build_calibration(spec),
-        simulator=build_simulator(spec, experiment),
+        confidence=build_confidence(spec, experiment),
         limits=build_power_limits(spec),
         plants=_build_plants(spec, experiment),
         header=build_header(spec),

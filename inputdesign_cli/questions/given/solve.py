@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, Requirement, worst
-from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
+from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
@@ -140,8 +140,7 @@ class GivenExcitation:
 class GivenTask(SpectrumTask):
     """Analyses an excitation: requirements are checked, a criterion is computed.
 
-    `calibration` and `simulator` size `alpha` anew, see `Confidence`; `plants` are others than the nominal
-    one.
+    The `plants` are others than the nominal one.
     """
 
     experiment: Experiment
@@ -149,9 +148,7 @@ class GivenTask(SpectrumTask):
     requirements: Sequence[RequirementFactory]
     criterion: Callable[[Experiment], Criterion] | None
     cost: dict[PowerKind, Weight]
-    alpha: float
-    calibration: Calibration | None
-    simulator: SimulatedEstimates | None
+    confidence: Confidence
     limits: Sequence[PowerLimit]
     plants: Plants | None
 
@@ -174,7 +171,7 @@ class GivenTask(SpectrumTask):
             )
         requirements = [make(experiment) for make in self.requirements]
         simulated = self._simulated(experiment)
-        confidence = Confidence.of(self.calibration, requirements, information, self.alpha, simulated)
+        confidence = self.confidence.of(requirements, information, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
         results, informed = self._report(experiment, information, requirements, confidence)
         record, signal = self._record(experiment, worst_ratio(requirements)), None
@@ -305,13 +302,14 @@ class GivenTask(SpectrumTask):
 
     def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
         """Return estimates of such experiments, for an exact confidence."""
-        if self.simulator is None:
+        simulator = self.confidence.simulator
+        if simulator is None:
             return None
         if self.excitation.samples is not None:
-            return self.simulator.of_record(self.excitation.samples)
+            return simulator.of_record(self.excitation.samples)
         samples = as_long(self.record, experiment)
         renewed = None if samples is None else self._renewed(samples)
-        return None if samples is None or renewed is None else self.simulator.of(renewed, samples)
+        return None if samples is None or renewed is None else simulator.of(renewed, samples)
 
     def _renewed(self, samples: int) -> Excitation | None:
         """Return the source of new records of the spectrum; None for a record that was given."""

@@ -11,15 +11,11 @@ from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
-from inputdesign_cli.questions.building.model_error import (
-    build_calibration,
-    model_error_alpha,
-    unstated_errors,
-)
+from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
 from inputdesign_cli.questions.building.parameters import check_known
 from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
-from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
+from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
@@ -68,15 +64,15 @@ def build_convex(spec: Spec) -> ConvexTask:
     # What no spectrum attains is proved as what every spectrum reaches.
     loose = basis.free and goal == "factor" and not reach.attained
     tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
-    alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)
-    simulator = build_simulator(spec, experiment)
-    exact = None if calibration is None else ExactConfidence(calibration, alpha, question, simulator)
+    stated, exact = build_confidence(spec, experiment), None
+    if stated.calibration is not None:
+        exact = ExactConfidence(stated.calibration, stated.usual, question, stated.simulator)
     return ConvexTask(
         asked=Sought(
             build_header(spec),
             question,
             cost,
-            alpha,
+            stated.usual,
             exact,
             spec.limits.samples,
             plants,
