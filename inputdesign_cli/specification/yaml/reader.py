@@ -207,7 +207,8 @@ class _Document:
 
 
 def _meaning(error: yaml.YAMLError, character: str) -> tuple[str, str]:
-    problem = " ".join(str(getattr(error, part, "")) for part in ("problem", "context"))
+    parts = getattr(error, "problem", ""), getattr(error, "context", "")
+    problem = " ".join(map(str, parts))
     if character == "\t":
         return "a tab is used where YAML wants spaces", "indent with spaces"
     if "cannot start any token" in problem:
