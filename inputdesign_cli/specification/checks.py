@@ -418,28 +418,16 @@ def lengths_agree(spec: Spec) -> _Found:
         yield PathDiagnostic("conflicting-keys", message, hint, ("experiment", "samples"))
 
 
-# The keys that each check reads. It is skipped if one could not be read: its answer would mislead.
-CHECKS: tuple[tuple[Callable[[Spec], _Found], tuple[str, ...]], ...] = (
-    (plant_is_stable, ("plant", "experiment.controller")),
-    (controllers_fit, ("plant", "experiment.controller", "accuracy.model_error.sensitivity")),
-    (noise_fits, ("plant",)),
-    (names_differ, ("plant.parameters", "noise")),
-    (true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
-    (spectrum_fits, ("plant", "spectrum.type")),
-    (regression_fits, ("plant", "accuracy.mean_squared_error")),
-    (weights_fit, ("plant.sample", "plant.continuous", "limits.spectrum")),
-    (control_fits, ("plant", "accuracy.closed_loop_error")),
-    (channels, ("plant",)),
-    (named_channels, ("plant", "channels")),
-    (delays, ("plant", "sample_time", "experiment.samples")),
-    (bands, ("plant.sample", "sample_time", "plant.continuous")),
-    (frequencies, ("plant.sample", "sample_time", "limits.band")),
-    (something_asked, ("accuracy", "spectrum.given", "objective")),
-    (goals_agree, ("accuracy", "spectrum.given", "objective")),
-    (limits_present, ("accuracy", "limits", "objective", "spectrum.given", "plant")),
-    (sensitivity_has_loop, ("experiment.controller", "accuracy.model_error.sensitivity")),
-    (lengths_agree, ("experiment.samples", "limits.samples", "objective")),
-)
+# Checks that rest on the same keys. They are skipped if one could not be read: the answers would mislead.
+CHECKS: dict[tuple[str, ...], tuple[Callable[[Spec], _Found], ...]] = {
+    ("plant", "sample_time", "experiment.controller"): (
+        *(plant_is_stable, controllers_fit, noise_fits, names_differ, true_system_fits, spectrum_fits),
+        *(regression_fits, weights_fit, control_fits, channels, named_channels, delays, bands, frequencies),
+        sensitivity_has_loop,
+    ),
+    ("accuracy", "spectrum.given", "objective", "limits"): (something_asked, goals_agree, limits_present),
+    ("experiment", "limits", "objective"): (lengths_agree,),
+}
 
 # These checks do not matter if a model is only to be estimated.
 OF_DESIGNS = (something_asked, limits_present)
@@ -454,8 +442,9 @@ def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagn
     """Return the diagnostics of all checks whose keys are not `broken`; of designs only with `design`."""
     return [
         found
-        for check, reads in CHECKS
-        if (design or check not in OF_DESIGNS)
-        and not (broken and any(related(parse_key(key), broken) for key in reads))
+        for keys, checks in CHECKS.items()
+        if not (broken and any(related(parse_key(key), broken) for key in keys))
+        for check in checks
+        if design or check not in OF_DESIGNS
         for found in check(spec)
     ]
