@@ -205,7 +205,7 @@ def system_of(path: Path) -> PlantAnswer:
         found = json.loads(read_regular(path))
     except (OSError, ValueError, RecursionError) as error:
         raise DataError(bad_answer("plant", f"{path.name} is not JSON: {error}").diagnostics) from None
-    parts = [found.get("num"), found.get("den")] if isinstance(found, dict) else []
+    parts: list[Any] = [found.get("num"), found.get("den")] if isinstance(found, dict) else []
     if not parts or not all(fields.depth(part) == 1 for part in parts) or found.keys() - _SYSTEM:
         why = f'{path.name} does not hold {{"num": [2], "den": [180, 1], "delay": 25}} or the like'
         raise bad_answer("plant", why)
