@@ -133,7 +133,7 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     w, ratio, support = curves.frequency, curves.ratio, curves.support
     axes.plot(w, ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost")
     if curves.within is not None:
-        label = "the same for records within the amplitude"
+        label = "worth by the bound over all records"
         axes.plot(w, curves.within, color=GREY, linestyle=DASHED, linewidth=1.6, label=label)
     axes.axhline(1.0, color=BLACK, linewidth=1.0, label="the most that is allowed")
     if support.size:

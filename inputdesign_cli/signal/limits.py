@@ -46,7 +46,7 @@ class Bounds:
     moves_in: float | None = None
 
     def most_moves(self, samples: int) -> int | None:
-        """Return the largest number of changes of the inputs in so many samples; None without a limit."""
+        """Return the largest number of changes of the inputs in a number of samples; None without a limit."""
         return None if self.moves is None else int(self.moves * samples / (self.moves_in or samples))
 
     @property

@@ -70,7 +70,7 @@ def input_range(text: str) -> Range:
 
 
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
-    """Return names and units of the channels: as told, else as a log, the range and the gain show them."""
+    """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
     if said["names"].lower() == "as said":
         ratio = re.search(rf"\bgain\b\D*{NUMBER}\s*(\S+)/([^\s,;/]+)", said["plant"])

@@ -169,8 +169,8 @@ def identified(
     """Return the estimate from the data in `paths`, jointly, and the question that it answers.
 
     The nominal parameters are one of the starts. Where the residuals refute the noise of the spec, a larger
-    one, C and D of small orders more, is estimated along. The errors of an estimate from one short record in
-    open loop are those of simulated records.
+    one, C and D of small orders more, is estimated along. One short record in open loop is simulated many
+    times, which shows the errors of its estimate.
 
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
