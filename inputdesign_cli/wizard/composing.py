@@ -12,7 +12,6 @@ from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
-from inputdesign_cli.specification.models.realisation import Signal
 from inputdesign_cli.wizard import questions as asking
 from inputdesign_cli.wizard.grammar import Phrase, short
 from inputdesign_cli.wizard.noise import noise_lines
@@ -46,7 +45,6 @@ _MEANWHILE = {
 _ORDERS, _LINES = (20, 40), (60, 120, 240)
 _ENOUGH = 1.02  # of the bound over every spectrum
 _LEAST_GAP = 1e-3  # smaller gaps are written as this
-_RETURNS = "return" in Signal.model_fields  # records can end at the operating point
 _POSITIONS = 10  # the fewest of an input that keeps them
 _PERIODS = 5  # of a record for a Bode plot
 _BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
@@ -147,7 +145,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "made": "binary" if two_levels else made,
         "converter": quantisation(said["converter"], span),
         "hold": hold,
-        "returns": asking.chosen("return", said["return"], {"yes": _RETURNS, "no": False}),
+        "returns": asking.chosen("return", said["return"], {"yes": True, "no": False}),
         "channels": channels_of(said, plant, span),
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
@@ -208,8 +206,8 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
 class Conversation:
     """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again.
 
-    The first answer may be a sentence that answers several questions. Then only what it leaves open is asked,
-    and what is asked always.
+    The first answer may be a sentence that answers several questions. Then only the others are asked, and
+    three about the actuator.
     """
 
     def __init__(self, known: Mapping[str, str], stem: str, folder: Path, *, brief: bool = False) -> None:
