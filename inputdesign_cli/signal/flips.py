@@ -30,6 +30,7 @@ _BETTER = 1.0 - 1e-7
 _STEP = 1e-5
 _NEAR = 0.7  # of the largest ratio: local maxima beyond it are looked at while single values change
 _KICKS = 3
+_STALE = 20  # changes in a row that lower a soft maximum, but not the largest ratio
 
 
 @dataclass(frozen=True)
@@ -324,7 +325,9 @@ class FlipSearch:
         """Change runs one by one, and two by two, to lower ever sharper soft maxima of the ratios."""
         best = point
         for sharpness in _SHARPNESSES if np.isfinite(point.ratio) else ():
-            while not over() and best.ratio > enough:
+            # The soft maximum is one of other places at each point: it may fall in a circle.
+            stale = 0
+            while stale < _STALE and not over() and best.ratio > enough:
                 places = [h.goal.places(M) for h, M in zip(self._held, point.informations, strict=True)]
                 soft = _Soft(places, sharpness)
                 changes = self._changes(point, self._weights(point, places, sharpness))
@@ -334,9 +337,9 @@ class FlipSearch:
                     better = self._first_better(point, pairs, soft)
                 if better is None:
                     break
-                point = better
+                point, stale = better, stale + 1
                 if point.ratio < best.ratio:
-                    best = point
+                    best, stale = point, 0
         return best
 
     def _changes(self, point: _Point, weights: Sequence[Array]) -> list[tuple[int, int, Array]]:

@@ -238,6 +238,6 @@ def test_the_search_finds_the_best_of_all_records_of_most_plants():
         rng = np.random.default_rng(seed)
         starts = [bound.best, *(np.sign(rng.standard_normal((samples, 1))) for _ in range(8))]
         search = FlipSearch([goal], np.array([[-1.0], [1.0]]), samples)
-        _, ratio = search.best(starts, rng, enough=0.0, over=lambda: False, changes=60)
+        _, ratio = search.best(starts, rng, enough=best * (1.0 + 1e-9), over=lambda: False, changes=30)
         found += ratio <= best * (1.0 + 1e-6)
     assert found >= 45, found
