@@ -12,7 +12,7 @@ import typer
 from inputdesign_cli.cli.options import path_option, refuse_existing
 from inputdesign_cli.cli.rows import TimeUnit, refuse, span
 from inputdesign_cli.cli.terminal import aligned
-from inputdesign_cli.plugins import names
+from inputdesign_cli.plugins import names, own
 
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.results import Results
@@ -57,8 +57,9 @@ class Form:
         if len(stated) != 1:
             said = " and ".join(f"--{name}" for name in stated) or "none of them"
             raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
-        if self.kind and self.kind not in names("idesign.signals"):
-            refuse(f"no package adds a kind {self.kind!r}", "--kind")
+        known = {*own("idesign.signals"), *names("idesign.signals")} - {"slewed"}  # which needs a rate
+        if self.kind and self.kind not in known:
+            refuse(f"no kind is {self.kind!r}: there are {', '.join(sorted(known))}", "--kind")
         kind = self.kind or stated[0]
         owners = {"--band": (self.band, "multisine"), "--odd": (self.odd, "multisine")}
         owners |= {"--periods": (self.periods > 1, "multisine"), "--hold": (self.hold > 1, "prbs")}

@@ -235,7 +235,7 @@ def _combinations(found: Sequence[Chosen]) -> list[tuple[tuple[Candidate, ...], 
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
-    """Return one model of `inputs` inputs that joins models of single outputs with structures of one kind.
+    """Join models of single outputs, of one kind of structure, into one model with all outputs.
 
     Sampled single models have the `moving` inputs only, and the others no effect; process models have all.
     """

@@ -62,7 +62,7 @@ class SearchedPlant:
 
 @dataclass(frozen=True)
 class Risk:
-    """Holds shares of plants that may be missed, with the stated confidence, before and after the design."""
+    """Bounds the share of plants at which the design may miss what is asked, with the stated confidence."""
 
     confidence: float
     after: float

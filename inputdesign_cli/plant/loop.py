@@ -124,7 +124,7 @@ class Loop:
 
     @cached_property
     def nearest(self) -> float:
-        """Return the frequency below which all responses are taken as constant."""
+        """Return the frequency below which responses are taken from there, to avoid a pole at zero."""
         if not self.integrates:
             return 0.0
         near = np.abs(logarithmic_distance(self.closed_poles))

@@ -115,8 +115,8 @@ def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
     if asked.inputs > 1 and not kind.several:
         raise bad_spec(
             "not-supported",
-            "a chirp has one frequency at a time, so that it cannot separate effects of several inputs",
-            hint="use a multisine for several inputs, or one chirp after the other",
+            f"a signal of kind {asked.kind} moves one input, and cannot separate effects of several",
+            hint="use a multisine for several inputs, or one signal after the other",
         )
     turn = math.ceil(4.0 * math.pi / sum(_band(asked)))
     if asked.kind == "chirp" and samples < turn:

@@ -28,7 +28,7 @@ _OF_VARIABLES = (".mat", ".npz")
 
 
 def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = None) -> Sheet:
-    """Return the columns of a data file, times of a day with their days.
+    """Return the columns of a data file, with clock times completed by dates.
 
     Args:
         key: the key of the spec that names the file, for diagnostics.

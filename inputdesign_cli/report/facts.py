@@ -59,7 +59,7 @@ def facts(outcome: Outcome, time_unit: str = "", part: str = "facts") -> list[Fa
 
 
 def answer(verb: str, outcome: Outcome) -> str:
-    """Return the answer in sentences; the verb is the command that gave it."""
+    """Return the sentences that answer a command, by its name (`verb`)."""
     stands, verdicts = facts(outcome, part="campaign_stands"), said("verdict", outcome)
     return " ".join(said("answer", outcome, verb=verb, stands=stands, verdicts=verdicts))
 

@@ -67,7 +67,7 @@ def test_pictures_are_drawn(tmp_path):
         (["--chirp=-1:1"], "within 0 to 1e+15"),
         (["--multisine", 5, "--range", "5:1"], "write 1:5?"),
         (["--multisine", 5, "--range", "5:5"], "1e-15 apart"),
-        (["--chirp", "0.1:1", "--inputs", 2], "one frequency at a time"),
+        (["--chirp", "0.1:1", "--inputs", 2], "moves one input"),
         (["--multisine", 5, "--inputs", 2, "--range", "0:1,0:1,0:1"], "3 ranges"),
         (["--multisine", 500, "--samples", 100], "49 harmonics"),
         (["--multisine", 5, "--samples", 100, "--periods", 3], "--samples 99"),

@@ -59,7 +59,7 @@ class Gradients:
         return graded_grid(nominal.singularities, *nominal.band)
 
     def grid_of(self, scenarios: Sequence[int]) -> Array:
-        """Return the common frequency grid for the densities of these scenarios together."""
+        """Return one frequency grid that serves the densities of all these scenarios."""
         others = frozenset(scenarios) - {0}
         if not others:
             return self.grid

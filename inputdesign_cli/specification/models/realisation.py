@@ -126,7 +126,7 @@ class Signal(Section):
         """Check that every setting belongs to the type of signal."""
         for key in self.stated(*_ONLY_FOR):
             types = _ONLY_FOR[key]
-            if self.type is not None and self.type not in types:
+            if self.type in own(_GROUP) and self.type not in types:  # other kinds use what they like
                 message = f"{{key}} does not go with type: {self.type}"
                 hint = f"it belongs to type: {types[0]}; remove it, or change the type"
                 yield PathDiagnostic("unsuitable-key", message, hint, (key,), at_key=True)

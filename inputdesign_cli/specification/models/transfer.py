@@ -154,7 +154,7 @@ class TransferMatrix(Section):
 
     @property
     def denominator_matrix(self) -> fields.PolynomialMatrix:
-        """Return the denominators as rows of columns, factors multiplied out."""
+        """Return the table of denominators, a row for each output, with factors multiplied out."""
         if fields.depth(self.denominator) == 3:
             return as_matrix(self.denominator)
         common = fields.product(factor for _, factor in with_paths(self.denominator))
