@@ -77,7 +77,7 @@ def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -
 def mean_cost(
     experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
 ) -> NDArray:
-    """Return what a unit of spectral density costs at each frequency, averaged over plants, (n,) or (n, r, r).
+    """Return what a unit of spectral density costs at frequencies, a mean over plants, (n,) or (n, r, r).
 
     Args:
         weights: for each kind of power and each channel (or all together).
