@@ -274,7 +274,7 @@ def _check_moves(spec: Spec, settings: SignalSettings) -> None:
     whole = spec.signal_samples == spec.experiment.samples
     if not (searched and known and asked and whole and "output" not in build_cost(spec)):
         message = "limits.moves is kept by the search for the best record, which does not go with this spec"
-        hint = "use signal.type: binary, limits.amplitude, an open loop, a stated length and solver.windows"
+        hint = "use signal.type: binary of one period, limits.amplitude, an open loop and a stated length"
         raise spec.complain("not-supported", message, hint=hint, key="limits.moves")
 
 

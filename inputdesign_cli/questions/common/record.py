@@ -194,7 +194,7 @@ def level_search(request: RecordRequest, design: Design) -> LevelSearch:
         powers = max(_power_share(plant, bounds.powers, samples) for plant in each)
         return powers <= MET and max(peak_share(plant, bounds, samples) for plant in each) <= MET
 
-    others = any(one is not None for one in (bounds.output, bounds.rate, bounds.moves))
+    others = bounds.output is not None or bounds.rate is not None
     depends = any(design.problem.experiment.depends_on_plant(kind) for kind, _, _ in bounds.powers)
     squares = np.zeros(1) if bounds.amplitude is None else bounds.amplitude**2
     affordable = all(
@@ -209,7 +209,7 @@ def level_search(request: RecordRequest, design: Design) -> LevelSearch:
         plants,
         cost,
         amplitude,
-        allowed if others or depends else None,
+        allowed if others or depends or bounds.moves is not None else None,
         bounds.most_moves,
     )
 
