@@ -58,12 +58,16 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
     "short-record",
     "Take a longer record for smaller ones. Accuracy is judged by the scatter of the simulated estimates.",
 )
-def scattered(kind: FindingKind, factor: float, runs: int) -> list[Finding]:
+def scattered(kind: FindingKind, factor: float, runs: int, *, none: bool) -> list[Finding]:
     """The errors of the estimate are larger than first-order theory states, as the record is short.
 
     Records of the estimated model were simulated and estimated again; their scatter is taken instead.
     """
     fact = f"{factor:.3g} times as large by {runs} simulated records"
+    if none:  # nothing was measured: the number says only that they are large
+        fact = (
+            f"most of {runs} simulated records give no estimate, so that {factor:.3g} times as large is taken"
+        )
     return [kind.found(fact, factor=factor, runs=runs)]
 
 

@@ -234,3 +234,5 @@ def test_the_hold_that_is_chosen_is_a_tenth_of_the_slowest_time_constant(pole, s
         accuracy="{criterion: D}",
     )
     assert build_convex(spec).record.settings.hold == hold
+    coloured = spec.revised({"noise": {"variance": 1.0, "D": [1, -0.995]}})
+    assert build_convex(coloured).record.settings.hold == hold

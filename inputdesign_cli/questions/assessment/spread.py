@@ -12,7 +12,6 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.estimates import scattered
 from inputdesign_cli.identification import Estimate, fit_batch
@@ -42,7 +41,7 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     if factor <= _LUCK:
         return estimate, []
     wider = replace(estimate, factor=estimate.factor / np.sqrt(factor))
-    return wider, scattered(float(np.sqrt(factor)), _RUNS)
+    return wider, scattered(float(np.sqrt(factor)), _RUNS, none=factor >= _MOST)
 
 
 def _scatter(model: Model, u: Array, step: float, *, free: bool) -> float:
@@ -52,7 +51,7 @@ def _scatter(model: Model, u: Array, step: float, *, free: bool) -> float:
     caused, noise = model.simulate(u[None], e, step)
     try:
         found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free)
-    except (SpecError, np.linalg.LinAlgError):  # records as short as this determine no estimate
+    except np.linalg.LinAlgError:  # records as short as this determine no estimate
         return _MOST
     away = (found.theta - model.theta)[found.converged]
     if len(away) < _SETTLED * _RUNS:

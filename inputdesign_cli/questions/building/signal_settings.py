@@ -98,7 +98,9 @@ def chosen_hold(spec: Spec) -> int:
     stated = spec.signal.hold
     if stated is None or isinstance(stated, int):
         return stated or 1
-    radius, samples = build_model(spec).radius, spec.signal_samples
+    # Noise may fade as slowly as it likes: the memory of the plant counts.
+    white = {"noise": {"variance": 1.0}}
+    radius, samples = build_model(spec.revised(white)).radius, spec.signal_samples
     slowest = -1.0 / np.log(radius) if 0.0 < radius < 1.0 else np.inf if radius >= 1.0 else 0.0
     most = int(np.clip(slowest / _VALUES, 1, max(samples // _FEWEST_VALUES, 1)))
     return max(hold for hold in range(1, most + 1) if samples % hold == 0)
