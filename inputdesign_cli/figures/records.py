@@ -159,7 +159,10 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         place.plot(time, shown(panel.predicted), color=BLUE, linewidth=1.0, label=label)
         if panel.simulated is not None and not same:
             place.plot(time, shown(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated)
-        place.set_ylabel(panel.label or "output")
+        if panel.label:
+            _name(place, f"y{panel.output + 1}", panel.label, "")
+        else:
+            place.set_ylabel("output")
         if not single:
             name = f"y{panel.output + 1}"
             place.set_title(", ".join(filter(None, (name, percent))), loc="left", color=GREY)

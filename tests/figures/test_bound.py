@@ -150,6 +150,15 @@ def test_a_fit_is_shown_where_the_output_moves(page, moves, label):
     np.testing.assert_array_equal(axes[0].lines[0].get_ydata(), y[begin : begin + 400])
 
 
+@pytest.mark.parametrize(
+    ("stated", "shown"), [("level (m)", "level (m)"), ("(m)", "y₁(t) (m)"), ("", "output")]
+)
+def test_a_fit_names_its_output_where_only_a_unit_is_known(page, stated, shown):
+    y = np.sin(np.arange(50.0))
+    axes = page(FitCurves(np.arange(50.0), (FitPanel(y, y, y, label=stated),))).axes
+    assert axes[0].get_ylabel() == shown
+
+
 def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
     figure = page(CURVES["predicted signal"])
     record, _, below, _ = figure.axes
