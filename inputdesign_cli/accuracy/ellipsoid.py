@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.cuts import EllipsoidCut
 from inputdesign_cli.accuracy.model_error import OnModelError
+from inputdesign_cli.accuracy.requirement import Requirement
 from inputdesign_cli.arrays import Array, ComplexArray
 
 _BISECTIONS = 80
@@ -78,6 +79,10 @@ class EllipsoidError(OnModelError):
         squared = low - np.sum(offset * low[:, None] ** 2 / left_over, axis=1)
         with np.errstate(divide="ignore"):
             return np.where(never, 0.0, self.alpha / np.sqrt(np.maximum(squared, 1e-300)))
+
+    def slope(self, information: Array, frequencies: Array, shares: Array) -> Array:
+        """Return the gradient by differences, since the ratio is not a sum of squares."""
+        return Requirement.slope(self, information, frequencies, shares)
 
     def cut(self, frequency: float | None) -> EllipsoidCut:
         """Return the matrix inequality of the S-procedure at this frequency."""

@@ -29,6 +29,7 @@ _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
 # Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
+_STEP = 1e-5  # of a difference, relative to M
 _KEPT = 8  # sets of frequencies whose rows are remembered at a time
 
 
@@ -75,6 +76,20 @@ class Requirement(ABC):
     @abstractmethod
     def ratios(self, information: Array, frequencies: Array) -> Array:
         """Return the ratio at given frequencies, (n,)."""
+
+    def slope(self, information: Array, frequencies: Array, shares: Array) -> Array:
+        """Return minus the gradient in M of the sum of `shares` (n,) times squared ratios, (k, k).
+
+        It is taken by differences unless a subclass knows it.
+        """
+        size, slope = len(information), np.zeros_like(information)
+        for i, j in zip(*np.triu_indices(size), strict=True):
+            step = _STEP * np.sqrt(information[i, i] * information[j, j])
+            turn = np.zeros_like(information)
+            turn[i, j] = turn[j, i] = step
+            down, up = (self.ratios(information + sign * turn, frequencies) ** 2 for sign in (-1.0, 1.0))
+            slope[i, j] = slope[j, i] = shares @ (down - up) / (2.0 * step * (1.0 if i == j else 2.0))
+        return slope
 
     @abstractmethod
     def cut(self, frequency: float | None) -> Cut:
@@ -163,6 +178,17 @@ class OverFrequency(Requirement):
         """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
         return largest_singular(half)
 
+    def measured(self, half: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return combinations (n, m, k) of the rows of half, whose squares add up to the squared ratio."""
+        if half.shape[1] != 2:
+            return np.linalg.eigh(half @ half.swapaxes(1, 2))[1][:, None, :, -1] @ half
+        real, imaginary = half[:, :1], half[:, 1:]
+        a, b, d = (
+            np.sum(x * y, axis=2) for x, y in ((real, real), (real, imaginary), (imaginary, imaginary))
+        )
+        angle = 0.5 * np.arctan2(2.0 * b, a - d)[:, None]
+        return np.cos(angle) * real + np.sin(angle) * imaginary
+
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """Return real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k).
 
@@ -228,6 +254,13 @@ class OverFrequency(Requirement):
         """Return the ratio (n,) at given frequencies."""
         rows = self._last.rows_at(frequencies, self.rows)
         return self.measure(turned(rows, inverse_factor(information).T), frequencies)
+
+    def slope(self, information: Array, frequencies: Array, shares: Array) -> Array:
+        """Return minus the gradient of a sum of squared ratios, from what `measured` says, (k, k)."""
+        factor = inverse_factor(information)
+        half = turned(self._last.rows_at(frequencies, self.rows), factor.T)
+        parts = self.measured(half) @ factor
+        return np.asarray(np.einsum("n,nmi,nmj->ij", shares, parts, parts, optimize=True))
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """Return local maxima of the ratio over the band, polished between the grid points."""

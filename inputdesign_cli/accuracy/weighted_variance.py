@@ -51,6 +51,10 @@ class WeightedVariance(OverFrequency):
         """Return the weighted standard deviation over its limit."""
         return np.sqrt(np.einsum("nqi,nqi->n", half, half))
 
+    def measured(self, half: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the rows themselves."""
+        return half
+
     def cut(self, frequency: float | None) -> Cut:
         """Return the cut tr(V^T M^-1 V) <= 1 at this frequency."""
         rows = self.rows(np.array([frequency]))[0]

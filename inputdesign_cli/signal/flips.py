@@ -27,7 +27,6 @@ _SOFT, _SHARP = 20.0, 120.0
 _SHARPNESSES = (60.0, 200.0, 1000.0)
 _TRIED, _PAIRED = 40, 12
 _BETTER = 1.0 - 1e-7
-_STEP = 1e-5
 _NEAR = 0.7  # of the largest ratio: local maxima beyond it are looked at while single values change
 _KICKS = 3
 _STALE = 20  # changes in a row that lower a soft maximum, but not the largest ratio
@@ -40,10 +39,11 @@ class PlantGoal:
     plant: FiniteRecord
     requirements: Sequence[Requirement]
 
-    def worst(self, information: Array) -> float:
-        """Return the largest ratio, polished over frequency; infinite where M is singular."""
+    def worst(self, information: Array, below: float = np.inf) -> float:
+        """Return the largest ratio, infinite for a singular M; polished over frequency if under `below`."""
         try:
-            return max(r.worst(information).ratio for r in self.requirements)
+            least = max(r.least(information) for r in self.requirements)
+            return least if least >= below else max(r.worst(information).ratio for r in self.requirements)
         except np.linalg.LinAlgError:
             return np.inf
 
@@ -258,15 +258,21 @@ class FlipSearch:
             return False
         return self._allowed is None or self._allowed(np.repeat(values, self._hold, axis=0))
 
-    def _at(self, values: Array) -> _Point:
+    def _at(self, values: Array, below: float = np.inf) -> _Point:
         psis = [held.of(values) for held in self._held]
         informations = [
             held.known + held.products(psi, psi) for held, psi in zip(self._held, psis, strict=True)
         ]
-        return _Point(values, psis, informations, self._worst(informations))
+        return _Point(values, psis, informations, self._worst(informations, below))
 
-    def _worst(self, informations: Sequence[Array]) -> float:
-        return max(held.goal.worst(M) for held, M in zip(self._held, informations, strict=True))
+    def _worst(self, informations: Sequence[Array], below: float) -> float:
+        """Return the largest ratio; if it is not under `below`, one that is not either."""
+        largest = 0.0
+        for held, M in zip(self._held, informations, strict=True):
+            largest = max(largest, held.goal.worst(M, below))
+            if largest >= below:
+                break
+        return largest
 
     def _weights(self, point: _Point, places: Sequence, sharpness: float) -> list[Array]:
         """Return minus the slopes in M of the soft maximum of the squared ratios at every plant, (k, k)."""
@@ -276,15 +282,9 @@ class FlipSearch:
         total = sum(float(one.sum()) for one in shares)
         found = []
         for there, M, share in zip(places, point.informations, shares, strict=True):
-            size, slope = len(M), np.zeros_like(M)
-            for i, j in zip(*np.triu_indices(size), strict=True):
-                step = _STEP * np.sqrt(M[i, i] * M[j, j])
-                turn = np.zeros_like(M)
-                turn[i, j] = turn[j, i] = step
-                up, down = _squares(there, M + turn), _squares(there, M - turn)
-                twice = 2.0 * step * total * (1.0 if i == j else 2.0)
-                slope[i, j] = slope[j, i] = float(share @ (down - up)) / twice
-            found.append(slope)
+            ends = np.cumsum([w.size for _, w in there])[:-1]
+            each = zip(there, np.split(share / total, ends), strict=True)
+            found.append(np.sum([r.slope(M, w, part) for (r, w), part in each if w.size], axis=0))
         return found
 
     def _gradient(self, point: _Point, weights: Sequence[Array]) -> Array:
@@ -316,7 +316,7 @@ class FlipSearch:
                 break
             values = point.values.copy()
             values.ravel()[order] = wanted.ravel()[order]
-            point = self._at(values)
+            point = self._at(values, best.ratio)
             if point.ratio < best.ratio and self.keeps(values):
                 best = point
         return best
@@ -331,14 +331,14 @@ class FlipSearch:
                 places = [h.goal.places(M) for h, M in zip(self._held, point.informations, strict=True)]
                 soft = _Soft(places, sharpness)
                 changes = self._changes(point, self._weights(point, places, sharpness))
-                better = self._first_better(point, [[c] for c in changes[:_TRIED]], soft)
+                better = self._first_better(point, [[c] for c in changes[:_TRIED]], soft, best.ratio)
                 if better is None:
                     pairs = [list(pair) for pair in combinations(changes[:_PAIRED], 2) if _apart(*pair)]
-                    better = self._first_better(point, pairs, soft)
+                    better = self._first_better(point, pairs, soft, best.ratio)
                 if better is None:
                     break
                 point, stale = better, stale + 1
-                if point.ratio < best.ratio:
+                if point.ratio < _BETTER * best.ratio:
                     best, stale = point, 0
         return best
 
@@ -372,8 +372,13 @@ class FlipSearch:
         found.sort(key=lambda one: -one[0])
         return [one[1:] for one in found]
 
-    def _first_better(self, point: _Point, tried: list[list[Change]], soft: _Soft) -> _Point | None:
-        """Return the first of some changes, each of several runs, that lowers the soft maximum."""
+    def _first_better(
+        self, point: _Point, tried: list[list[Change]], soft: _Soft, below: float
+    ) -> _Point | None:
+        """Return the first of some changes, each of several runs, that lowers the soft maximum.
+
+        Its ratio is exact if it is under `below`.
+        """
         least = soft(point.informations)
         for changes in tried:
             psis, informations = [], []
@@ -388,7 +393,7 @@ class FlipSearch:
             for channel, first, steps in changes:
                 values[first : first + len(steps), channel] += steps
             if self.keeps(values):
-                return _Point(values, psis, informations, self._worst(informations))
+                return _Point(values, psis, informations, self._worst(informations, below))
         return None
 
     def _kicked(self, values: Array, rng: np.random.Generator) -> Array:
