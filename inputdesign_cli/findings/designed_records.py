@@ -12,6 +12,7 @@ from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.signal.selection import Record
 
 _FALLS_SHORT = 5e-3
+_FAR = 0.1  # from the bound over all records, as a share
 # Times its own deviation: an input whose mean is farther from zero has a level.
 _AWAY = 0.5
 _DEAR = 1.0  # beyond the cost of the design, relative to it
@@ -84,15 +85,37 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
 
 
 @finding(NOTE, "record-less-accurate", "Take more samples, or more candidates (`signal.candidates`).")
-def less_accurate(kind: FindingKind, reached: float, designed: float) -> list[Finding]:
+def less_accurate(
+    kind: FindingKind, reached: float, designed: float, *, searched: bool = False
+) -> list[Finding]:
     """The record is less accurate than the design. Finite length or limits on samples reduce accuracy.
 
     Args:
         reached, designed: multiples of the admissible error.
+        searched: whether the record was searched, not drawn.
     """
     more = reached / designed - 1.0
     fact = f"it reaches {reached:.4g} times the admissible error, {per_cent(more)} more than {designed:.4g}"
-    return kind.when(more > _FALLS_SHORT, fact, where="signal", reached=reached, designed=designed)
+    remedy = "Take more samples, or let the search take longer (`signal.seconds`)." if searched else ""
+    return kind.when(
+        more > _FALLS_SHORT, fact, where="signal", remedy=remedy, reached=reached, designed=designed
+    )
+
+
+@finding(NOTE, "bound-of-power-only", "Take `signal.hold: auto` if the actuator may keep its values as long.")
+def short_windows(kind: FindingKind, seen: int, remembered: float, distance: float | None) -> list[Finding]:
+    """The bound over all records knows no more than the power. Its windows are shorter than the memory.
+
+    Args:
+        seen: samples in a window of the bound.
+        remembered: the slowest time constant of the plant in samples.
+        distance: of the record from the bound, as a share.
+    """
+    helps = int(np.ceil(0.1 * remembered)) if np.isfinite(remembered) else None
+    fact = f"it sees {seen} samples of a plant whose slowest time constant is {remembered:.3g} samples"
+    fact += f". A `signal.hold` of about {helps} would see it all" if helps else ""
+    far = distance is not None and distance > _FAR and remembered > seen
+    return kind.when(far, fact, where="signal.hold", seen=seen, hold=helps, distance=distance)
 
 
 @finding(DOUBT, "record-misses-requirement", "Take more samples, or loosen the requirement.")

@@ -209,6 +209,7 @@ class FlipSearch:
         returns: bool = False,
     ) -> None:
         self._held = [_Held(goal, values, hold) for goal in goals]
+        self._hardest = list(range(len(goals)))  # the plants, those that ended a look last first
         self._letters, self._hold, self._allowed = letters, hold, allowed
         self._most_moves, self._returns = most_moves, returns
 
@@ -248,9 +249,13 @@ class FlipSearch:
                 best = point
         return np.repeat(best.values, self._hold, axis=0), best.ratio
 
-    def ratio(self, values: Array) -> float:
-        """Return the worst ratio of values (n, r) at all plants; infinite if they excite too little."""
-        return self._at(values).ratio
+    def ranked(self, starts: Iterable[Array], most: int) -> list[Array]:
+        """Return the best `most` of values (n, r), the one with the least worst ratio first."""
+        kept: list[tuple[float, Array]] = []
+        for values in starts:
+            ratio = self._at(values, kept[-1][0] if len(kept) >= most else np.inf).ratio
+            kept = sorted([*kept, (ratio, values)], key=lambda one: one[0])[:most]
+        return [values for _, values in kept]
 
     def keeps(self, values: Array) -> bool:
         """Return whether values (n, r) keep to the limits beside their levels."""
@@ -268,9 +273,10 @@ class FlipSearch:
     def _worst(self, informations: Sequence[Array], below: float) -> float:
         """Return the largest ratio; if it is not under `below`, one that is not either."""
         largest = 0.0
-        for held, M in zip(self._held, informations, strict=True):
-            largest = max(largest, held.goal.worst(M, below))
+        for place, number in enumerate(self._hardest):
+            largest = max(largest, self._held[number].goal.worst(informations[number], below))
             if largest >= below:
+                self._hardest.insert(0, self._hardest.pop(place))
                 break
         return largest
 

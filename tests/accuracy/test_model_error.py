@@ -226,3 +226,22 @@ def test_ellipsoid_bound_is_the_first_order_one_in_the_limit():
         for kind in (EllipsoidError, ModelError)
     )
     np.testing.assert_allclose(exact, linear, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("model", "entry", "weighted"),
+    [(SINGLE, (0, 0), False), (SINGLE, (0, 0), True), (arx(), (1, 0), False), (arx(), None, False)],
+)
+def test_the_slope_of_squared_ratios_is_their_difference(model, entry, weighted):
+    """Along a random change of M, of two rows, of several, and of a variance."""
+    M = information(model.theta.size, 4)
+    common = {"experiment": Experiment(model, 500), "band": (0.0, np.pi), "entry": entry}
+    if weighted:
+        requirement = WeightedVariance(**common, weight=Rational.build([1.0, 0.3]), limit=0.7)
+    else:
+        requirement = ModelError(**common, admissible=Absolute(1.0), alpha=2.45)
+    w, shares = np.array([0.05, 0.4, 1.1, 2.9]), np.array([0.1, 0.4, 0.3, 0.2])
+    turn = 1e-5 * information(len(M), 5)
+    up, down = (shares @ requirement.ratios(M + sign * turn, w) ** 2 for sign in (1.0, -1.0))
+    change = -2.0 * np.sum(requirement.slope(M, w, shares) * turn)
+    assert up - down == pytest.approx(change, rel=1e-6)

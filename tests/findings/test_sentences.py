@@ -86,6 +86,7 @@ FOUND = {
     "record-misses-accuracy": [f for h in (True, False) for f in records.accuracy_missed(MADE, held=h)],
     "record-dear": records.length_of_record(MADE, 40, 1, {}),
     "record-longer": records.length_of_record(MADE, 20, 1, {"rate": 0.99}),
+    "bound-of-power-only": records.short_windows(12, 1000.0, 0.6),
     "record-less-accurate": records.less_accurate(1.2, 1.0),
     "record-misses-requirement": records.requirement_missed(["model_error"], 1.1),
     "start-from-rest": [records.start_matters(2.0), records.start_matters(np.inf)],
@@ -122,6 +123,7 @@ def test_what_is_in_order_is_not_noted():
     assert unfinished.fewer_plants(120, 120) == unfinished.unstable_draws(40, 100) == []
     assert unfinished.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good, held=True) == []
+    assert records.short_windows(12, 10.0, 0.6) == records.short_windows(12, 1000.0, 0.05) == []
     assert records.length_of_record(good, 40, 1, {}) == records.less_accurate(1.001, 1.0) == []
     assert runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None) == []
     assert runs.other_length(7, 7) == runs.one_minimum(None) == []

@@ -106,8 +106,15 @@ def _certified(
     of_rows = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
     price = weighted_mean(problem.costs, proof.costs) if problem.goal == "cost" else None
     upper = lower = fixed_lower = 0.0
+    # One functional for all forms of the lags: many of them may count.
+    forms = [(row, w) for row, w in zip(rows, of_rows, strict=True) if row.form is not None]
+    form = sum(w * row.form for row, w in forms)
+    if np.any(form):
+        together = problem.form(np.asarray(form))
+        price = together if price is None else price + together
+        upper += sum(w * row.bound for row, w in forms)
     for row, w in zip(rows, of_rows, strict=True):
-        if w == 0.0:
+        if w == 0.0 or row.form is not None:
             continue
         if row.upper:
             price = row.functional * w if price is None else price + row.functional * w
@@ -121,7 +128,7 @@ def _certified(
     if price is None:
         raise ValueError("a goal with s needs an upper limit")
     grid, lift, lifted = _grid(problem, weights, proof.costs), 0.0, 0.0
-    if any(row.form is not None for row in rows):
+    if forms:
         grid = problem.with_form_grid(grid)
         price, lift = _lifted(problem, price, grid)
         lifted = lift * problem.amplitude_power
@@ -136,7 +143,6 @@ def _certified(
         spent = upper + t * (scaled - lower - scaled_required)
         bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
     t = t if bound > 0.0 else 0.0
-    forms = [(row, w) for row, w in zip(rows, of_rows, strict=True) if row.form is not None]
     shares = np.zeros(len(problem.limits))
     for row, w in zip(rows, of_rows, strict=True):
         if row.limit is not None:
@@ -149,7 +155,7 @@ def _certified(
         price=price * unit,
         value=value * (t * unit),
         costs=proof.costs,
-        form=unit * _raised(sum(w * row.form for row, w in forms), lift) if forms else None,
+        form=unit * _raised(np.asarray(form), lift) if forms else None,
         form_share=unit * (lifted + sum(w * row.bound for row, w in forms)),
     )
 

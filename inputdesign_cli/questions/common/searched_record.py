@@ -122,8 +122,9 @@ class LevelSearch:
         if returns:
             starts = [np.append(start[:-1], 0.0 * start[:1], axis=0) for start in starts]
         starts = [start for start in starts if search.keeps(start)]
-        starts = sorted(starts, key=search.ratio)[:_IMPROVED] if starts else [own]
-        return search.best(starts, self._rng, enough=enough, over=over, changes=_CHANGES)
+        return search.best(
+            search.ranked(starts, _IMPROVED) or [own], self._rng, enough=enough, over=over, changes=_CHANGES
+        )
 
     def _starts(self, values: int) -> Iterator[Array]:
         """Yield values (n, r): the record of the bound, pseudo-random sequences, noise of the spectrum."""
@@ -136,7 +137,7 @@ class LevelSearch:
         slow = () if most is None else (-(-values // (most + 1)), max(values // (2 * most), 1))
         for clock in (*_CLOCKS, *slow):
             for bits in _REGISTERS:
-                if clock <= values and 2 ** (bits - 1) * clock <= 2 * values:
+                if clock <= values:
                     sequence = shifted_sequences(bits, -(-values // clock), inputs, self._rng)
                     yield np.repeat(sequence, clock, axis=0)[:values]
         lines = Lines(*bound.result.basis.lines(bound.result.x))

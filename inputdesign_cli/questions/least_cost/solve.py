@@ -43,6 +43,7 @@ from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.questions.least_cost.sought import Sought
 from inputdesign_cli.signal.selection import Record
 
+_GAINED = 1.001  # a bound over records this much above that of the power has gained nothing
 _NEAR = 0.05  # of the best record there is: nothing is worth a note
 
 
@@ -213,11 +214,19 @@ class ConvexTask(SpectrumTask):
             cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)
             distance = distance_to_best(done.design, record, known, cost)
             signal = replace(signal, distance_to_best=distance)
+            bound, free = done.design.any_record, done.design.any_spectrum
+            if bound is not None and free is not None and bound.bound <= _GAINED * free.certificate.bound:
+                radius = problem.experiment.model.radius
+                remembered = -1.0 / np.log(radius) if 0.0 < radius < 1.0 else np.inf
+                seen = bound.length * request.settings.hold
+                findings += of_records.short_windows(seen, remembered, distance)
             spectral = problem.goal == "factor" and problem.demands.criterion is None
             near = distance is not None and distance <= _NEAR
             if spectral and not near:  # a record that is near the best there is needs no other
                 designed = float(np.sqrt(done.design.result.objective))
-                findings += of_records.less_accurate(record.worst_ratio, designed)
+                findings += of_records.less_accurate(
+                    record.worst_ratio, designed, searched=distance is not None
+                )
             names = list(dict.fromkeys(requirement.name for requirement in problem.side))
             findings += of_records.requirement_missed(names, worst_ratio(problem.side)(known))
         return self.applied(results, done.experiment, record, signal, problem.requirements, findings)

@@ -16,6 +16,7 @@ from inputdesign_cli.design.convex.record_bound import bound_over_records
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.signal.flips import FlipSearch, PlantGoal
+from inputdesign_cli.signal.prbs import pseudo_random
 from inputdesign_cli.specification import Spec
 
 ERROR = {"model_error": {"relative": 0.2, "band": [0.02, 2.5], "alpha": 3}}
@@ -215,6 +216,22 @@ def output_error_plant(rng):
     if order == 2 and rng.random() < 0.5:
         poles = poles[0] * np.exp(1j * rng.uniform(0.2, 2.8) * np.array([1.0, -1.0]))
     return {"B": [0.0, *rng.standard_normal(order).tolist()], "F": np.real(np.poly(poles)).tolist()}
+
+
+def test_no_pseudo_random_sequence_is_better_than_the_best_start():
+    """Whatever the register and the clock, also where the record holds a part of the sequence only."""
+    design = designed(PLANTS[0][0], 30, ERROR)
+    goal = worst_of(design, 30)
+    search = FlipSearch([goal, goal], np.array([[-1.0], [1.0]]), 30)
+    rng = np.random.default_rng(2)
+    starts = [
+        np.repeat(pseudo_random(bits, -(-30 // clock), rng), clock)[:30, None]
+        for clock in (1, 2, 3, 5)
+        for bits in range(2, 10)
+    ]
+    every = sorted(goal.worst(goal.plant.information(u)) for u in starts)
+    ranked = [goal.worst(goal.plant.information(u)) for u in search.ranked(starts, 4)]
+    assert ranked == pytest.approx(every[:4], rel=1e-9)
 
 
 @pytest.mark.slow
