@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from inputdesign_cli.accuracy.admissible import AdmissibleError
 from inputdesign_cli.accuracy.cuts import MatrixCut
@@ -53,6 +53,10 @@ class OnModelError(OverFrequency):
         """Return the singularities of r_adm."""
         return self.admissible.singularities
 
+    def weight_at(self, w: ArrayLike) -> Array:
+        """Return alpha / r_adm: with V(w)^T = (alpha / r_adm) T the requirement reads M >= V V^T."""
+        return self.alpha / self.admissible.at(w)
+
     def error_bound(self, information: Array, w: ArrayLike) -> Array:
         """Return r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
         return self.alpha * largest_singular(turned(self.plant_rows(w), inverse_factor(information).T))
@@ -61,10 +65,6 @@ class OnModelError(OverFrequency):
 @dataclass(frozen=True, kw_only=True)
 class ModelError(OnModelError):
     """The requirement on the model error to first order."""
-
-    def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Return V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T, (n, q, k)."""
-        return self.plant_rows(w) * (self.alpha / self.admissible.at(w))[:, None, None]
 
     def cut(self, frequency: float | None) -> MatrixCut:
         """Return the cut M >= R_adm at this frequency."""

@@ -132,8 +132,8 @@ class OverFrequency(Requirement):
     """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
 
     It concerns one `entry` of G, or all of them together; `band` is in the unit of the experiment. Subclasses
-    give `rows`, often `measure`, and the points of the frequency plane near which they change fast
-    (`own_singularities`) or have a kink (`knots`).
+    give `weight_at` or `rows`, often `measure`, and the points of the frequency plane near which they change
+    fast (`own_singularities`) or have a kink (`knots`).
     """
 
     experiment: Experiment
@@ -155,9 +155,13 @@ class OverFrequency(Requirement):
         """Return frequencies at which the ratio may have a kink."""
         return np.zeros(0)
 
-    @abstractmethod
+    def weight_at(self, w: ArrayLike) -> Array:
+        """Return the weight (n,) of an error of the entry; one by default."""
+        return np.ones(np.shape(w))
+
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Return T(w), (n, q, k)."""
+        """Return T(w), (n, q, k); by default the `plant_rows` times their weight."""
+        return self.plant_rows(w) * self.weight_at(w)[:, None, None]
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
@@ -168,13 +172,18 @@ class OverFrequency(Requirement):
 
         In memory they stand as `turned` has them.
         """
-        if self.entry is None:
-            gradient = self.experiment.plant_gradient(w)
-        else:
-            gradient = self.experiment.entry_gradient(w, *self.entry)
+        gradient = self.experiment.model.plant_gradient(w)
+        if self.entry is not None:
+            gradient = gradient[:, :, self.entry[0], self.entry[1]]
         n, k = gradient.shape[:2]
         flat = gradient.reshape(n, k, -1).transpose(1, 2, 0)
-        return np.concatenate([flat.real, flat.imag], axis=1).T
+        columns = np.concatenate([flat.real, flat.imag], axis=1)
+        return (self._whitener @ columns.reshape(k, -1)).reshape(columns.shape).T
+
+    @cached_property
+    def _whitener(self) -> Array:
+        """Return the matrix (k, k) that brings gradients of raw parameters to these coordinates."""
+        return self.experiment.from_raw
 
     def concerned(self, G: ComplexArray) -> ComplexArray:
         """Return the entry (n, 1) of G (n, p, r), or all of them (n, p r)."""

@@ -205,10 +205,10 @@ class PolynomialModel(Parametrised):
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """Return the frequency response G as (n, p, r)."""
-        q = unit_circle(w)
-        G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
+        _, known = self._at_last(w)
+        G = np.zeros((np.size(w), self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
-            A, B, F = evaluate(self._entries[i][j], q)
+            A, B, F = known[i, j]
             G[:, i, j] = B / (A * F)
         return G
 
@@ -245,6 +245,19 @@ class PolynomialModel(Parametrised):
         rows = zip(self.per_output(self.A), self.B, self.F, strict=True)
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
+    def _at_last(self, w: ArrayLike) -> tuple[ComplexArray, dict[tuple[int, int], ComplexArray]]:
+        """Return q^-1, and A_i, B_ij and F_ij of each entry, at frequencies; dG and G are asked for in turn."""
+        if not self._last or self._last[0] is not w:
+            q, found = unit_circle(w), dict[tuple[int, int], ComplexArray]()
+            for i, j in self.active:
+                found[i, j] = evaluate(self._entries[i][j], q)
+            self._last[:] = w, (q, found)
+        return self._last[1]
+
+    @cached_property
+    def _last(self) -> list:
+        return []
+
     @cached_property
     def _highest(self) -> int:
         """Return the highest power of q^-1 that a parameter stands before."""
@@ -252,13 +265,12 @@ class PolynomialModel(Parametrised):
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
-        highest, entries = self._highest, self._entries
-        q = unit_circle(w)
+        highest, (q, known) = self._highest, self._at_last(w)
         gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
         shifts = powers(q, highest)
         for i, j in self.active:
-            A, B, F = evaluate(entries[i][j], q)
+            A, B, F = known[i, j]
             AF = A * F
             factors["b", i, j] = 1.0 / AF
             for letter, own in (("a", A), ("f", F)):

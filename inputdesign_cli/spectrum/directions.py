@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Values
+from inputdesign_cli.information import PRODUCTS, Sums, Values
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum.basis import Density, Factor, Functional
 
@@ -20,42 +20,28 @@ _ROUNDING = 1e-15
 _LEVEL = 1e-10  # ratios this near to each other, relative, are the same
 _BETWEEN = 200  # frequencies between two of a grid
 
-WeightedSums = Callable[[NDArray, NDArray, Array], NDArray]
-
 
 def matrices(density: NDArray) -> NDArray:
     """Return values (n,) of a density for one input as (n, 1, 1), and values (n, r, r) unchanged."""
     return density[:, None, None] if density.ndim == 1 else density
 
 
-def integrand(density: Density, factor: Factor | None, inputs: int) -> tuple[Values, WeightedSums]:
-    """Return the values to compute at the nodes of a rule, and how to sum them against a table of functions.
+def integrand(density: Density, factor: Factor | None, inputs: int) -> tuple[Values, Sums]:
+    """Return the values to compute at the nodes of a rule, and how to sum them against functions.
 
-    The sums, of the table (n, functions), of the values at n nodes and of the weights (n,), are
-    sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r). With a `factor` F of D, D = F^* F, the
-    values belong to F.
+    The sums, of weighted functions (n, f) and of the values at n nodes, are sum_n weighted[n, f] D(node_n):
+    (f, ...), or (f, ..., r, r) for several inputs. With a `factor` F of D, D = F^* F, the values belong to F.
     """
-    if factor is not None and inputs > 1:
-        return factor, _summed_products
-    return density, _summed_scalars if inputs == 1 else _summed
+    return (factor, _summed_products) if factor is not None and inputs > 1 else (density, PRODUCTS)
 
 
-def _summed(table: NDArray, values: NDArray, weights: Array) -> NDArray:
-    return np.tensordot(table * weights[:, None], values, axes=(0, 0))
-
-
-def _summed_scalars(table: NDArray, values: NDArray, weights: Array) -> NDArray:
-    return _summed(table, values, weights)[..., None, None]
-
-
-def _summed_products(table: NDArray, F: NDArray, weights: Array) -> NDArray:
+def _summed_products(weighted: NDArray, F: NDArray) -> NDArray:
     """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
 
     Of an output only the parameters and inputs that matter to it take part.
     """
     n, k, p, r = F.shape
-    weighted = table * weights[:, None]
-    half = np.zeros((table.shape[1], k * r, k * r), dtype=complex)
+    half = np.zeros((weighted.shape[1], k * r, k * r), dtype=complex)
     for output in range(p):
         rows = F[:, :, output].reshape(n, k * r)
         size = np.abs(rows).max(axis=0)

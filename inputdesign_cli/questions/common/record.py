@@ -141,7 +141,10 @@ def make_record(
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
     def at_worst(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
-        return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+        largest = -np.inf
+        for n, M in zip(numbers, informations, strict=True):
+            largest = max(largest, of[n](M))
+        return largest
 
     cost, bounded = design_cost(design, request.cost), partial(at_worst, bounding) if meets else None
     target = Target(partial(at_worst, scores), meets, request.cost, cost, bounded)

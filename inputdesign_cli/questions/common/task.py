@@ -30,6 +30,8 @@ from inputdesign_cli.signal.selection import Record
 
 # Errors that grow by less than this, relative, where the start is unknown are not mentioned.
 _MATTERS = 0.2
+# An upper bound this small shows that without knowing them. A start is forgotten at e^-8 of itself.
+_SURELY, _FORGOTTEN = 0.19, 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,15 +122,28 @@ class SpectrumTask(ABC):
 def growth_by_start(
     experiment: Experiment, record: Array, step: float, requirements: Sequence[Requirement]
 ) -> float:
-    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown."""
-    from inputdesign_cli.identification import information_begun_anywhere
+    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown.
 
+    Where it hardly matters it is an upper bound: samples after the start has been forgotten, without their
+    means, know nothing of either.
+    """
     plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
-    u, y = plant.signals("input", record), plant.signals("output", record)
+    poles = np.concatenate([experiment.singularities, experiment.model.singularities])
+    damping = max(float(np.min(poles.imag, initial=1.0 / step)), 1e-9)
+    begins = int(np.ceil((_FORGOTTEN / damping + experiment.memory) / step))
     try:
         at_rest = error(plant.information(record))
         if at_rest <= 0.0:
             return 1.0
+        if 2 * begins < len(record):
+            psi = plant.gradient(record)[begins:]
+            psi = psi - psi.mean(axis=0)
+            bound = error(plant.known + np.tensordot(psi, psi, axes=([0, 2], [0, 2]))) / at_rest
+            if bound <= 1.0 + _SURELY:
+                return bound
+        from inputdesign_cli.identification import information_begun_anywhere
+
+        u, y = plant.signals("input", record), plant.signals("output", record)
         anywhere = information_begun_anywhere(experiment.model, u, y, step)
         return error(plant.known + experiment.whiten_matrix(anywhere)) / at_rest
     except np.linalg.LinAlgError:
