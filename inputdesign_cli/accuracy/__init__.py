@@ -34,6 +34,8 @@ from inputdesign_cli.accuracy.requirement import (
     Violation as Violation,
     active_entries as active_entries,
     inverse_factor as inverse_factor,
+    least_ratio as least_ratio,
     worst as worst,
+    worst_ratio as worst_ratio,
 )
 from inputdesign_cli.accuracy.weighted_variance import WeightedVariance as WeightedVariance

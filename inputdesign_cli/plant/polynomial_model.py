@@ -246,7 +246,7 @@ class PolynomialModel(Parametrised):
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
     def _at_last(self, w: ArrayLike) -> tuple[ComplexArray, dict[tuple[int, int], ComplexArray]]:
-        """Return q^-1, and A_i, B_ij and F_ij of each entry, at frequencies; dG and G are asked for in turn."""
+        """Return q^-1, and A_i, B_ij, F_ij of each entry; who asks for dG then asks for G at the same w."""
         if not self._last or self._last[0] is not w:
             q, found = unit_circle(w), dict[tuple[int, int], ComplexArray]()
             for i, j in self.active:

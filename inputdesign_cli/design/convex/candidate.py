@@ -39,10 +39,7 @@ class Candidate:
 
 def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
     """Return the candidate with these unknowns, whether or not it meets the requirements."""
-    informations = problem.fixed_information + problem.excited(z)
-    if problem.scaled:
-        informations = informations + s * problem.scaled_information
-    return Candidate(z, s, informations, s if problem.scaled else problem.cost_at(z))
+    return Candidate(z, s, *problem.reached(z, s))
 
 
 def least_scale(problem: Problem, z: Array) -> float:
@@ -100,18 +97,18 @@ def missing_floor(problem: Problem, z: Array) -> float:
 
 
 def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], factor: float) -> float:
-    excited = problem.excited(z) + (s * problem.scaled_information if problem.scaled else 0.0)
     fixed, places = problem.fixed_information, dict[int, list[float | None]]()
+    excited = problem.reached(z, s)[0] - fixed
     for index, frequency in at:
         places.setdefault(index, []).append(frequency)
+    looked = [(problem.demands.asked[i], np.array(w)) for i, w in places.items()]
 
     def excess(f: float) -> float:
-        ratios = [
-            problem.demands.requirement(i).ratios(fixed[n] + f * excited[n], np.array(w)).max()
-            for i, w in places.items()
-            for n in (problem.demands.asked[i].scenario,)
-        ]
-        return float(max(ratios, default=0.0)) ** 2 - 1.0
+        most = 0.0
+        for asked, w in looked:
+            information = fixed[asked.scenario] + f * excited[asked.scenario]
+            most = max(most, float(asked.requirement.ratios(information, w).max()))
+        return most**2 - 1.0
 
     value = excess(factor)
     while value > _MEETS:

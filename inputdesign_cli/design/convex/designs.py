@@ -15,10 +15,10 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
 from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.coordinates import balanced_powers, suited, white_power, whitened_problem
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError
 from inputdesign_cli.design.convex.feasible import KEEPS, solve_limited
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.record_bound import RecordBound
 from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis

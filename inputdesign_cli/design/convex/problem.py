@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Literal
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,22 +20,24 @@ from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.amplitude.polytope import Facet, LagPolytope
 from inputdesign_cli.design.amplitude.windows import weighted
-from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.limits import (
     DensityBreach,
     DensityLimit,
     DensityPlace,
+    Goal,
+    Paid,
     PowerLimit,
+    Weight,
     breach_ratio,
     breaches_at,
+    weights_of,
 )
 from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts, joint_information, mean_cost
 from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
-from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
+from inputdesign_cli.spectrum import Basis, Density, Functional, constant, kept_on_grid
 
 _RIPPLE = 16  # points of the grid a lag
-Goal = Literal["cost", "factor", "samples"]
 
 
 def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
@@ -248,6 +249,13 @@ class Problem:
         """Return M(x) of the nominal plant (k, k)."""
         return self.baseline_information + np.tensordot(x, self.information_map, axes=1)
 
+    def reached(self, z: Array, s: float) -> tuple[NDArray[np.float64], float]:
+        """Return M' (S, k, k) of every scenario, and the objective, with these unknowns."""
+        informations = self.fixed_information + np.tensordot(z, self.information_maps, axes=1)
+        if not self.scaled:
+            return informations, self.cost_at(z)
+        return informations + s * self.scaled_information, s
+
     def excited(self, x: Array) -> NDArray[np.float64]:
         """Return sum_i x_i M_si (S, k, k)."""
         return np.tensordot(x, self.information_maps, axes=1)
@@ -333,10 +341,9 @@ class Problem:
         known = self._powers.get((kind, channel, scenario))
         if known is not None:
             return known
-
-        def density(w: Array) -> Array:
-            return experiment.power_density(kind, w, channel)
-
+        density: Density = partial(experiment.power_density, kind, channel=channel)
+        if kind == "excitation":
+            density = constant(density(np.zeros(1))[0])
         vector = self._along(
             lambda problem: problem.power(kind, channel, scenario).vector,
             lambda basis: basis.integrals(density, experiment.singularities),

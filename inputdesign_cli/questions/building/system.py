@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.limits import Weight
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
     Coloured,

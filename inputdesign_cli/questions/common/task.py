@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
+from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors, worst_ratio
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import seconds_left
@@ -23,7 +23,7 @@ from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.bound import Informed, Pairs
 from inputdesign_cli.questions.common.delivery import Delivered, adding
 from inputdesign_cli.questions.common.foresight import Foresight
-from inputdesign_cli.questions.common.record import RecordRequest, worst_ratio
+from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.signal_outcome import with_record
 from inputdesign_cli.questions.common.simulation import Simulation, simulate
 from inputdesign_cli.signal.selection import Record

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
-from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.limits import PowerLimit, Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
 from inputdesign_cli.findings.designs import limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts

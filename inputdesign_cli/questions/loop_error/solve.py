@@ -13,7 +13,7 @@ import numpy as np
 from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of
 from inputdesign_cli.design.loop_error.parametric import LossTheory, ParametricCriterion, loss_theory
