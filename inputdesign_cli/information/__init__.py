@@ -17,11 +17,10 @@ from inputdesign_cli.information.joint import (
     mean_cost as mean_cost,
 )
 from inputdesign_cli.information.quadrature import (
-    PRODUCTS as PRODUCTS,
     Quadrature as Quadrature,
-    Sums as Sums,
     Values as Values,
     graded_quadrature as graded_quadrature,
+    integrand as integrand,
     integrate as integrate,
     integrate_band as integrate_band,
 )

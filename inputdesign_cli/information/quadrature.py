@@ -24,6 +24,7 @@ RELATIVE_ERROR = 1e-11
 _PHASE_PER_PANEL = 16.0
 _MAX_REFINEMENTS = 4
 _ROUNDING = 1e-7
+_NO_PART = 1e-15  # a share of the largest gradient of an output
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
 _AT_ONCE, _AT_ONCE_OF_SEVERAL = 2048, 256  # nodes
@@ -109,6 +110,33 @@ def _panels(
     return rule
 
 
+def integrand(density: Values, factor: Values | None, inputs: int) -> tuple[Values, Sums]:
+    """Return the values to compute at the nodes of a rule, and how to sum them against functions.
+
+    The sums, of weighted functions (n, f) and of the values at n nodes, are sum_n weighted[n, f] D(node_n):
+    (f, ...), or (f, ..., r, r) for several inputs. With a `factor` F of D, D = F^* F, the values belong to F.
+    """
+    return (factor, _summed_products) if factor is not None and inputs > 1 else (density, PRODUCTS)
+
+
+def _summed_products(weighted: NDArray, F: NDArray) -> NDArray:
+    """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
+
+    Of an output only the parameters and inputs that matter to it take part.
+    """
+    n, k, p, r = F.shape
+    half = np.zeros((weighted.shape[1], k * r, k * r), dtype=complex)
+    for output in range(p):
+        rows = F[:, :, output].reshape(n, k * r)
+        size = np.abs(rows).max(axis=0)
+        used = np.flatnonzero(size > _NO_PART * size.max(initial=0.0))
+        rows = rows[:, used]
+        for sums, weight in zip(half, weighted.T, strict=True):
+            sums[np.ix_(used, used)] += (rows.conj() * weight[:, None]).T @ rows
+    both = half.reshape(-1, k, r, k, r).transpose(0, 1, 3, 2, 4)
+    return 0.5 * (both + both.swapaxes(1, 2))
+
+
 def integrate(
     values: Values,
     functions: Values,
@@ -181,14 +209,14 @@ def _summed(
     ends = np.cumsum([rule.nodes.size for rule in rules]).tolist()
     found: list[list[NDArray]] = [[] for _ in rules]
     for start in range(0, nodes.size, at_once):
-        here = values(nodes[start : start + at_once] * unit)
+        w = nodes[start : start + at_once] * unit
+        here, table = values(w), functions(w)
         for rule, end, parts in zip(rules, ends, found, strict=True):
             first = end - rule.nodes.size
             lo, hi = max(start, first), min(start + len(here), end)
             if lo < hi:
-                own = slice(lo - first, hi - first)
-                weighted = functions(rule.nodes[own] * unit) * (rule.weights[own] * unit)[:, None]
-                parts.append(sums(weighted, here[lo - start : hi - start]))
+                weights, part = rule.weights[lo - first : hi - first] * unit, slice(lo - start, hi - start)
+                parts.append(sums(table[part] * weights[:, None], here[part]))
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in found]
 
 

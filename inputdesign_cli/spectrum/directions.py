@@ -9,14 +9,12 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import PRODUCTS, Sums, Values
 from inputdesign_cli.plant import local_maxima
-from inputdesign_cli.spectrum.basis import Density, Factor, Functional
+from inputdesign_cli.spectrum.basis import Functional
 
 _SINGULAR = 1e-13
 # A price below this is none: its inverse would leave the range of double precision.
 _NOTHING = 1e-140
-_ROUNDING = 1e-15
 _LEVEL = 1e-10  # ratios this near to each other, relative, are the same
 _BETWEEN = 200  # frequencies between two of a grid
 
@@ -24,33 +22,6 @@ _BETWEEN = 200  # frequencies between two of a grid
 def matrices(density: NDArray) -> NDArray:
     """Return values (n,) of a density for one input as (n, 1, 1), and values (n, r, r) unchanged."""
     return density[:, None, None] if density.ndim == 1 else density
-
-
-def integrand(density: Density, factor: Factor | None, inputs: int) -> tuple[Values, Sums]:
-    """Return the values to compute at the nodes of a rule, and how to sum them against functions.
-
-    The sums, of weighted functions (n, f) and of the values at n nodes, are sum_n weighted[n, f] D(node_n):
-    (f, ...), or (f, ..., r, r) for several inputs. With a `factor` F of D, D = F^* F, the values belong to F.
-    """
-    return (factor, _summed_products) if factor is not None and inputs > 1 else (density, PRODUCTS)
-
-
-def _summed_products(weighted: NDArray, F: NDArray) -> NDArray:
-    """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
-
-    Of an output only the parameters and inputs that matter to it take part.
-    """
-    n, k, p, r = F.shape
-    half = np.zeros((weighted.shape[1], k * r, k * r), dtype=complex)
-    for output in range(p):
-        rows = F[:, :, output].reshape(n, k * r)
-        size = np.abs(rows).max(axis=0)
-        used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
-        rows = rows[:, used]
-        for sums, weight in zip(half, weighted.T, strict=True):
-            sums[np.ix_(used, used)] += (rows.conj() * weight[:, None]).T @ rows
-    both = half.reshape(-1, k, r, k, r).transpose(0, 1, 3, 2, 4)
-    return 0.5 * (both + both.swapaxes(1, 2))
 
 
 def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:

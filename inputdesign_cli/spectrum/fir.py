@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import integrate
+from inputdesign_cli.information import integrand, integrate
 from inputdesign_cli.spectrum.basis import Density, Factor
-from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import FaceSizes, GramBasis
 from inputdesign_cli.spectrum.svec import svec_layout, svec_length
 

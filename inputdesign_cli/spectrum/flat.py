@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Experiment, integrate_band
+from inputdesign_cli.information import Experiment, integrand, integrate_band
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
-from inputdesign_cli.spectrum.directions import integrand
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,8 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import integrate_band
+from inputdesign_cli.information import integrand, integrate_band
 from inputdesign_cli.spectrum.basis import Density, Factor
-from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import hmat, hvec, hvec_layout, smat, svec, svec_layout, svec_length
 

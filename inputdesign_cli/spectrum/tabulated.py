@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import integrate_band
+from inputdesign_cli.information import integrand, integrate_band
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Factor
-from inputdesign_cli.spectrum.directions import integrand
 
 
 @dataclass(frozen=True)

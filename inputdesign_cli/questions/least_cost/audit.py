@@ -35,7 +35,7 @@ _STEPS = 4
 _FAST = 200
 # The highest peaks on the grid are looked at more closely, `_INSIDE` points at a time. Where r_adm of a plant
 # passes that of its floor they have kinks, at which what is missed is in proportion to the last step.
-_PEAKS, _ZOOMS, _INSIDE = 8, 5, 65
+_PEAKS, _ZOOMS, _INSIDE = 8, 4, 129
 _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 
