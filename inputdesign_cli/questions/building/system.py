@@ -32,7 +32,6 @@ from inputdesign_cli.questions.building.tables import read_frequency_table, read
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.experiment import NoiseShape
-from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
@@ -278,4 +277,4 @@ def _arrays(rows: Sequence[Sequence[Sequence[float]]], step: int = 1) -> tuple[t
 
 def per_output(value: tuple) -> tuple[Array, ...]:
     """Return one polynomial, common to all outputs, or one per output."""
-    return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))
+    return tuple(np.array(p, dtype=float) for p in (value if isinstance(value[0], tuple) else (value,)))
