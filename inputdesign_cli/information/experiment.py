@@ -261,9 +261,7 @@ class Experiment:
     @cached_property
     def told_by_noise(self) -> bool:
         """Return whether the noise alone has information on any parameter."""
-        if self.model.continuous:
-            return False
-        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
+        return not self.model.continuous and self._source.informative_noise
 
     def whitened(self, power: float | Array) -> Experiment:
         """Return the experiment in coordinates where M = I by this power, flat over the band.

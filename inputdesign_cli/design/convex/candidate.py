@@ -73,13 +73,13 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
     factor, at = 1.0, set(places)
     for _ in range(12 + len(problem.others)):
         factor = _smallest_factor(problem, z, s, at, factor)
-        informations = candidate_at(problem, factor * z, factor * s).informations
-        found = problem.demands.violations(informations, above=1.0, few=FEW)
+        scaled = candidate_at(problem, factor * z, factor * s if problem.scaled else 1.0)
+        found = problem.demands.violations(scaled.informations, above=1.0, few=FEW)
         missed = [(i, v) for i, v in found if v.ratio > 1.0 + _MEETS]
         if not missed:
             break
         at |= {(i, v.frequency) for i, v in missed}
-    return candidate_at(problem, factor * z, factor * s if problem.scaled else 1.0)
+    return scaled
 
 
 def missing_floor(problem: Problem, z: Array) -> float:

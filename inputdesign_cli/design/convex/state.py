@@ -92,8 +92,9 @@ class State:
             self.active = _active(self.keys, answer.proof)
         if moves:  # else cuts that hold without weight (a degenerate optimum) would come and go for ever
             self._prune(answer.proof)
-        z, s = self._definite(answer.z, answer.s)
-        found, breaches = self._misses(z, s)
+        tried = self._definite(answer.z, answer.s)
+        z, s = tried.z, tried.s
+        found, breaches = self._misses(tried)
         worst = max([v.ratio for _, v in found] + [b.ratio for b in breaches], default=1.0)
         if self.interior is not None:
             self.best = min(self.best, mixed(problem, z, s, self.interior), key=lambda c: c.objective)
@@ -117,15 +118,14 @@ class State:
         better = self.best.objective < 0.9 * before[0] or self.certificate.bound > 1.1 * before[1]
         return answer.converged or better
 
-    def _misses(self, z: Array, s: float) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
-        problem = self.problem
-        informations = candidate_at(problem, z, s).informations
+    def _misses(self, tried: Candidate) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
+        problem, s, informations = self.problem, tried.s, tried.informations
         found = problem.demands.violations(informations, above=1.0, few=FEW)
         if problem.side:
             root = np.sqrt(s)
             sides = problem.demands.violations(informations, above=1.0 / root, side=True, few=FEW)
             found += [(i, replace(v, ratio=root * v.ratio)) for i, v in sides]
-        return found, problem.density_breaches(z, s, above=1.0)
+        return found, problem.density_breaches(tried.z, s, above=1.0)
 
     def _prune(self, proof: Proof) -> None:
         """Drop the cuts that have not bound for some rounds; each costs the solver a k x k cone.
@@ -140,18 +140,17 @@ class State:
         self.cuts = [self.cuts[i] for i in kept]
         self.proof = replace(proof, cuts=tuple(proof.cuts[i] for i in kept))
 
-    def _definite(self, z: Array, s: float) -> tuple[Array, float]:
+    def _definite(self, z: Array, s: float) -> Candidate:
         """Return (z, s), or halfway to the best design when z leaves some parameter without information."""
+        tried = candidate_at(self.problem, z, s)
         if not self.problem.demands.definite:
-            return z, s
+            return tried
         for _ in range(_HALVINGS):
-            try:
-                np.linalg.cholesky(candidate_at(self.problem, z, s).informations)
-            except np.linalg.LinAlgError:
-                z, s = 0.5 * (z + self.best.z), 0.5 * (s + self.best.s)
-            else:
-                return z, s
-        return self.best.z, self.best.s
+            with suppress(np.linalg.LinAlgError):
+                np.linalg.cholesky(tried.informations)
+                return tried
+            tried = candidate_at(self.problem, 0.5 * (tried.z + self.best.z), 0.5 * (tried.s + self.best.s))
+        return self.best
 
     def _grow(self, problem: Problem) -> None:
         """Extend the state to a basis with more functions."""

@@ -42,8 +42,8 @@ def refuse_unhandled(
 
     `handled` are values of some of these keys that it handles.
     """
-    for key, remedy in remedies.items():
-        value = spec.at(*key.split("."))
+    values = [spec.at(*key.split(".")) for key in remedies]
+    for (key, remedy), value in zip(remedies.items(), values, strict=True):
         if value is not None and value not in (handled or {}).get(key, ()):
             stated = f"{key}: {value}" if isinstance(value, str) else key
             raise bad_spec("not-supported", f"{question} does not handle {stated}", hint=remedy, key=key)

@@ -24,6 +24,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.common.bound import hermitian_columns
 from inputdesign_cli.questions.common.delivery import (
     APART,
     KINDS,
@@ -36,7 +37,6 @@ from inputdesign_cli.questions.common.delivery import (
 )
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.signal_outcome import signal_of, with_record
-from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.signal.selection import Record
 

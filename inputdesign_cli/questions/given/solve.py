@@ -24,13 +24,12 @@ from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectr
 from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.bound import Informed
+from inputdesign_cli.questions.common.bound import Informed, spectrum_curves
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
 from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, redrawn
 from inputdesign_cli.questions.common.robust import MET, Kept, Plants
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.spectrum import spectrum_curves
 from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
 from inputdesign_cli.questions.least_cost.robust_outcome import (

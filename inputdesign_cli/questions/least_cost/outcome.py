@@ -20,10 +20,10 @@ from inputdesign_cli.findings import designs
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.common.bound import described_spectrum, distinct
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.delivery import KINDS
 from inputdesign_cli.questions.common.robust import Plants, delivered
-from inputdesign_cli.questions.common.spectrum import described_spectrum, distinct
 from inputdesign_cli.spectrum import Basis, flat_basis, matrices
 
 # A limit binds when the design uses all but this share of it.

@@ -29,6 +29,7 @@ from inputdesign_cli.outcome import robust as parts
 from inputdesign_cli.outcome.curves import Curves, FanCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.bound import axis
 from inputdesign_cli.questions.common.robust import (
     CONFIDENCE,
     MET,
@@ -43,7 +44,6 @@ from inputdesign_cli.questions.common.robust import (
     kept_by,
     tried_on,
 )
-from inputdesign_cli.questions.common.spectrum import axis
 from inputdesign_cli.questions.least_cost.outcome import Answer, Designed, spent
 
 # Steps towards the farthest point, of a difference, and of an ascent at most.

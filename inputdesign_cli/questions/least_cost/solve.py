@@ -21,13 +21,18 @@ from inputdesign_cli.outcome import Outcome, White
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.questions.common.bound import Informed, equal_white
+from inputdesign_cli.questions.common.bound import (
+    Informed,
+    equal_white,
+    optimality_curves,
+    spectrum_curves,
+    with_periodogram,
+)
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
 from inputdesign_cli.questions.common.record import Made, design_cost, peak_at, redrawn, spectrum_of
 from inputdesign_cli.questions.common.searched_record import distance_to_best
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
