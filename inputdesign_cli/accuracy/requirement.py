@@ -164,7 +164,8 @@ class OverFrequency(Requirement):
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """Return T(w), (n, q, k); by default the `plant_rows` times their weight."""
-        return self.plant_rows(w) * self.weight_at(w)[:, None, None]
+        weight, gradient = self.weight_at(w), self.experiment.model.plant_gradient(w)
+        return self._rows_of(gradient) * weight[:, None, None]
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
@@ -175,7 +176,9 @@ class OverFrequency(Requirement):
 
         In memory they stand as `turned` has them.
         """
-        gradient = self.experiment.model.plant_gradient(w)
+        return self._rows_of(self.experiment.model.plant_gradient(w))
+
+    def _rows_of(self, gradient: ComplexArray) -> NDArray[np.float64]:
         if self.entry is not None:
             gradient = gradient[:, :, self.entry[0], self.entry[1]]
         n, k = gradient.shape[:2]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
@@ -120,9 +119,3 @@ def first_directions(units: Array) -> ComplexArray:
     both = [axes[i] + sign * axes[j] for i in range(len(units)) for j in range(i) for sign in (1.0, -1.0)]
     found = np.array([*axes, *both], dtype=complex)
     return found / np.linalg.norm(found, axis=1, keepdims=True)
-
-
-def leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:
-    """Return the `number` largest generalised eigenvalues, ascending, and their vectors as columns."""
-    first = max(len(worth) - number, 0)
-    return scipy.linalg.eigh(worth, metric, subset_by_index=[first, len(worth) - 1])

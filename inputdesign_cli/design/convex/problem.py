@@ -33,7 +33,14 @@ from inputdesign_cli.design.convex.limits import (
     breaches_at,
     weights_of,
 )
-from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts, joint_information, mean_cost
+from inputdesign_cli.information import (
+    POWER_KINDS,
+    Experiment,
+    PowerKind,
+    WeightedProducts,
+    joint_information,
+    mean_cost,
+)
 from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
 from inputdesign_cli.spectrum import Basis, Density, Functional, constant, kept_on_grid
 
@@ -354,6 +361,15 @@ class Problem:
     @cached_property
     def _powers(self) -> dict[tuple[PowerKind, int | None, int], Functional]:
         return {}
+
+    def powers(self, x: Array, scenario: int = 0) -> dict[PowerKind, list[float]]:
+        """Return the powers of input, output and excitation at a plant, one entry a channel."""
+        found: dict[PowerKind, list[float]] = {}
+        for kind in POWER_KINDS:
+            channels = self.experiment.model.outputs if kind == "output" else self.experiment.inputs
+            of_each = [self.power(kind, channel, scenario).vector @ x for channel in range(channels)]
+            found[kind] = [max(float(one), 0.0) for one in of_each]  # zero may come out below by rounding
+        return found
 
     def _limited(self, limit: PowerLimit) -> Functional:
         return self.power(limit.kind, limit.channel, limit.scenario)

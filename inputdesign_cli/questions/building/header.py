@@ -15,7 +15,7 @@ def build_units(spec: Spec) -> Units:
         time_unit=spec.time_unit,
         sample_time=spec.sample_time,
         sampled=spec.plant.sampled,
-        closed_loop=spec.closed_loop,
+        closed_loop=spec.experiment.controller is not None,
         inputs=spec.plant.inputs,
         outputs=spec.plant.outputs,
         channels={name: (one.name or "", one.unit or "") for name, one in (spec.channels or {}).items()},

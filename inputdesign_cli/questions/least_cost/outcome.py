@@ -17,7 +17,7 @@ from inputdesign_cli.design.convex.limits import Weight, paid_for, weighted_sum
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings import designs
-from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.bound import described_spectrum, distinct
@@ -163,20 +163,10 @@ def requirement_met(units: Units, requirement: Requirement, information: Array) 
     )
 
 
-def _powers_by_kind(problem: Problem, basis: Basis, x: Array, scenario: int) -> dict[PowerKind, list[float]]:
-    """Return the powers of input, output and excitation at a plant, one entry a channel."""
-    at, model = problem.on(basis), problem.experiment.model
-    channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
-    # A channel without power may come out below zero by rounding.
-    return {
-        kind: [max(float(at.power(kind, c, scenario).vector @ x), 0.0) for c in range(channels[kind])]
-        for kind in POWER_KINDS
-    }
-
-
 def spent(done: Designed, basis: Basis, x: Array) -> tuple[out.Powers, list[float]]:
     """Return the mean squares of a spectrum at the plant of the spec, and its cost at each that pays."""
-    used = [_powers_by_kind(done.design.problem, basis, x, at) for at in done.design.problem.paying]
+    problem = done.design.problem.on(basis)
+    used = [problem.powers(x, at) for at in problem.paying]
     return out.Powers.of(used[0]), [weighted_sum(done.cost, one) for one in used]
 
 
