@@ -29,10 +29,10 @@ _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
 # Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
+_KEPT = 8  # sets of frequencies whose rows are remembered at a time
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
-_KEPT = 8  # sets of frequencies whose rows are remembered at a time
 
 
 @dataclass(frozen=True)

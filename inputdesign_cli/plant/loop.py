@@ -14,14 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import (
-    Model,
-    Noisy,
-    SampledPlant,
-    forcings_at,
-    lefts_at,
-    prediction_gradients,
-)
+from inputdesign_cli.plant.model import Model, SampledPlant, forcings_at, lefts_at, prediction_gradients
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
@@ -49,7 +42,7 @@ def beside_zero(w: ArrayLike, nearest: float) -> ComplexArray | Array:
 
 
 @dataclass(frozen=True)
-class Loop(Noisy):
+class Loop:
     """A model under u = r - C y, with e acting on u through the loop.
 
     With R y = N u + R H e of the model (see `SampledPlant`) and C = Q^-1 P, Q diagonal, everything solves

@@ -49,10 +49,6 @@ class Model(Protocol):
         """Return the covariance (p, p) of e; in continuous time of the noise on each output sample."""
 
     @property
-    def informative_noise(self) -> bool:
-        """Return whether noise alone informs about any parameter."""
-
-    @property
     def at_once(self) -> NDArray[np.bool_]:
         """Return the entries of G that may act without delay at some parameters, (p, r)."""
 
@@ -274,21 +270,7 @@ class Listed(Model, Protocol):
         """Return the parameters in the order of theta, (k,)."""
 
 
-class Noisy:
-    """Says whether noise alone informs about any parameter, once for all experiments on a plant or loop."""
-
-    if TYPE_CHECKING:
-
-        def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-            """Return the prediction gradient due to e, (n, k, p, p)."""
-
-    @cached_property
-    def informative_noise(self) -> bool:
-        """Return whether the gradient due to e is other than zero."""
-        return bool(np.any(self.noise_gradient(np.array([0.3, 1.1, 2.3]))))
-
-
-class Parametrised(Noisy):
+class Parametrised:
     """Derives the properties of a model from its list of `parameters`."""
 
     if TYPE_CHECKING:
@@ -367,7 +349,7 @@ class WhiteNoise:
         return np.asarray(self.plant_gradient(w) @ u[:, None])
 
 
-class Around(Noisy, ABC):
+class Around(ABC):
     """A model that is made of another one, `inner`, and answers like that one unless it says otherwise."""
 
     @property

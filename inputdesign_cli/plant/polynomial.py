@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 
+Key = TypeVar("Key")
 _latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
 _WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared
 _MODERATE = 1e100  # quotients up to this are no overflow
@@ -32,9 +34,28 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
     return q
 
 
+def frequencies_last(*shape: int) -> ComplexArray:
+    """Return zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
+    return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))
+
+
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
-    """Return the value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    c = np.asarray(coefficients, dtype=float).tolist()
+    """Return the value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
+
+    Several polynomials (S, l) have values (S, ..).
+    """
+    stated = np.asarray(coefficients, dtype=float)
+    if stated.ndim == 2 and len(stated) > 1:
+        columns = stated.T.reshape(stated.shape[1], len(stated), *(1 for _ in np.shape(q)))
+        several = np.zeros((len(stated), *np.shape(q)), dtype=complex)
+        several += columns[-1]
+        for column in columns[-2::-1]:
+            several *= q
+            several.real += column
+        return several
+    if stated.ndim == 2:
+        return evaluate(stated[0], q)[None]
+    c = stated.tolist()
     if len(c) == 1:
         return np.full(np.shape(q), c[0], dtype=complex)
     value: ComplexArray = c[-1] * q
@@ -43,6 +64,27 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
         value *= q
         value += coefficient
     return value
+
+
+def evaluate_all(polynomials: Mapping[Key, Sequence[Array]], q: ComplexArray) -> dict[Key, ComplexArray]:
+    """Return values (S, 1, n) at `q` of polynomials of S models each; of constants (S, 1, 1)."""
+    tables = {key: np.array(one) for key, one in polynomials.items()}
+    found = {key: one[:, None].astype(complex) for key, one in tables.items() if one.shape[1] == 1}
+    varying = [key for key, one in tables.items() if one.shape[1] > 1]
+    if varying:
+        longest = max(tables[key].shape[1] for key in varying)
+        rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
+        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), len(rows[0]), 1, q.size)
+        found |= dict(zip(varying, at_q, strict=True))
+    return found
+
+
+def powers(q: ComplexArray, highest: int) -> list[ComplexArray]:
+    """Return the powers of q up to the `highest`, from q^0 on; at least up to the first."""
+    found = [np.ones_like(q), q]
+    for _ in range(highest - 1):
+        found.append(found[-1] * q)
+    return found
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:

@@ -5,7 +5,7 @@ B and F are matrices of polynomials, an entry for each output and input.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -29,10 +29,21 @@ from inputdesign_cli.plant.model import (
     row_parameters,
     tables_at,
 )
-from inputdesign_cli.plant.polynomial import all_roots, at, evaluate, roots_in_z, stack, unit_circle
+from inputdesign_cli.plant.polynomial import (
+    all_roots,
+    at,
+    evaluate,
+    evaluate_all,
+    frequencies_last,
+    powers,
+    roots_in_z,
+    stack,
+    unit_circle,
+)
 from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix, product_of
 
-_Place = tuple[str, int, int]  # a letter, and the output and input of its polynomial
+# A model, frequencies, and its polynomials there.
+_latest: list[tuple] = [(None, None, None)]
 
 
 @dataclass(frozen=True)
@@ -204,6 +215,21 @@ class PolynomialModel(Parametrised):
             G[:, i, j] = B / (A * F)
         return G
 
+    def _at_last(self, w: ArrayLike) -> tuple[ComplexArray, dict[tuple[int, int], ComplexArray]]:
+        """Return q^-1, and A_i, B_ij, F_ij of each entry; who asks for dG then asks for G at the same w."""
+        of, asked, known = _latest[0]
+        if of is self and asked is w:
+            return known
+        q, found = np.exp(-1j * np.asarray(w)), dict[tuple[int, int], ComplexArray]()
+        for i, j in self.active:
+            table = self._entries[i][j]
+            found[i, j] = np.zeros((len(table), *np.shape(q)), dtype=complex)
+            for coefficients in table.T[::-1]:  # Horner
+                found[i, j] *= q
+                found[i, j].real += coefficients.reshape(-1, *(1,) * np.ndim(q))
+        _latest[0] = self, w, (q, found)
+        return q, found
+
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """Return the noise filter H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
         q = unit_circle(w)
@@ -228,7 +254,7 @@ class PolynomialModel(Parametrised):
             if parameter.letter in "abf" and (output, input) in parameter.places:
                 gradient = above if parameter.letter == "b" else below
                 gradient[:, index] = q**parameter.power
-        A, B, F = _evaluated(self._entries[output][input], q)
+        A, B, F = evaluate(self._entries[output][input], q)
         return Fraction(B, A * F, above, below)
 
     @cached_property
@@ -236,19 +262,6 @@ class PolynomialModel(Parametrised):
         """Return A_i, B_ij and F_ij of each entry, as (3, l)."""
         rows = zip(self.per_output(self.A), self.B, self.F, strict=True)
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
-
-    def _at_last(self, w: ArrayLike) -> tuple[ComplexArray, dict[tuple[int, int], ComplexArray]]:
-        """Return q^-1, and A_i, B_ij, F_ij of each entry; who asks for dG then asks for G at the same w."""
-        if not self._last or self._last[0] is not w:
-            q, found = np.exp(-1j * np.asarray(w)), dict[tuple[int, int], ComplexArray]()
-            for i, j in self.active:
-                found[i, j] = _evaluated(self._entries[i][j], q)
-            self._last[:] = w, (q, found)
-        return self._last[1]
-
-    @cached_property
-    def _last(self) -> list:
-        return []
 
     @cached_property
     def _highest(self) -> int:
@@ -258,9 +271,9 @@ class PolynomialModel(Parametrised):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
         highest, (q, known) = self._highest, self._at_last(w)
-        gradient = _frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
+        gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
-        shifts = _powers(q, highest)
+        shifts = powers(q, highest)
         for i, j in self.active:
             A, B, F = known[i, j]
             AF = A * F
@@ -348,8 +361,8 @@ def _forcings_at(first: PolynomialModel, models: Sequence[PolynomialModel], w: A
     q, p = unit_circle(w), first.outputs
     found = np.zeros((len(models), q.size, p, p), dtype=complex)
     for i in range(p):
-        above = _evaluated(np.array([product_of([*m.F[i], m.row(m.C, i)]) for m in models]), q)
-        found[:, :, i, i] = above / _evaluated(np.array([m.row(m.D, i) for m in models]), q)
+        above = evaluate(np.array([product_of([*m.F[i], m.row(m.C, i)]) for m in models]), q)
+        found[:, :, i, i] = above / evaluate(np.array([m.row(m.D, i) for m in models]), q)
     return found
 
 
@@ -404,8 +417,8 @@ def _gradients(
     if "f" in letters:
         wanted |= {("b", i, j): [m.B[i][j] for m in models] for i, j in active}
     y, u, e = (x if x is None else x.transpose(0, 2, 3, 1) for x in (y, u, e))
-    q = first._last[1][0] if first._last and first._last[0] is w else np.exp(-1j * np.asarray(w))
-    at_q, shifts = _all_evaluated(wanted, q), _powers(q, highest)
+    q = unit_circle(w)
+    at_q, shifts = evaluate_all(wanted, q), powers(q, highest)
     gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)
     noise: dict[tuple[str, int], ComplexArray] = {}
     for i in range(first.outputs):
@@ -435,42 +448,3 @@ def _gradients(
             if (parameter.letter, i) in noise:
                 gradient[:, index, i] = shifts[parameter.power] * noise[parameter.letter, i]
     return gradient.transpose(0, 4, 1, 2, 3)
-
-
-def _evaluated(polynomials: Array, q: ComplexArray) -> ComplexArray:
-    """Return the values (S, ..) at `q`, which stands for q^-1, of polynomials (S, l)."""
-    columns = polynomials.T.reshape(polynomials.shape[1], len(polynomials), *(1 for _ in np.shape(q)))
-    values = np.zeros((len(polynomials), *np.shape(q)), dtype=complex)
-    values += columns[-1]
-    for column in columns[-2::-1]:
-        values *= q
-        values.real += column
-    return values
-
-
-def _all_evaluated(
-    polynomials: Mapping[_Place, Sequence[Array]], q: ComplexArray
-) -> dict[_Place, ComplexArray]:
-    """Return values (S, 1, n) at `q` of polynomials of S models each; of constants (S, 1, 1)."""
-    tables = {key: np.array(one) for key, one in polynomials.items()}
-    found = {key: one[:, None].astype(complex) for key, one in tables.items() if one.shape[1] == 1}
-    varying = [key for key, one in tables.items() if one.shape[1] > 1]
-    if varying:
-        longest = max(tables[key].shape[1] for key in varying)
-        rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
-        at_q = _evaluated(np.concatenate(rows), q).reshape(len(varying), len(rows[0]), 1, q.size)
-        found |= dict(zip(varying, at_q, strict=True))
-    return found
-
-
-def _frequencies_last(*shape: int) -> ComplexArray:
-    """Return zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
-    return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))
-
-
-def _powers(q: ComplexArray, highest: int) -> list[ComplexArray]:
-    """Return the powers of q up to the `highest`, from q^0 on; at least up to the first."""
-    found = [np.ones_like(q), q]
-    for _ in range(highest - 1):
-        found.append(found[-1] * q)
-    return found
