@@ -110,6 +110,19 @@ class Gradients:
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """A design: z (size,), s, M' (S, k, k) of every scenario, and the objective (the cost, or s).
+
+    The spectrum is z / s; goals without s have s = 1.
+    """
+
+    z: Array
+    s: float
+    informations: NDArray[np.float64]
+    objective: float
+
+
+@dataclass(frozen=True)
 class Problem:
     """A design problem, for one of three goals.
 
@@ -256,12 +269,12 @@ class Problem:
         """Return M(x) of the nominal plant (k, k)."""
         return self.baseline_information + np.tensordot(x, self.information_map, axes=1)
 
-    def reached(self, z: Array, s: float) -> tuple[NDArray[np.float64], float]:
-        """Return M' (S, k, k) of every scenario, and the objective, with these unknowns."""
+    def candidate(self, z: Array, s: float) -> Candidate:
+        """Return the candidate with these unknowns, whether or not it meets the requirements."""
         informations = self.fixed_information + np.tensordot(z, self.information_maps, axes=1)
         if not self.scaled:
-            return informations, self.cost_at(z)
-        return informations + s * self.scaled_information, s
+            return Candidate(z, s, informations, self.cost_at(z))
+        return Candidate(z, s, informations + s * self.scaled_information, s)
 
     def excited(self, x: Array) -> NDArray[np.float64]:
         """Return sum_i x_i M_si (S, k, k)."""

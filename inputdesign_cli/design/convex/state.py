@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, Violation
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.candidate import (
-    Candidate,
-    Place,
-    candidate_at,
-    least_scale,
-    mixed,
-    scaled_up,
-)
+from inputdesign_cli.design.convex.candidate import Place, least_scale, mixed, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.limits import DensityBreach, DensityPlace
 from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Candidate, Problem
 from inputdesign_cli.spectrum import Face, first_directions
 
 # A far-off iterate is not worth repairing: its upper bound would say nothing.
@@ -142,14 +135,14 @@ class State:
 
     def _definite(self, z: Array, s: float) -> Candidate:
         """Return (z, s), or halfway to the best design when z leaves some parameter without information."""
-        tried = candidate_at(self.problem, z, s)
+        tried = self.problem.candidate(z, s)
         if not self.problem.demands.definite:
             return tried
         for _ in range(_HALVINGS):
             with suppress(np.linalg.LinAlgError):
                 np.linalg.cholesky(tried.informations)
                 return tried
-            tried = candidate_at(self.problem, 0.5 * (tried.z + self.best.z), 0.5 * (tried.s + self.best.s))
+            tried = self.problem.candidate(0.5 * (tried.z + self.best.z), 0.5 * (tried.s + self.best.s))
         return self.best
 
     def _grow(self, problem: Problem) -> None:
@@ -168,14 +161,14 @@ class State:
         if self.solved:
             return self.moved_to(problem)
         z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
-        return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
+        return replace(self, problem=problem, best=problem.candidate(z, self.best.s))
 
     def tight(self) -> State:
         """Return the state with the least s for its best design, which has room to spare if interior."""
         if self.problem.goal != "factor":
             return self
         worst = self.problem.demands.largest(self.best.informations, default=1.0)
-        best = candidate_at(self.problem, worst**2 * self.best.z, worst**2 * self.best.s)
+        best = self.problem.candidate(worst**2 * self.best.z, worst**2 * self.best.s)
         return replace(self, best=best)
 
     def moved_to(self, problem: Problem) -> State:
@@ -186,7 +179,7 @@ class State:
         rows = [on_basis(problem, row) for row in self.rows]
         proved = certify(problem, self.proof, rows[: self.proof.rows.size])
         _, face = problem.basis.enlarge(*self.solved, proved.directions, problem.price)
-        best = candidate_at(problem, z, self.best.s)
+        best = problem.candidate(z, self.best.s)
         return replace(self, problem=problem, face=face, best=best, certificate=proved, rows=rows)
 
     def _add(self, keys: list[Place]) -> None:
@@ -241,14 +234,14 @@ def first_state(problem: Problem, start: Array, interior: Array | None, known: S
 
 def _inner(problem: Problem, x: Array) -> Candidate:
     """Return the interior design in (z, s), its requirements met with room where s allows that."""
-    unit = candidate_at(problem, x, 1.0)
+    unit = problem.candidate(x, 1.0)
     if not problem.scaled:
         return unit
     ratio = problem.demands.largest(unit.informations, default=0.0)
     s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
     if problem.goal == "samples":
         s = 1.2 * scaled_up(problem, x, 1.0, []).s
-    return candidate_at(problem, s * x, s)
+    return problem.candidate(s * x, s)
 
 
 def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: list[Place]) -> list[Place]:
