@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors, worst_ratio
+from inputdesign_cli.accuracy import OnModelError, Requirement, model_errors, worst_ratio
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import seconds_left
@@ -38,12 +38,11 @@ _SURELY, _FORGOTTEN = 0.19, 8.0
 class SpectrumTask(ABC):
     """Asks about the spectrum of an experiment, with its record and its trial.
 
-    Without a requirement on them `unstated` are the errors that have r_u; `ellipses` are None for a choice.
+    Without a requirement on errors those of the simulation have r_u; `ellipses` are None for a choice.
     """
 
     header: Header
     record: RecordRequest
-    unstated: Sequence[ModelError]
     ellipses: Pairs | None
     simulation: Simulation
     foresight: Foresight | None
@@ -66,7 +65,8 @@ class SpectrumTask(ABC):
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
         """Return the model errors asked about, or r_u of all entries of G, and whether any is asked about."""
         stated = model_errors(asked)
-        return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
+        every = self.simulation.entries
+        return stated or [replace(error, experiment=experiment) for error in every], bool(stated)
 
     def applied(
         self,

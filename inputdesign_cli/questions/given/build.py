@@ -11,7 +11,7 @@ from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import InPhase
 from inputdesign_cli.questions.building.header import build_header, build_units, refuse_unhandled
-from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
+from inputdesign_cli.questions.building.model_error import build_confidence
 from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
 from inputdesign_cli.questions.building.spectra import build_power_limits, read_given_spectrum
@@ -59,7 +59,6 @@ def build_given(spec: Spec) -> GivenTask:
         plants=_build_plants(spec, experiment),
         header=build_header(spec),
         record=build_record_request(spec, experiment.size),
-        unstated=unstated_errors(spec, experiment),
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
         foresight=build_foresight(spec, experiment),

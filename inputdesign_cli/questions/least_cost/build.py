@@ -10,7 +10,7 @@ from inputdesign_cli.design.convex.limits import Goal
 from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design, check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.header import build_header, refuse_unhandled
-from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
+from inputdesign_cli.questions.building.model_error import build_confidence
 from inputdesign_cli.questions.building.parameters import check_known
 from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
@@ -65,12 +65,12 @@ def build_convex(spec: Spec) -> ConvexTask:
     # What no spectrum attains is proved as what every spectrum reaches.
     loose = basis.free and goal == "factor" and not reach.attained
     tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
-    stated, exact = build_confidence(spec, experiment), None
+    header, stated, exact = build_header(spec), build_confidence(spec, experiment), None
     if stated.calibration is not None:
         exact = ExactConfidence(stated.calibration, stated.usual, question, stated.simulator)
     return ConvexTask(
         asked=Sought(
-            build_header(spec),
+            header,
             question,
             cost,
             stated.usual,
@@ -85,9 +85,8 @@ def build_convex(spec: Spec) -> ConvexTask:
             _few_columns(spec, basis),
             windows=solver.windows,
         ),
-        header=build_header(spec),
+        header=header,
         record=build_record_request(spec, experiment.size),
-        unstated=unstated_errors(spec, experiment),
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
         foresight=build_foresight(spec, experiment),
