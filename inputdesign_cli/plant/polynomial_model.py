@@ -34,7 +34,6 @@ from inputdesign_cli.plant.polynomial import (
     at,
     evaluate,
     evaluate_all,
-    frequencies_last,
     powers,
     roots_in_z,
     stack,
@@ -271,9 +270,13 @@ class PolynomialModel(Parametrised):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
         highest, (q, known) = self._highest, self._at_last(w)
-        gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
+        # Frequencies lie side by side in memory.
+        shape = (len(self.parameters), self.outputs, self.inputs, q.size)
+        gradient = np.zeros(shape, dtype=complex).transpose(3, 0, 1, 2)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
-        shifts = powers(q, highest)
+        shifts = [np.ones_like(q), q]
+        for _ in range(highest - 1):
+            shifts.append(shifts[-1] * q)
         for i, j in self.active:
             A, B, F = known[i, j]
             AF = A * F
