@@ -412,7 +412,7 @@ def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
     # Sums of a few hundred nodes, added up, round less than one of them all.
-    return integrate(gradients, lambda w: np.ones((w.size, 1)), singularities, sums=products, several=True)
+    return integrate(gradients, None, singularities, sums=products, several=True)
 
 
 def taking_part(names: Sequence[str], directions: Array) -> str:

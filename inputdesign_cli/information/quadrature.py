@@ -139,7 +139,7 @@ def _summed_products(weighted: NDArray, F: NDArray) -> NDArray:
 
 def integrate(
     values: Values,
-    functions: Values,
+    functions: Values | None,
     singularities: ComplexArray,
     *,
     sums: Sums = PRODUCTS,
@@ -157,7 +157,7 @@ def integrate(
     parameters are nearly indistinguishable.
 
     Args:
-        functions: against which the values are integrated, (n, f) at frequencies (n,).
+        functions: against which the values are integrated, (n, f) at frequencies (n,); None: one (n, 1).
         several: values are large, as for several channels: they are computed at few nodes at a time.
         unit: of the frequencies of `values` and `functions`; all other frequencies are divided by it.
 
@@ -202,7 +202,12 @@ def integrate(
 
 
 def _summed(
-    values: Values, functions: Values, sums: Sums, rules: Sequence[Quadrature], at_once: int, unit: float
+    values: Values,
+    functions: Values | None,
+    sums: Sums,
+    rules: Sequence[Quadrature],
+    at_once: int,
+    unit: float,
 ) -> list[NDArray]:
     """Return the sums on each of the rules."""
     nodes = np.concatenate([rule.nodes for rule in rules])
@@ -210,7 +215,7 @@ def _summed(
     found: list[list[NDArray]] = [[] for _ in rules]
     for start in range(0, nodes.size, at_once):
         w = nodes[start : start + at_once] * unit
-        here, table = values(w), functions(w)
+        here, table = values(w), np.ones((w.size, 1)) if functions is None else functions(w)
         for rule, end, parts in zip(rules, ends, found, strict=True):
             first = end - rule.nodes.size
             lo, hi = max(start, first), min(start + len(here), end)
@@ -222,7 +227,7 @@ def _summed(
 
 def integrate_band(
     values: Values,
-    functions: Values,
+    functions: Values | None,
     singularities: ComplexArray,
     band: tuple[float, float],
     *,

@@ -124,10 +124,6 @@ class Demands:
         """Return whether the requirements exclude a singular information matrix."""
         return any(asked.requirement.definite for asked in self.asked)
 
-    def requirement(self, index: int) -> Requirement:
-        """Return the requirement with the index that `violations` gives."""
-        return self.asked[index].requirement
-
     def violations(
         self,
         informations: NDArray[np.float64],

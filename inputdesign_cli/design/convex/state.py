@@ -185,7 +185,7 @@ class State:
     def _add(self, keys: list[Place]) -> None:
         self.keys += keys
         self.idle += [0] * len(keys)
-        self.cuts += [self.problem.demands.requirement(i).cut(w) for i, w in keys]
+        self.cuts += [self.problem.demands.asked[i].requirement.cut(w) for i, w in keys]
 
     def _add_rows(self, breaches: list[DensityBreach]) -> None:
         most = _MOST_ROWS * self.problem.experiment.inputs

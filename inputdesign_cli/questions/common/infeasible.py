@@ -173,7 +173,7 @@ def explain(
         times = f"{nearest.certificate.bound:.4g} times as large for the lower ones to be reached"
         why = f"contradict each other: the upper ones would have to be {times}"
         return contradictory(sorted(involved, key=lambda limit: limit.upper), why)
-    missed = (problem.demands.requirement(index) for index, _ in nearest.active)
+    missed = (problem.demands.asked[index].requirement for index, _ in nearest.active)
     names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
     parts = [f"{names} cannot be met within the limits: {bought.sentence}"]
     remedies = [
