@@ -77,7 +77,9 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
 """The powers that results state; the power of the moves of u between samples is only limited."""
-_latest: list[tuple[object, bool]] = [(None, False)]  # the last plant or loop, and whether its noise informs
+# The last plant or loop, and whether its noise informs; the last experiment, and its gradients at flat nodes.
+_latest: list[tuple[object, bool]] = [(None, False)]
+_flat: list[tuple] = [(None, ())]
 # What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
 _NOTHING = 1e-13
 
@@ -279,16 +281,13 @@ class Experiment:
         Raises:
             SpecError: `not-identifiable` when even that excitation does not identify all parameters.
         """
-        return self.whitened_by(power, *self._flat_gradients)
-
-    @cached_property
-    def _flat_gradients(
-        self,
-    ) -> tuple[tuple[Quadrature, ComplexArray], tuple[Quadrature, ComplexArray | None]]:
-        """Return the gradients of raw parameters at the nodes of the `flat_rules`, see `whitened_by`."""
-        raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
-        noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
-        return (excited, raw.excitation_gradient(excited.nodes)), (around, noise)
+        of, gradients = _flat[0]
+        if of is not self:  # several powers are tried in turn
+            raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
+            noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
+            gradients = (excited, raw.excitation_gradient(excited.nodes)), (around, noise)
+            _flat[0] = self, gradients
+        return self.whitened_by(power, *gradients)
 
     def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
         """Return nodes for flat excitation over the band, and for the noise, with these singularities."""
