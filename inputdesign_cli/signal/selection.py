@@ -173,7 +173,8 @@ class _Candidates:
 
     def record(self, rng: np.random.Generator, best: Record | None = None) -> Record:
         """Return one candidate at its level, or the best so far where it is seen early to be no better."""
-        seconds_left()
+        if best is None or self.generator.samples > LONG:  # short records take no time to speak of
+            seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
         drawn = float(np.sum(np.mean(values**2, axis=0)))
         if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
