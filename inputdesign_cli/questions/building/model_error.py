@@ -23,9 +23,8 @@ from inputdesign_cli.questions.building.controllers import (
     on_the_limit,
     rational,
 )
-from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.header import bad_table, build_units, has_column, read_frequency_table
 from inputdesign_cli.questions.building.system import build_loop
-from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE

@@ -19,9 +19,17 @@ from inputdesign_cli.questions.building import system
 from inputdesign_cli.questions.building.demand import check_effects, on_finite_information
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import confidence_factor, unstated_errors
-from inputdesign_cli.questions.building.parameters import build_earlier, check_known, embedded, inverse
 from inputdesign_cli.questions.building.requirements import build_asked
-from inputdesign_cli.questions.building.system import build_cost, build_loop, build_model, held_plant
+from inputdesign_cli.questions.building.system import (
+    build_cost,
+    build_earlier,
+    build_loop,
+    build_model,
+    check_known,
+    embedded,
+    held_plant,
+    inverse,
+)
 from inputdesign_cli.questions.common.foresight import Foreseen, Foresight, Knowledge
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
 from inputdesign_cli.questions.common.simulation import Simulation

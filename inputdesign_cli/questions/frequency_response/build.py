@@ -19,13 +19,13 @@ from inputdesign_cli.questions.building.header import (
     build_header,
     build_units,
     check_compared,
+    has_column,
     refuse_unhandled,
 )
 from inputdesign_cli.questions.building.model_error import positive_table
 from inputdesign_cli.questions.building.signal_settings import build_record_request
 from inputdesign_cli.questions.building.spectra import build_power_limits, implied_limits
 from inputdesign_cli.questions.building.system import build_cost, build_model
-from inputdesign_cli.questions.building.tables import has_column
 from inputdesign_cli.questions.building.uncertainty import build_simulation
 from inputdesign_cli.questions.frequency_response.measure import Measurement
 from inputdesign_cli.questions.frequency_response.outcome import KEY, ResponseTerms

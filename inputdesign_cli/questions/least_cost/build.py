@@ -11,7 +11,6 @@ from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design, check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.header import build_header, refuse_unhandled
 from inputdesign_cli.questions.building.model_error import build_confidence
-from inputdesign_cli.questions.building.parameters import check_known
 from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
 from inputdesign_cli.questions.building.spectra import (
@@ -20,7 +19,12 @@ from inputdesign_cli.questions.building.spectra import (
     build_power_limits,
     implied_limits,
 )
-from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
+from inputdesign_cli.questions.building.system import (
+    build_cost,
+    build_experiment,
+    check_known,
+    excitation_band,
+)
 from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants, build_simulation
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
