@@ -150,10 +150,6 @@ class Experiment:
             return self._whitened(self._source.noise_gradient, w)
         return self._whitened(self._source.noise_gradient, w, self.noise_whitener, self.noise_colouring)
 
-    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return dG/dtheta (n, k, p, r), in these coordinates."""
-        return self._whitened(self.model.plant_gradient, w)
-
     def _whitened(
         self,
         of: Callable[[ArrayLike], ComplexArray],
