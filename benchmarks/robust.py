@@ -23,8 +23,8 @@ os.environ.update(ONE_THREAD)
 import numpy as np
 
 from inputdesign_cli import parse_spec
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import Design, solve_design
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 

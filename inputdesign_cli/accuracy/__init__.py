@@ -1,14 +1,5 @@
 """Requirements on the accuracy of the model, one a file."""
 
-from inputdesign_cli.accuracy.admissible import (
-    Absolute as Absolute,
-    AdmissibleError as AdmissibleError,
-    Floored as Floored,
-    Relative as Relative,
-    Sensitivity as Sensitivity,
-    Table as Table,
-    Weighted as Weighted,
-)
 from inputdesign_cli.accuracy.criteria import (
     Criterion as Criterion,
     InformationTarget as InformationTarget,
@@ -24,8 +15,15 @@ from inputdesign_cli.accuracy.cuts import (
 )
 from inputdesign_cli.accuracy.ellipsoid import EllipsoidError as EllipsoidError
 from inputdesign_cli.accuracy.model_error import (
+    Absolute as Absolute,
+    AdmissibleError as AdmissibleError,
+    Floored as Floored,
     ModelError as ModelError,
     OnModelError as OnModelError,
+    Relative as Relative,
+    Sensitivity as Sensitivity,
+    Table as Table,
+    Weighted as Weighted,
     model_errors as model_errors,
 )
 from inputdesign_cli.accuracy.requirement import (
@@ -34,6 +32,8 @@ from inputdesign_cli.accuracy.requirement import (
     Violation as Violation,
     active_entries as active_entries,
     inverse_factor as inverse_factor,
+    least_ratio as least_ratio,
     worst as worst,
+    worst_ratio as worst_ratio,
 )
 from inputdesign_cli.accuracy.weighted_variance import WeightedVariance as WeightedVariance

@@ -113,7 +113,11 @@ class MatrixCut:
     def blocks(self, size: int) -> list[CutBlock]:
         """Return M - `matrix` positive semidefinite as a cone."""
         rows = svec_length(size)
-        return [CutBlock("psd", size, -svec(self.matrix), sp.eye_array(rows, format="csc"), _none(rows))]
+        return [
+            CutBlock(
+                "psd", size, -svec(self.matrix), sp.eye_array(rows, format="csc"), sp.csc_matrix((rows, 0))
+            )
+        ]
 
     @property
     def inequality(self) -> Inequality:
@@ -280,7 +284,7 @@ class TraceCut:
     def blocks(self, size: int) -> list[CutBlock]:
         """Return the linear inequality itself."""
         row = sp.csc_matrix(svec(self.weight)[None, :])
-        return [CutBlock("nonnegative", 1, -np.ones(1), row, _none(1))]
+        return [CutBlock("nonnegative", 1, -np.ones(1), row, sp.csc_matrix((1, 0)))]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
         """Return a multiple of the inequality."""
@@ -302,10 +306,6 @@ class TraceCut:
 def _root(matrix: Array) -> Array:
     eigenvalues, vectors = np.linalg.eigh(matrix)
     return np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T
-
-
-def _none(rows: int) -> sp.csc_matrix:
-    return sp.csc_matrix((rows, 0))
 
 
 @dataclass(frozen=True)

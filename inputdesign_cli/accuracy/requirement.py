@@ -7,7 +7,7 @@ are polished between its points.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,6 +31,9 @@ _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
 _STEP = 1e-5  # of a difference, relative to M
 _KEPT = 8  # sets of frequencies whose rows are remembered at a time
+# Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
+# rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
+_UNTOLD = 1e-12
 
 
 @dataclass(frozen=True)
@@ -147,8 +150,8 @@ class OverFrequency(Requirement):
     """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
 
     It concerns one `entry` of G, or all of them together; `band` is in the unit of the experiment. Subclasses
-    give `rows`, often `measure`, and the points of the frequency plane near which they change fast
-    (`own_singularities`) or have a kink (`knots`).
+    give `weight_at` or `rows`, often `measure`, and the points of the frequency plane near which they change
+    fast (`own_singularities`) or have a kink (`knots`).
     """
 
     experiment: Experiment
@@ -170,9 +173,14 @@ class OverFrequency(Requirement):
         """Return frequencies at which the ratio may have a kink."""
         return np.zeros(0)
 
-    @abstractmethod
+    def weight_at(self, w: ArrayLike) -> Array:
+        """Return the weight (n,) of an error of the entry; one by default."""
+        return np.ones(np.shape(w))
+
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Return T(w), (n, q, k)."""
+        """Return T(w), (n, q, k); by default the `plant_rows` times their weight."""
+        weight, gradient = self.weight_at(w), self.experiment.model.plant_gradient(w)
+        return self._rows_of(gradient) * weight[:, None, None]
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
@@ -194,13 +202,20 @@ class OverFrequency(Requirement):
 
         In memory they stand as `turned` has them.
         """
-        if self.entry is None:
-            gradient = self.experiment.plant_gradient(w)
-        else:
-            gradient = self.experiment.entry_gradient(w, *self.entry)
+        return self._rows_of(self.experiment.model.plant_gradient(w))
+
+    def _rows_of(self, gradient: ComplexArray) -> NDArray[np.float64]:
+        if self.entry is not None:
+            gradient = gradient[:, :, self.entry[0], self.entry[1]]
         n, k = gradient.shape[:2]
         flat = gradient.reshape(n, k, -1).transpose(1, 2, 0)
-        return np.concatenate([flat.real, flat.imag], axis=1).T
+        columns = np.concatenate([flat.real, flat.imag], axis=1)
+        return (self._whitener @ columns.reshape(k, -1)).reshape(columns.shape).T
+
+    @cached_property
+    def _whitener(self) -> Array:
+        """Return the matrix (k, k) that brings gradients of raw parameters to these coordinates."""
+        return self.experiment.from_raw
 
     def concerned(self, G: ComplexArray) -> ComplexArray:
         """Return the entry (n, 1) of G (n, p, r), or all of them (n, p r)."""
@@ -341,6 +356,31 @@ def inverse_factor(information: Array) -> Array:
 def worst(violations: list[Violation]) -> Violation:
     """Return the largest violation; ratio 0 when there are none."""
     return max(violations, key=lambda v: v.ratio, default=Violation(0.0))
+
+
+def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
+    """Return the largest ratio of requirements as a function of the information of a record; 0 for none.
+
+    It raises `LinAlgError` if rounding would decide: the record hardly determines all parameters.
+    """
+    return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
+
+
+def least_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
+    """Return a lower bound on `worst_ratio`, without a slow search."""
+    return _largest(requirements, lambda requirement, information: requirement.least(information))
+
+
+def _largest(
+    requirements: Sequence[Requirement], of: Callable[[Requirement, Array], float]
+) -> Callable[[Array], float]:
+    def ratio(information: Array) -> float:
+        eigenvalues = np.linalg.eigvalsh(information)
+        if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
+            raise np.linalg.LinAlgError
+        return max([of(requirement, information) for requirement in requirements], default=0.0)
+
+    return ratio
 
 
 def turned(rows: NDArray[np.float64], turn: Array) -> NDArray[np.float64]:

@@ -40,12 +40,10 @@ class WeightedVariance(OverFrequency):
         """Return the singularities of the weight."""
         return self.weight.singularities
 
-    def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Return |W| / sqrt(max) times the real and imaginary parts of Lambda, (n, 2, k)."""
+    def weight_at(self, w: ArrayLike) -> Array:
+        """Return |W| / sqrt(max), or that over |G|."""
         size = np.abs(self.weight.at(w)) / np.sqrt(self.limit)
-        if self.relative:
-            size = size / self.nominal_size(w)
-        return self.plant_rows(w) * size[:, None, None]
+        return size / self.nominal_size(w) if self.relative else size
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """Return the weighted standard deviation over its limit."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.spectrum import svec, svec_length
+from inputdesign_cli.spectrum import svec
 
 ConeKind = Literal["zero", "nonnegative", "psd", "exponential"]
 
@@ -43,12 +43,6 @@ class Block:
         """
         rows = svec(parts) if kind == "psd" else parts
         return cls(kind, sp.csc_matrix(rows[1:].T), rows[0], parts.shape[1] if kind == "psd" else 0)
-
-    def __post_init__(self) -> None:
-        if self.kind == "psd" and self.offset.size != svec_length(self.order):
-            raise ValueError("a psd block has as many rows as svec has entries")
-        if self.kind == "exponential" and self.offset.size != 3 * self.order:
-            raise ValueError("an exponential block has three rows for each of its order")
 
 
 @dataclass(frozen=True)

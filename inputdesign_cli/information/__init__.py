@@ -20,6 +20,7 @@ from inputdesign_cli.information.quadrature import (
     Quadrature as Quadrature,
     Values as Values,
     graded_quadrature as graded_quadrature,
+    integrand as integrand,
     integrate as integrate,
     integrate_band as integrate_band,
 )

@@ -77,6 +77,9 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
 """The powers that results state; the power of the moves of u between samples is only limited."""
+# The last plant or loop, and whether its noise informs; the last experiment, and its gradients at flat nodes.
+_latest: list[tuple[object, bool]] = [(None, False)]
+_flat: list[tuple] = [(None, ())]
 # What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
 _NOTHING = 1e-13
 
@@ -127,35 +130,40 @@ class Experiment:
         """Return K (p, p) with K^T K the inverse of the noise covariance."""
         return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
 
+    @cached_property
+    def noise_colouring(self) -> Array:
+        """Return the inverse (p, p) of `noise_whitener`."""
+        return np.linalg.inv(self.noise_whitener)
+
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return F_x (n, k, p, r): the gradient of the prediction with respect to x, noise whitened to I.
 
         F_u = H^-1 dG in open loop; in closed loop what x causes at y and u enters the prediction as well
         ([bombois-least-costly], below (4) and (15), for one channel).
         """
-        gradient = self.model.input_gradient(w) if self.loop is None else self.loop.excitation_gradient(w)
-        if len(self.noise_whitener) == 1:
-            return self._whiten(self.noise_whitener[0, 0] * gradient)
-        return self._whiten(np.einsum("pq,nkqr->nkpr", self.noise_whitener, gradient))
+        of = self.model.input_gradient if self.loop is None else self.loop.excitation_gradient
+        return self._whitened(of, w, self.noise_whitener)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient for white e of covariance I, noise whitened to I, (n, k, p, p)."""
-        K = self.noise_whitener
-        gradient = self._source.noise_gradient(w)
-        if len(K) == 1:
-            return self._whiten(gradient)
-        return self._whiten(np.einsum("pq,nkqs,st->nkpt", K, gradient, np.linalg.inv(K), optimize=True))
+        if self.model.outputs == 1:
+            return self._whitened(self._source.noise_gradient, w)
+        return self._whitened(self._source.noise_gradient, w, self.noise_whitener, self.noise_colouring)
 
-    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return dG/dtheta (n, k, p, r), in these coordinates."""
-        return self._whiten(self.model.plant_gradient(w))
-
-    def entry_gradient(self, w: ArrayLike, output: int, input: int) -> ComplexArray:
-        """Return the whitened gradient (n, k) of one entry of G."""
-        entry = self.model.plant_gradient(w)[:, :, output, input]
-        return entry if self.factor is None else (self._inverse_factor @ entry.T).T
-
-    def _whiten(self, gradient: ComplexArray) -> ComplexArray:
+    def _whitened(
+        self,
+        of: Callable[[ArrayLike], ComplexArray],
+        w: ArrayLike,
+        left: Array | None = None,
+        right: Array | None = None,
+    ) -> ComplexArray:
+        """Return left G right of gradients G (n, k, p, r) at frequencies, in these coordinates."""
+        gradient = of(w)
+        if left is not None:
+            single = len(left) == 1
+            gradient = left[0, 0] * gradient if single else np.einsum("pq,nkqr->nkpr", left, gradient)
+        if right is not None:
+            gradient = np.einsum("nkpq,qr->nkpr", gradient, right)
         if self.factor is None:
             return gradient
         if gradient.shape[2:] == (1, 1):
@@ -168,8 +176,15 @@ class Experiment:
         [mohan-spectral], (3), made Hermitian in the channels and symmetric in the parameters.
         """
         F = self.excitation_gradient(w)
+        if F.shape[2:] == (1, 1):
+            columns = F[:, :, 0, 0].T
+            real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
+            products = real[:, None] * real
+            products += imaginary[:, None] * imaginary
+            return self.samples * products.transpose(2, 0, 1)
         if self.inputs == 1:
-            return self.samples * _real_products(F)
+            rows = np.concatenate([F[..., 0].real, F[..., 0].imag], axis=2)
+            return self.samples * (rows @ rows.swapaxes(1, 2))
         half = np.einsum("nmpa,nlpb->nlmab", F.conj(), F, optimize=True)
         return (0.5 * self.samples) * (half + half.swapaxes(1, 2))
 
@@ -247,7 +262,11 @@ class Experiment:
         """Return whether the noise alone has information on any parameter."""
         if self.model.continuous:
             return False
-        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
+        source, told = _latest[0]
+        if source is not self._source:  # the experiments of a design have one plant, in many coordinates
+            source, told = self._source, bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
+            _latest[0] = source, told
+        return told
 
     def whitened(self, power: float | Array) -> Experiment:
         """Return the experiment in coordinates where M = I by this power, flat over the band.
@@ -258,9 +277,13 @@ class Experiment:
         Raises:
             SpecError: `not-identifiable` when even that excitation does not identify all parameters.
         """
-        raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
-        noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
-        return self.whitened_by(power, (excited, raw.excitation_gradient(excited.nodes)), (around, noise))
+        of, gradients = _flat[0]
+        if of is not self:  # several powers are tried in turn
+            raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
+            noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
+            gradients = (excited, raw.excitation_gradient(excited.nodes)), (around, noise)
+            _flat[0] = self, gradients
+        return self.whitened_by(power, *gradients)
 
     def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
         """Return nodes for flat excitation over the band, and for the noise, with these singularities."""
@@ -350,19 +373,6 @@ class Experiment:
         return taking_part(self.model.names, raw / np.maximum(size, 1e-3 * size.max())[:, None])
 
 
-def _real_products(F: ComplexArray) -> NDArray[np.float64]:
-    """Return Re sum over channels of F_l F_m^* (n, k, k), for F (n, k, p, r)."""
-    if F.shape[2:] == (1, 1):
-        columns = F[:, :, 0, 0].T
-        real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
-        products = real[:, None] * real
-        products += imaginary[:, None] * imaginary
-        return products.transpose(2, 0, 1)
-    flat = F.reshape(*F.shape[:2], -1)
-    real = np.concatenate([flat.real, flat.imag], axis=2)
-    return real @ real.swapaxes(1, 2)
-
-
 def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
     """Return sqrt(weight) F as real rows (2 n p r, k), for F (n, k, p, r)."""
     flat = F.transpose(0, 2, 3, 1) * np.sqrt(weights)[:, None, None, None]
@@ -390,14 +400,14 @@ def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.
         singularities: of all of them.
     """
 
-    def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-        weighted = np.moveaxis(values, 0, -1) * np.sqrt(rule.weights)
+    def products(weights: NDArray, values: NDArray) -> NDArray:
+        weighted = np.moveaxis(values, 0, -1) * np.sqrt(weights[:, 0])
         flat = weighted.reshape(*weighted.shape[:2], -1)
         rows = np.concatenate([flat.real, flat.imag], axis=2)
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
     # Sums of a few hundred nodes, added up, round less than one of them all.
-    return integrate(gradients, sums, singularities, several=True)
+    return integrate(gradients, None, singularities, sums=products, several=True)
 
 
 def taking_part(names: Sequence[str], directions: Array) -> str:

@@ -159,7 +159,12 @@ class RecordFilters:
         for column, parameter in enumerate(self.model.parameters):
             if parameter.letter in sources and parameter.power < samples:
                 raw[parameter.power :, column] = sources[parameter.letter][: samples - parameter.power]
-        return self.experiment.whiten_rows(raw)[:, :, None] / np.sqrt(self.model.covariance[0, 0])
+        return (raw @ self._whitener)[:, :, None]
+
+    @cached_property
+    def _whitener(self) -> Array:
+        """Return the matrix (k, k) from raw rows to these coordinates, noise whitened to 1."""
+        return self.experiment.from_raw.T / np.sqrt(self.model.covariance[0, 0])
 
     @cached_property
     def _responses(self) -> dict[PowerKind, Filter]:
@@ -183,7 +188,7 @@ class RecordFilters:
         It is minus the derivative of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters run
         one after the other: a double pole in one product of their denominators costs half the digits.
         """
-        m, letters = self.model, {p.letter for p in self.model.parameters}
+        m, letters = self.model, self.model.letters
         B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]
         by_b = filtered(D, np.convolve(C, F), self.signals("input", record)[:, 0])
         sources = {"b": by_b}

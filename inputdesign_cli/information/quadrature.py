@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -24,6 +24,7 @@ RELATIVE_ERROR = 1e-11
 _PHASE_PER_PANEL = 16.0
 _MAX_REFINEMENTS = 4
 _ROUNDING = 1e-7
+_NO_PART = 1e-15  # a share of the largest gradient of an output
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
 _AT_ONCE, _AT_ONCE_OF_SEVERAL = 2048, 256  # nodes
@@ -40,8 +41,9 @@ class Quadrature:
     weights: Array
 
 
-Sums = Callable[[Quadrature, NDArray], NDArray[np.float64]]
-"""Sums over nodes of weighted values (n, ...) there; those over two sets of nodes add up."""
+Sums = Callable[[NDArray, NDArray], NDArray]
+"""Sums over nodes of functions (n, f), with their weights, times values (n, ...): (f, ...)."""
+PRODUCTS: Sums = partial(np.tensordot, axes=(0, 0))
 
 
 def _edges(
@@ -108,27 +110,56 @@ def _panels(
     return rule
 
 
+def integrand(density: Values, factor: Values | None, inputs: int) -> tuple[Values, Sums]:
+    """Return the values to compute at the nodes of a rule, and how to sum them against functions.
+
+    The sums, of weighted functions (n, f) and of the values at n nodes, are sum_n weighted[n, f] D(node_n):
+    (f, ...), or (f, ..., r, r) for several inputs. With a `factor` F of D, D = F^* F, the values belong to F.
+    """
+    return (factor, _summed_products) if factor is not None and inputs > 1 else (density, PRODUCTS)
+
+
+def _summed_products(weighted: NDArray, F: NDArray) -> NDArray:
+    """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
+
+    Of an output only the parameters and inputs that matter to it take part.
+    """
+    n, k, p, r = F.shape
+    half = np.zeros((weighted.shape[1], k * r, k * r), dtype=complex)
+    for output in range(p):
+        rows = F[:, :, output].reshape(n, k * r)
+        size = np.abs(rows).max(axis=0)
+        used = np.flatnonzero(size > _NO_PART * size.max(initial=0.0))
+        rows = rows[:, used]
+        for sums, weight in zip(half, weighted.T, strict=True):
+            sums[np.ix_(used, used)] += (rows.conj() * weight[:, None]).T @ rows
+    both = half.reshape(-1, k, r, k, r).transpose(0, 1, 3, 2, 4)
+    return 0.5 * (both + both.swapaxes(1, 2))
+
+
 def integrate(
     values: Values,
-    sums: Sums,
+    functions: Values | None,
     singularities: ComplexArray,
     *,
+    sums: Sums = PRODUCTS,
     lo: float = 0.0,
     hi: float = np.pi,
     highest_lag: int = 0,
     knots: Array = _NONE,
     several: bool = False,
     unit: float = 1.0,
-) -> NDArray[np.float64]:
-    """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
+) -> NDArray:
+    """Return `sums` of `values` times `functions` on a rule that is proved fine enough by halving its panels.
 
     Halving gains twelve digits or none. Where it gains none and the change is already small, only rounding of
     the integrand remains, which no rule can mend. It occurs in whitened coordinates of a plant whose
     parameters are nearly indistinguishable.
 
     Args:
+        functions: against which the values are integrated, (n, f) at frequencies (n,); None: one (n, 1).
         several: values are large, as for several channels: they are computed at few nodes at a time.
-        unit: of the frequencies of `values` and `sums`; all other frequencies are divided by it.
+        unit: of the frequencies of `values` and `functions`; all other frequencies are divided by it.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:
@@ -142,11 +173,11 @@ def integrate(
 
     at_once = _AT_ONCE_OF_SEVERAL if several else _AT_ONCE
     # The first rule never stands alone: one call computes its values and the next rule's.
-    coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once, unit)
+    coarse, fine = _summed(values, functions, sums, [rule_of(0), rule_of(1)], at_once, unit)
     earlier = np.inf
     for refine in range(1, _MAX_REFINEMENTS + 1):
         if refine > 1:
-            (fine,) = _summed(values, sums, [rule_of(refine)], at_once, unit)
+            (fine,) = _summed(values, functions, sums, [rule_of(refine)], at_once, unit)
         scale = np.abs(fine).max(initial=0.0)
         change = np.abs(fine - coarse).max(initial=0.0)
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
@@ -171,33 +202,39 @@ def integrate(
 
 
 def _summed(
-    values: Values, sums: Sums, rules: Sequence[Quadrature], at_once: int, unit: float
-) -> list[NDArray[np.float64]]:
+    values: Values,
+    functions: Values | None,
+    sums: Sums,
+    rules: Sequence[Quadrature],
+    at_once: int,
+    unit: float,
+) -> list[NDArray]:
     """Return the sums on each of the rules."""
     nodes = np.concatenate([rule.nodes for rule in rules])
     ends = np.cumsum([rule.nodes.size for rule in rules]).tolist()
-    found: list[list[NDArray[np.float64]]] = [[] for _ in rules]
+    found: list[list[NDArray]] = [[] for _ in rules]
     for start in range(0, nodes.size, at_once):
-        here = values(nodes[start : start + at_once] * unit)
+        w = nodes[start : start + at_once] * unit
+        here, table = values(w), np.ones((w.size, 1)) if functions is None else functions(w)
         for rule, end, parts in zip(rules, ends, found, strict=True):
             first = end - rule.nodes.size
             lo, hi = max(start, first), min(start + len(here), end)
             if lo < hi:
-                own = slice(lo - first, hi - first)
-                there = Quadrature(rule.nodes[own] * unit, rule.weights[own] * unit)
-                parts.append(sums(there, here[lo - start : hi - start]))
+                weights, part = rule.weights[lo - first : hi - first] * unit, slice(lo - start, hi - start)
+                parts.append(sums(table[part] * weights[:, None], here[part]))
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in found]
 
 
 def integrate_band(
     values: Values,
-    sums: Sums,
+    functions: Values | None,
     singularities: ComplexArray,
     band: tuple[float, float],
     *,
+    sums: Sums = PRODUCTS,
     highest_lag: int = 0,
     knots: Array = _NONE,
-) -> NDArray[np.float64]:
+) -> NDArray:
     """Integrate over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
     The band is stretched to the length of the half circle, for which the panels are laid out.
@@ -206,8 +243,9 @@ def integrate_band(
     near: ComplexArray = np.asarray(singularities, dtype=complex) * (1.0 / unit + 0j)
     return integrate(
         values,
-        sums,
+        functions,
         near,
+        sums=sums,
         lo=band[0] / unit,
         hi=band[1] / unit,
         highest_lag=highest_lag,

@@ -97,18 +97,29 @@ def local_maxima(
     Returns:
         Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
     """
-    index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
-    if index.size == 0:
-        return np.zeros(0), np.zeros(0)
-    around = np.unique(np.clip(index[:, None] + np.arange(-2, 2), 0, grid.size - 2))
-    inside = (
-        grid[around, None] + (grid[around + 1] - grid[around])[:, None] * _fractions(_REFINEMENT)
-    ).ravel()
-    places = np.repeat(around + 1, _REFINEMENT)
-    finer, values = np.insert(grid, places, inside), np.insert(values, places, function(inside))
-    index = _within_reach(values, around, above)
-    if index.size == 0:
-        return np.zeros(0), np.zeros(0)
+    least = above - SLACK * abs(above) if np.isfinite(above) else above
+    finer, beside = grid, np.zeros(0, dtype=bool)  # whether the cell before each point is refined
+    for refined in (False, True):
+        padded = np.concatenate([[-np.inf], values, [-np.inf]])
+        index = np.flatnonzero((values >= padded[:-2]) & (values > padded[2:]) & (values > least))
+        index = _distinct(values, index) if index.size > 1 else index
+        if refined and np.isfinite(above):
+            # There the function has less room to rise, in proportion to the steps at least.
+            slack = np.where(beside[index] & beside[index + 1], SLACK / (_REFINEMENT + 1), SLACK)
+            index = index[values[index] > above - slack * abs(above)]
+        if index.size == 0:
+            return np.zeros(0), np.zeros(0)
+        if refined:
+            break
+        around = np.unique(np.clip(index[:, None] + np.arange(-2, 2), 0, grid.size - 2))
+        inside = grid[around, None] + (grid[around + 1] - grid[around])[:, None] * _fractions(_REFINEMENT)
+        places = np.repeat(around + 1, _REFINEMENT)
+        finer = np.insert(grid, places, inside.ravel())
+        values = np.insert(values, places, function(inside.ravel()))
+        first = around + _REFINEMENT * np.arange(around.size)
+        beside = np.zeros(finer.size + 1, dtype=bool)
+        beside[first[:, None] + np.arange(1, _REFINEMENT + 2)] = True
+        beside[[0, -1]] = True  # beyond the ends there is nothing
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
     points, repeats = _ZOOM_FEW if index.size <= _FEW else _ZOOM_MANY
@@ -134,31 +145,6 @@ def local_maxima(
         best, best_value = np.where(flat, grid[end], best), np.where(flat, level, best_value)
     kept = best_value > above
     return best[kept], best_value[kept]
-
-
-def _within_reach(values: Array, around: NDArray[np.intp], above: float) -> NDArray[np.intp]:
-    """Return the peaks of a grid beside which the function may exceed `above`.
-
-    The cells `around` are refined: there it has less room to rise, in proportion to the steps at least.
-
-    Args:
-        around: cells of the grid before it was refined, ascending; cell i lies between points i and i + 1.
-    """
-    if not np.isfinite(above):
-        return _peaks(values, above)
-    index = _peaks(values, above - SLACK * abs(above))
-    first = around + _REFINEMENT * np.arange(around.size)
-    refined = np.zeros(values.size - 1, dtype=bool)
-    refined[first[:, None] + np.arange(_REFINEMENT + 1)] = True
-    beside = np.pad(refined, 1, constant_values=True)  # beyond the ends there is nothing
-    slack = np.where(beside[index] & beside[index + 1], SLACK / (_REFINEMENT + 1), SLACK)
-    return index[values[index] > above - slack * abs(above)]
-
-
-def _peaks(values: Array, above: float) -> NDArray[np.intp]:
-    padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    found = np.flatnonzero((values >= padded[:-2]) & (values > padded[2:]) & (values > above))
-    return _distinct(values, found) if found.size > 1 else found
 
 
 def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:

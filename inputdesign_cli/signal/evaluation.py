@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import FiniteRecord, PowerKind
@@ -161,21 +162,20 @@ class Evaluator:
 
     def share(self, samples: Array) -> float:
         """Return the largest factor on the record's powers within the limits, at every plant."""
-        powers = {kind: self.plant.mean_squares_of_each(kind, samples) for kind, _, _ in self.limits}
-        spent = [
-            (most, float(max(powers[kind].sum(axis=1) if channel is None else powers[kind][:, channel])))
-            for kind, channel, most in self.limits
-        ]
-        return min((most / power for most, power in spent if power > 0.0), default=np.inf)
+        powers, share = dict[PowerKind, NDArray[np.float64]](), np.inf
+        for kind, channel, most in self.limits:
+            if kind not in powers:
+                powers[kind] = self.plant.mean_squares_of_each(kind, samples)
+            spent = float(max(powers[kind].sum(axis=1) if channel is None else powers[kind][:, channel]))
+            share = min(share, most / spent) if spent > 0.0 else share
+        return share
 
     def cost(self, samples: Array) -> float:
         """Return the weighted sum of the powers."""
-        return float(
-            sum(
-                np.sum(np.asarray(weight) * self.plant.mean_squares(kind, samples))
-                for kind, weight in self.target.cost.items()
-            )
-        )
+        cost = 0.0
+        for kind, weight in self.target.cost.items():
+            cost += float(np.sum(np.asarray(weight) * self.plant.mean_squares(kind, samples)))
+        return cost
 
     def costs_more(self, samples: Array, cost: float) -> bool:
         """Return whether multiples of the samples miss the target as long as they cost no more than that."""

@@ -41,7 +41,7 @@ class SignalGenerator:
             return None
         return spectral_factor(self.spectrum.autocovariances)
 
-    @property
+    @cached_property
     def method(self) -> str:
         """Return the name of the kind that is made.
 
@@ -53,7 +53,7 @@ class SignalGenerator:
         unusable = self.factor is not None and self.factor.residual > _FACTOR_RESIDUAL
         return "multisine" if unusable or self.spectrum.sinusoids is not None else "filtered_noise"
 
-    @property
+    @cached_property
     def kind(self) -> SignalKind:
         """Return the kind of this name."""
         return kind_of(self.method)

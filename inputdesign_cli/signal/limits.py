@@ -49,7 +49,7 @@ class Bounds:
         """Return the largest number of changes of the inputs in a number of samples; None without a limit."""
         return None if self.moves is None else int(self.moves * samples / (self.moves_in or samples))
 
-    @property
+    @cached_property
     def hard(self) -> bool:
         """Return whether single samples are limited, or only some values of them can be made."""
         limited = any(bound is not None for bound in (self.amplitude, self.rate, self.output))
@@ -100,7 +100,7 @@ class Limiter:
         constraints = _constraints(plant, settings.hold, bounds)
         return cls(settings, amplitude, rate, bounds.quantisers, constraints)
 
-    @property
+    @cached_property
     def plain(self) -> bool:
         """Return whether the record is just a multiple of its values."""
         limited = self.constraints or self.quantisers or np.isfinite([*self.amplitude, *self.rate]).any()

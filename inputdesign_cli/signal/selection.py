@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -172,9 +173,10 @@ class _Candidates:
 
     def record(self, rng: np.random.Generator, best: Record | None = None) -> Record:
         """Return one candidate at its level, or the best so far where it is seen early to be no better."""
-        seconds_left()
+        if best is None or self.generator.samples > LONG:  # short records take no time to speak of
+            seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
-        drawn = _power(values)
+        drawn = float(np.sum(np.mean(values**2, axis=0)))
         if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
             values = values * np.sqrt(power / drawn)
         if self.generator.kind.slewed:
@@ -195,12 +197,12 @@ class _Candidates:
             met,
         )
 
-    @property
+    @cached_property
     def free_level(self) -> bool:
         """Return whether the level of a record is the one that it needs."""
         return self.evaluator.target.meets and self.limiter.settings.level is None
 
-    @property
+    @cached_property
     def _free(self) -> bool:
         """Return whether a record is its values at the level that it needs, and nothing else."""
         return self.free_level and self.limiter.plain

@@ -2,9 +2,11 @@
 
 from inputdesign_cli.spectrum.basis import (
     Basis as Basis,
+    Density as Density,
     Face as Face,
     Functional as Functional,
     Pricing as Pricing,
+    constant as constant,
     kept_on_grid as kept_on_grid,
     weighted_mean as weighted_mean,
 )

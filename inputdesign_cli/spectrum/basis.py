@@ -46,6 +46,11 @@ class Functional:
         return float(self.vector @ x)
 
 
+def constant(level: NDArray) -> Density:
+    """Return the density that has this level at every frequency."""
+    return lambda w: np.broadcast_to(level, (np.size(w), *np.shape(level)))
+
+
 def kept_on_grid(density: Callable[[Array], NDArray]) -> Callable[[Array], NDArray]:
     """Return the function with a memory of its values at the last of the largest arrays."""
     last: list[tuple[Array, NDArray]] = []

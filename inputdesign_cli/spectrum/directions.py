@@ -5,66 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Values
 from inputdesign_cli.plant import local_maxima
-from inputdesign_cli.spectrum.basis import Density, Factor, Functional
+from inputdesign_cli.spectrum.basis import Functional
 
 _SINGULAR = 1e-13
 # A price below this is none: its inverse would leave the range of double precision.
 _NOTHING = 1e-140
-_ROUNDING = 1e-15
 _LEVEL = 1e-10  # ratios this near to each other, relative, are the same
 _BETWEEN = 200  # frequencies between two of a grid
-
-WeightedSums = Callable[[NDArray, NDArray, Array], NDArray]
 
 
 def matrices(density: NDArray) -> NDArray:
     """Return values (n,) of a density for one input as (n, 1, 1), and values (n, r, r) unchanged."""
     return density[:, None, None] if density.ndim == 1 else density
-
-
-def integrand(density: Density, factor: Factor | None, inputs: int) -> tuple[Values, WeightedSums]:
-    """Return the values to compute at the nodes of a rule, and how to sum them against a table of functions.
-
-    The sums, of the table (n, functions), of the values at n nodes and of the weights (n,), are
-    sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r). With a `factor` F of D, D = F^* F, the
-    values belong to F.
-    """
-    if factor is not None and inputs > 1:
-        return factor, _summed_products
-    return density, _summed_scalars if inputs == 1 else _summed
-
-
-def _summed(table: NDArray, values: NDArray, weights: Array) -> NDArray:
-    return np.tensordot(table * weights[:, None], values, axes=(0, 0))
-
-
-def _summed_scalars(table: NDArray, values: NDArray, weights: Array) -> NDArray:
-    return _summed(table, values, weights)[..., None, None]
-
-
-def _summed_products(table: NDArray, F: NDArray, weights: Array) -> NDArray:
-    """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
-
-    Of an output only the parameters and inputs that matter to it take part.
-    """
-    n, k, p, r = F.shape
-    weighted = table * weights[:, None]
-    half = np.zeros((table.shape[1], k * r, k * r), dtype=complex)
-    for output in range(p):
-        rows = F[:, :, output].reshape(n, k * r)
-        size = np.abs(rows).max(axis=0)
-        used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
-        rows = rows[:, used]
-        for sums, weight in zip(half, weighted.T, strict=True):
-            sums[np.ix_(used, used)] += (rows.conj() * weight[:, None]).T @ rows
-    both = half.reshape(-1, k, r, k, r).transpose(0, 1, 3, 2, 4)
-    return 0.5 * (both + both.swapaxes(1, 2))
 
 
 def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
@@ -163,9 +119,3 @@ def first_directions(units: Array) -> ComplexArray:
     both = [axes[i] + sign * axes[j] for i in range(len(units)) for j in range(i) for sign in (1.0, -1.0)]
     found = np.array([*axes, *both], dtype=complex)
     return found / np.linalg.norm(found, axis=1, keepdims=True)
-
-
-def leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:
-    """Return the `number` largest generalised eigenvalues, ascending, and their vectors as columns."""
-    first = max(len(worth) - number, 0)
-    return scipy.linalg.eigh(worth, metric, subset_by_index=[first, len(worth) - 1])

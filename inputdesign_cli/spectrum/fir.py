@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Quadrature, integrate
+from inputdesign_cli.information import integrand, integrate
 from inputdesign_cli.spectrum.basis import Density, Factor
-from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import FaceSizes, GramBasis
 from inputdesign_cli.spectrum.svec import svec_layout, svec_length
 
@@ -81,13 +80,13 @@ class FirBasis(GramBasis):
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
         """Return (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown, (size, ...)."""
-        source, summed = integrand(density, factor, self.inputs)
-
-        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            found = summed(self._turn(rule.nodes), values, rule.weights).real
-            return self._functional(np.moveaxis(found, (-2, -1), (1, 2)))
-
-        return integrate(source, sums, singularities, highest_lag=self.order, several=self.inputs > 1)
+        (source, sums), several = integrand(density, factor, self.inputs), self.inputs > 1
+        found = integrate(
+            source, self._turn, singularities, sums=sums, highest_lag=self.order, several=several
+        )
+        return self._functional(
+            np.moveaxis(found.real, (-2, -1), (1, 2)) if several else found[:, None, None]
+        )
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """Return v^* Phi v at one frequency, v the `direction` (r,), as a functional, (size,)."""

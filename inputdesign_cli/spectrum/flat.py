@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Experiment, Quadrature, integrate_band
+from inputdesign_cli.information import Experiment, integrand, integrate_band
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
-from inputdesign_cli.spectrum.directions import integrand
 
 
 @dataclass(frozen=True)
@@ -53,13 +52,9 @@ class FlatBasis(DensityFamily):
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
         """Return level times (1 / 2 pi) integral of the trace of the density, (1, ...)."""
-        source, summed = integrand(density, factor, self.inputs)
-
-        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            found = summed(np.ones((rule.nodes.size, 1)), values, rule.weights)
-            return self.level * np.trace(found, axis1=-2, axis2=-1).real
-
-        return integrate_band(source, sums, singularities, self.band)
+        source, sums = integrand(density, factor, self.inputs)
+        found = integrate_band(source, None, singularities, self.band, sums=sums)
+        return self.level * (found if self.inputs == 1 else np.trace(found, axis1=-2, axis2=-1).real)
 
     def coarser(self) -> list[FlatBasis]:
         """Return an empty list, since no basis is coarser."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.spectrum.basis import DensityFamily, Face, Functional, Pricing
-from inputdesign_cli.spectrum.directions import directed_scale, leading_pairs
+from inputdesign_cli.spectrum.directions import directed_scale
 from inputdesign_cli.spectrum.svec import smat
 
 _DIRECTIONS = 8
@@ -106,9 +106,9 @@ class GramBasis(DensityFamily, ABC):
         metric, worth = metric / np.outer(unit, unit), worth / np.outer(unit, unit)
         spread = np.linalg.eigvalsh(metric)
         if spread[0] <= _SINGULAR_PRICE * spread[-1]:
-            _, vectors = leading_pairs(worth - metric, np.eye(len(metric)), _DIRECTIONS)
+            _, vectors = _leading_pairs(worth - metric, np.eye(len(metric)), _DIRECTIONS)
             return Pricing(directed_scale(price, value, grid)[0], vectors / unit[:, None])
-        ratios, vectors = leading_pairs(worth, metric, _DIRECTIONS)
+        ratios, vectors = _leading_pairs(worth, metric, _DIRECTIONS)
         return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors / unit[:, None])
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[Self, Face]:
@@ -150,3 +150,9 @@ def _independent(vectors: NDArray) -> NDArray:
         return np.asarray(scipy.linalg.qr(vectors, mode="economic")[0])
     q = scipy.linalg.qr(np.concatenate([vectors.real, vectors.imag]), mode="economic")[0]
     return q[: len(vectors)] + 1j * q[len(vectors) :]
+
+
+def _leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:
+    """Return the `number` largest generalised eigenvalues, ascending, and their vectors as columns."""
+    first = max(len(worth) - number, 0)
+    return scipy.linalg.eigh(worth, metric, subset_by_index=[first, len(worth) - 1])

@@ -17,9 +17,8 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Quadrature, integrate_band
+from inputdesign_cli.information import integrand, integrate_band
 from inputdesign_cli.spectrum.basis import Density, Factor
-from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import hmat, hvec, hvec_layout, smat, svec, svec_layout, svec_length
 
@@ -88,18 +87,18 @@ class PolynomialBasis(GramBasis):
         rows, columns, scale, imaginary = self._layout()
         pairs = place[rows // self.inputs, columns // self.inputs]
         i, j = rows % self.inputs, columns % self.inputs
-        source, summed = integrand(density, factor, self.inputs)
+        source, sums = integrand(density, factor, self.inputs)
 
-        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            p = self.functions(rule.nodes)
-            found = summed(p[:, first] * p[:, second], values, rule.weights)
-            # The advanced indices are apart, so that their axis comes first: (size, ...).
-            entries = np.moveaxis(found, (-2, -1), (1, 2))[pairs, i, j]
-            spread = (slice(None), *[None] * (entries.ndim - 1))
-            chosen = np.where(imaginary[spread], entries.imag, entries.real)
-            return 0.5 * scale[spread] * chosen
+        def products(w: Array) -> NDArray[np.float64]:
+            p = self.functions(w)
+            return p[:, first] * p[:, second]
 
-        return integrate_band(source, sums, singularities, self.band, highest_lag=2 * self.order)
+        lag = 2 * self.order
+        found = integrate_band(source, products, singularities, self.band, sums=sums, highest_lag=lag)
+        # The advanced indices are apart, so that their axis comes first: (size, ...).
+        entries = np.moveaxis(found, (-2, -1), (1, 2))[pairs, i, j] if self.inputs > 1 else found[pairs]
+        spread = (slice(None), *[None] * (entries.ndim - 1))
+        return 0.5 * scale[spread] * np.where(imaginary[spread], entries.imag, entries.real)
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """Return v^* Phi v at one frequency, v the `direction` (r,), as a functional, (size,)."""

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information import Quadrature, integrate_band
+from inputdesign_cli.information import integrand, integrate_band
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Factor
-from inputdesign_cli.spectrum.directions import integrand
 
 
 @dataclass(frozen=True)
@@ -75,12 +74,16 @@ class TabulatedSpectrum(DensityFamily):
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
         """Return (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w, (1, ...)."""
-        r = self.inputs
-        source, summed = integrand(density, factor, r)
-
-        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            found = summed(self._at(rule.nodes).reshape(-1, r * r), values, rule.weights)
-            return np.einsum("ba...ab->...", found.reshape(r, r, *found.shape[1:])).real[None]
-
-        band = (float(self.frequency[0]), float(self.frequency[-1]))
-        return integrate_band(source, sums, singularities, band, knots=self.frequency)
+        r, band = self.inputs, (float(self.frequency[0]), float(self.frequency[-1]))
+        source, sums = integrand(density, factor, r)
+        found = integrate_band(
+            source,
+            lambda w: self._at(w).reshape(-1, r * r),
+            singularities,
+            band,
+            sums=sums,
+            knots=self.frequency,
+        )
+        if r == 1:
+            return found.real
+        return np.einsum("ba...ab->...", found.reshape(r, r, *found.shape[1:])).real[None]

@@ -259,7 +259,7 @@ def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dic
 def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     """Estimate gain, time constant and dead time from a record that begins at rest."""
     from inputdesign_cli import questions
-    from inputdesign_cli.questions.building.tables import read_columns
+    from inputdesign_cli.questions.building.header import read_columns
     from inputdesign_cli.records import Preparation
 
     wanted = {"time": "time", "u1": "u", "y1": "y"} | dict(columns)

@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 from inputdesign_cli import load_spec, parse_spec, questions, solve
 from inputdesign_cli.compute.time_limit import stoppable
+from inputdesign_cli.design.convex.demands import Alternative
 from inputdesign_cli.design.convex.designs import solve_design
-from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.building.uncertainty import build_plants

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from inputdesign_cli.accuracy import worst_ratio
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.questions.common.record import worst_ratio
 from inputdesign_cli.signal.evaluation import Target
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.lines import DesignedSpectrum

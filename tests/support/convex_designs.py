@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, ModelError, Relative
+from inputdesign_cli.design.convex.demands import Alternative, Question
 from inputdesign_cli.design.convex.designs import solve_design
-from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, close_loop
 from inputdesign_cli.spectrum import FirBasis, LinesBasis

@@ -9,40 +9,17 @@ leads to a design that is good enough, and a few steps find the best mixture.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.demands import FEW
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Candidate, Problem
 
 Place = tuple[int, float | None]
 
 _MEETS = 1e-12
 _MIXINGS = 12
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A feasible design: z (size,), s, M' (S, k, k) of every scenario, and the objective (the cost, or s).
-
-    The spectrum is z / s; goals without s have s = 1.
-    """
-
-    z: Array
-    s: float
-    informations: NDArray[np.float64]
-    objective: float
-
-
-def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
-    """Return the candidate with these unknowns, whether or not it meets the requirements."""
-    informations = problem.fixed_information + problem.excited(z)
-    if problem.scaled:
-        informations = informations + s * problem.scaled_information
-    return Candidate(z, s, informations, s if problem.scaled else problem.cost_at(z))
 
 
 def least_scale(problem: Problem, z: Array) -> float:
@@ -70,19 +47,19 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
         s = max(least_scale(problem, z), s if problem.goal == "samples" else 0.0)
     if problem.goal == "factor":
         # All of M' scales, so that one look at the ratios gives the factor, above or below one.
-        informations = candidate_at(problem, z, s).informations
+        informations = problem.candidate(z, s).informations
         factor = problem.demands.largest(informations, default=1.0) ** 2
-        return candidate_at(problem, factor * z, factor * s)
+        return problem.candidate(factor * z, factor * s)
     factor, at = 1.0, set(places)
     for _ in range(12 + len(problem.others)):
         factor = _smallest_factor(problem, z, s, at, factor)
-        informations = candidate_at(problem, factor * z, factor * s).informations
-        found = problem.demands.violations(informations, above=1.0, few=FEW)
+        scaled = problem.candidate(factor * z, factor * s if problem.scaled else 1.0)
+        found = problem.demands.violations(scaled.informations, above=1.0, few=FEW)
         missed = [(i, v) for i, v in found if v.ratio > 1.0 + _MEETS]
         if not missed:
             break
         at |= {(i, v.frequency) for i, v in missed}
-    return candidate_at(problem, factor * z, factor * s if problem.scaled else 1.0)
+    return scaled
 
 
 def missing_floor(problem: Problem, z: Array) -> float:
@@ -100,18 +77,18 @@ def missing_floor(problem: Problem, z: Array) -> float:
 
 
 def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], factor: float) -> float:
-    excited = problem.excited(z) + (s * problem.scaled_information if problem.scaled else 0.0)
     fixed, places = problem.fixed_information, dict[int, list[float | None]]()
+    excited = problem.candidate(z, s).informations - fixed
     for index, frequency in at:
         places.setdefault(index, []).append(frequency)
+    looked = [(problem.demands.asked[i], np.array(w)) for i, w in places.items()]
 
     def excess(f: float) -> float:
-        ratios = [
-            problem.demands.requirement(i).ratios(fixed[n] + f * excited[n], np.array(w)).max()
-            for i, w in places.items()
-            for n in (problem.demands.asked[i].scenario,)
-        ]
-        return float(max(ratios, default=0.0)) ** 2 - 1.0
+        most = 0.0
+        for asked, w in looked:
+            information = fixed[asked.scenario] + f * excited[asked.scenario]
+            most = max(most, float(asked.requirement.ratios(information, w).max()))
+        return most**2 - 1.0
 
     value = excess(factor)
     while value > _MEETS:
@@ -145,7 +122,7 @@ def mixed(problem: Problem, z: Array, s: float, interior: Candidate) -> Candidat
     """Return the feasible design nearest to (z, s) on the line to the strictly feasible `interior`."""
 
     def at(share: float) -> Candidate:
-        return candidate_at(problem, z + share * (interior.z - z), s + share * (interior.s - s))
+        return problem.candidate(z + share * (interior.z - z), s + share * (interior.s - s))
 
     start = at(0.0)
     missed = excess(problem, start)

@@ -12,13 +12,13 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
-from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, scaled_up
+from inputdesign_cli.design.convex.candidate import excess, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.coordinates import balanced_powers, suited, white_power, whitened_problem
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError
 from inputdesign_cli.design.convex.feasible import KEEPS, solve_limited
-from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.problem import Candidate, Problem
 from inputdesign_cli.design.convex.record_bound import RecordBound
 from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
@@ -158,7 +158,7 @@ def _white(question: Question, flat: Problem, power: float) -> Candidate:
     if question.goal == "cost":
         # Enough for the nominal plant; the others may take more.
         at = np.array([power])
-        return scaled_up(flat, at, 1.0, []) if power > 0.0 and flat.others else candidate_at(flat, at, 1.0)
+        return scaled_up(flat, at, 1.0, []) if power > 0.0 and flat.others else flat.candidate(at, 1.0)
     # From far below, since what meets the requirements with room to spare is not scaled down.
     return scaled_up(replace(flat, floors_fixed=False), np.array([_FAR_BELOW * power]), 0.0, [])
 

@@ -10,14 +10,7 @@ import numpy as np
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
-from inputdesign_cli.design.convex.candidate import (
-    Place,
-    candidate_at,
-    excess,
-    least_scale,
-    missing_floor,
-    scaled_up,
-)
+from inputdesign_cli.design.convex.candidate import Place, excess, least_scale, missing_floor, scaled_up
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError, exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
@@ -185,7 +178,7 @@ def _known_within_limits(problem: Problem, start: Array, free: ExchangeResult) -
 
 def _keeps_limits(problem: Problem, found: ExchangeResult) -> bool:
     kept = problem.on(found.basis)
-    return excess(kept, candidate_at(kept, found.x, 1.0)) <= KEEPS
+    return excess(kept, kept.candidate(found.x, 1.0)) <= KEEPS
 
 
 def _unweighted(problem: Problem, free: ExchangeResult) -> ExchangeResult:

@@ -63,8 +63,8 @@ class FiniteProgram:
     def work(self) -> int:
         """Return the number of entries of the matrix inequalities that make up the cuts."""
         cuts = [cut for part in self.matrices for cut in part.cuts]
-        orders = [self.size if cut.concave is None else 2 * self.size for cut in cuts]
-        return sum(svec_length(order) for order in orders)
+        orders = np.array([self.size if cut.concave is None else 2 * self.size for cut in cuts], dtype=int)
+        return int(np.sum(orders * (orders + 1) // 2))
 
 
 @dataclass(frozen=True)

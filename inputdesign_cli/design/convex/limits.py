@@ -1,9 +1,10 @@
-"""Upper and lower limits of an experiment: linear conditions on the spectrum."""
+"""The goals, the price and the limits of an experiment: linear conditions on the spectrum."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,3 +120,33 @@ def _ratio(limit: DensityLimit, phi: Array, level: Array) -> Array:
     if limit.upper:
         return phi / np.maximum(level, _TINY)
     return np.where(level > 0, 2.0 - phi / np.maximum(level, _TINY), 0.0)
+
+
+Goal = Literal["cost", "factor", "samples"]
+Weight = float | tuple[float, ...]
+# The plants whose powers are paid for: the nominal one, all of them evenly, or the dearest.
+Paid = Literal["nominal", "mean", "worst"]
+
+
+def paid_for(paid: Paid, costs: Sequence[float]) -> float:
+    """Return the cost of a design from its costs at each of the plants considered."""
+    return max(costs) if paid == "worst" else sum(costs) / len(costs)
+
+
+def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | None, float]]:
+    """Return the positive weights of a cost: kind, channel (None is the sum over the channels), weight."""
+    listed: list[tuple[PowerKind, int | None, float]] = []
+    for kind, weight in cost.items():
+        if isinstance(weight, tuple):
+            listed += [(kind, channel, w) for channel, w in enumerate(weight) if w > 0]
+        elif weight > 0:
+            listed.append((kind, None, weight))
+    return listed
+
+
+def weighted_sum(weights: Mapping[PowerKind, Weight], power: Mapping[PowerKind, Sequence[float]]) -> float:
+    """Return the cost of powers, by kind and channel, at these weights."""
+    return sum(
+        weight * (sum(power[kind]) if channel is None else power[kind][channel])
+        for kind, channel, weight in weights_of(weights)
+    )

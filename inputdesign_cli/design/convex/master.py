@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, positive_part
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.candidate import Candidate
 from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, solve_program
 from inputdesign_cli.design.convex.limits import DensityPlace
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Candidate, Problem
 from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
 
 # The conic program is solved this much tighter than the gap that is asked for.
@@ -118,17 +117,18 @@ def solve_master(
             feasible where scaling up is no remedy.
         dense: see `solve_program`.
     """
-    ray = best.z[:, None] / problem.price.at(best.z) if keep else np.zeros((best.z.size, 0))
+    worth = float(problem.price.vector @ best.z)
+    ray = best.z[:, None] / worth if keep else np.zeros((best.z.size, 0))
     several = not problem.scaled and len(problem.costs) > 1
     largest = np.zeros((best.z.size, int(several)))  # an unknown that excites nothing
     columns = np.concatenate([face.columns, ray, largest], axis=1)
     inside = face.columns.shape[1]
-    objective, worth = best.objective, problem.price.at(best.z)
+    objective = best.objective
     # The nominal plant where there are no cuts: a program without M is solved by no spectrum at all.
     involved = sorted({placed.scenario for placed in cuts}) or [0]
     definite = problem.demands.definite
     turns = {plant: _congruence(best.informations[plant], definite=definite) for plant in involved}
-    program = _program(problem, face, columns, cuts, rows, best, turns)
+    program = _program(problem, face, columns, cuts, rows, best, worth, turns)
     exact = max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR)
     solution = solve_program(program, tolerance=exact, rough=max(_SOLVER_MARGIN * rough, exact), dense=dense)
     if solution is None:
@@ -158,11 +158,11 @@ def _program(
     cuts: Sequence[PlacedCut],
     rows: Sequence[Row],
     best: Candidate,
+    worth: float,
     turns: Mapping[int, Array],
 ) -> FiniteProgram:
     """Return the finite program in scaled numbers; the last column is the largest of several costs."""
     inside, number = face.columns.shape[1], columns.shape[1]
-    worth = problem.price.at(best.z)
     matrices = []
     for plant, turn in turns.items():
         mine = [placed for placed in cuts if placed.scenario == plant]
@@ -201,20 +201,17 @@ def _turned(
     problem: Problem, scenario: int, turn: Array, columns: Array, worth: float, s: float
 ) -> tuple[Array, Array]:
     """Return svec of K M' K^T, K = `turn`, as gains (entries, unknowns) and offset of (y / worth, s)."""
-
-    def turned(information: NDArray[np.float64]) -> NDArray[np.float64]:
-        return svec(turn @ information @ turn.T)
-
     maps = problem.information_maps[:, scenario]
     # Of a basis that grows, most functions have left the face.
     used = np.flatnonzero(columns.any(axis=1))
     gains = np.zeros((svec_length(len(turn)), columns.shape[1]))
     for start in range(0, used.size, _AT_ONCE):
         part = used[start : start + _AT_ONCE]
-        gains += worth * (turned(maps[part]).T @ columns[part])
+        gains += worth * (svec(turn @ maps[part] @ turn.T).T @ columns[part])
     if problem.scaled:
-        gains = np.column_stack([gains, s * turned(problem.scaled_information[scenario])])
-    return gains, turned(problem.fixed_information[scenario])
+        scaled = svec(turn @ problem.scaled_information[scenario] @ turn.T)
+        gains = np.column_stack([gains, s * scaled])
+    return gains, svec(turn @ problem.fixed_information[scenario] @ turn.T)
 
 
 def _in_cone(face: Face, y: Array) -> Array:

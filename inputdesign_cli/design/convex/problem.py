@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Literal
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,22 +20,31 @@ from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.amplitude.polytope import Facet, LagPolytope
 from inputdesign_cli.design.amplitude.windows import weighted
-from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.limits import (
     DensityBreach,
     DensityLimit,
     DensityPlace,
+    Goal,
+    Paid,
     PowerLimit,
+    Weight,
     breach_ratio,
     breaches_at,
+    weights_of,
 )
-from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts, joint_information, mean_cost
+from inputdesign_cli.information import (
+    POWER_KINDS,
+    Experiment,
+    PowerKind,
+    WeightedProducts,
+    joint_information,
+    mean_cost,
+)
 from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
-from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
+from inputdesign_cli.spectrum import Basis, Density, Functional, constant, kept_on_grid
 
 _RIPPLE = 16  # points of the grid a lag
-Goal = Literal["cost", "factor", "samples"]
 
 
 def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
@@ -99,6 +107,19 @@ class Gradients:
         if known is None or known[0] is not w:
             known = self._products[scenario] = (w, experiment.products(w))
         return experiment.valued(known[1], weight)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design: z (size,), s, M' (S, k, k) of every scenario, and the objective (the cost, or s).
+
+    The spectrum is z / s; goals without s have s = 1.
+    """
+
+    z: Array
+    s: float
+    informations: NDArray[np.float64]
+    objective: float
 
 
 @dataclass(frozen=True)
@@ -248,6 +269,13 @@ class Problem:
         """Return M(x) of the nominal plant (k, k)."""
         return self.baseline_information + np.tensordot(x, self.information_map, axes=1)
 
+    def candidate(self, z: Array, s: float) -> Candidate:
+        """Return the candidate with these unknowns, whether or not it meets the requirements."""
+        informations = self.fixed_information + np.tensordot(z, self.information_maps, axes=1)
+        if not self.scaled:
+            return Candidate(z, s, informations, self.cost_at(z))
+        return Candidate(z, s, informations + s * self.scaled_information, s)
+
     def excited(self, x: Array) -> NDArray[np.float64]:
         """Return sum_i x_i M_si (S, k, k)."""
         return np.tensordot(x, self.information_maps, axes=1)
@@ -333,10 +361,9 @@ class Problem:
         known = self._powers.get((kind, channel, scenario))
         if known is not None:
             return known
-
-        def density(w: Array) -> Array:
-            return experiment.power_density(kind, w, channel)
-
+        density: Density = partial(experiment.power_density, kind, channel=channel)
+        if kind == "excitation":
+            density = constant(density(np.zeros(1))[0])
         vector = self._along(
             lambda problem: problem.power(kind, channel, scenario).vector,
             lambda basis: basis.integrals(density, experiment.singularities),
@@ -347,6 +374,15 @@ class Problem:
     @cached_property
     def _powers(self) -> dict[tuple[PowerKind, int | None, int], Functional]:
         return {}
+
+    def powers(self, x: Array, scenario: int = 0) -> dict[PowerKind, list[float]]:
+        """Return the powers of input, output and excitation at a plant, one entry a channel."""
+        found: dict[PowerKind, list[float]] = {}
+        for kind in POWER_KINDS:
+            channels = self.experiment.model.outputs if kind == "output" else self.experiment.inputs
+            of_each = [self.power(kind, channel, scenario).vector @ x for channel in range(channels)]
+            found[kind] = [max(float(one), 0.0) for one in of_each]  # zero may come out below by rounding
+        return found
 
     def _limited(self, limit: PowerLimit) -> Functional:
         return self.power(limit.kind, limit.channel, limit.scenario)

@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, Violation
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.candidate import (
-    Candidate,
-    Place,
-    candidate_at,
-    least_scale,
-    mixed,
-    scaled_up,
-)
+from inputdesign_cli.design.convex.candidate import Place, least_scale, mixed, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.limits import DensityBreach, DensityPlace
 from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Candidate, Problem
 from inputdesign_cli.spectrum import Face, first_directions
 
 # A far-off iterate is not worth repairing: its upper bound would say nothing.
@@ -92,8 +85,9 @@ class State:
             self.active = _active(self.keys, answer.proof)
         if moves:  # else cuts that hold without weight (a degenerate optimum) would come and go for ever
             self._prune(answer.proof)
-        z, s = self._definite(answer.z, answer.s)
-        found, breaches = self._misses(z, s)
+        tried = self._definite(answer.z, answer.s)
+        z, s = tried.z, tried.s
+        found, breaches = self._misses(tried)
         worst = max([v.ratio for _, v in found] + [b.ratio for b in breaches], default=1.0)
         if self.interior is not None:
             self.best = min(self.best, mixed(problem, z, s, self.interior), key=lambda c: c.objective)
@@ -117,15 +111,14 @@ class State:
         better = self.best.objective < 0.9 * before[0] or self.certificate.bound > 1.1 * before[1]
         return answer.converged or better
 
-    def _misses(self, z: Array, s: float) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
-        problem = self.problem
-        informations = candidate_at(problem, z, s).informations
+    def _misses(self, tried: Candidate) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
+        problem, s, informations = self.problem, tried.s, tried.informations
         found = problem.demands.violations(informations, above=1.0, few=FEW)
         if problem.side:
             root = np.sqrt(s)
             sides = problem.demands.violations(informations, above=1.0 / root, side=True, few=FEW)
             found += [(i, replace(v, ratio=root * v.ratio)) for i, v in sides]
-        return found, problem.density_breaches(z, s, above=1.0)
+        return found, problem.density_breaches(tried.z, s, above=1.0)
 
     def _prune(self, proof: Proof) -> None:
         """Drop the cuts that have not bound for some rounds; each costs the solver a k x k cone.
@@ -140,18 +133,17 @@ class State:
         self.cuts = [self.cuts[i] for i in kept]
         self.proof = replace(proof, cuts=tuple(proof.cuts[i] for i in kept))
 
-    def _definite(self, z: Array, s: float) -> tuple[Array, float]:
+    def _definite(self, z: Array, s: float) -> Candidate:
         """Return (z, s), or halfway to the best design when z leaves some parameter without information."""
+        tried = self.problem.candidate(z, s)
         if not self.problem.demands.definite:
-            return z, s
+            return tried
         for _ in range(_HALVINGS):
-            try:
-                np.linalg.cholesky(candidate_at(self.problem, z, s).informations)
-            except np.linalg.LinAlgError:
-                z, s = 0.5 * (z + self.best.z), 0.5 * (s + self.best.s)
-            else:
-                return z, s
-        return self.best.z, self.best.s
+            with suppress(np.linalg.LinAlgError):
+                np.linalg.cholesky(tried.informations)
+                return tried
+            tried = self.problem.candidate(0.5 * (tried.z + self.best.z), 0.5 * (tried.s + self.best.s))
+        return self.best
 
     def _grow(self, problem: Problem) -> None:
         """Extend the state to a basis with more functions."""
@@ -169,14 +161,14 @@ class State:
         if self.solved:
             return self.moved_to(problem)
         z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
-        return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
+        return replace(self, problem=problem, best=problem.candidate(z, self.best.s))
 
     def tight(self) -> State:
         """Return the state with the least s for its best design, which has room to spare if interior."""
         if self.problem.goal != "factor":
             return self
         worst = self.problem.demands.largest(self.best.informations, default=1.0)
-        best = candidate_at(self.problem, worst**2 * self.best.z, worst**2 * self.best.s)
+        best = self.problem.candidate(worst**2 * self.best.z, worst**2 * self.best.s)
         return replace(self, best=best)
 
     def moved_to(self, problem: Problem) -> State:
@@ -187,13 +179,13 @@ class State:
         rows = [on_basis(problem, row) for row in self.rows]
         proved = certify(problem, self.proof, rows[: self.proof.rows.size])
         _, face = problem.basis.enlarge(*self.solved, proved.directions, problem.price)
-        best = candidate_at(problem, z, self.best.s)
+        best = problem.candidate(z, self.best.s)
         return replace(self, problem=problem, face=face, best=best, certificate=proved, rows=rows)
 
     def _add(self, keys: list[Place]) -> None:
         self.keys += keys
         self.idle += [0] * len(keys)
-        self.cuts += [self.problem.demands.requirement(i).cut(w) for i, w in keys]
+        self.cuts += [self.problem.demands.asked[i].requirement.cut(w) for i, w in keys]
 
     def _add_rows(self, breaches: list[DensityBreach]) -> None:
         most = _MOST_ROWS * self.problem.experiment.inputs
@@ -242,14 +234,14 @@ def first_state(problem: Problem, start: Array, interior: Array | None, known: S
 
 def _inner(problem: Problem, x: Array) -> Candidate:
     """Return the interior design in (z, s), its requirements met with room where s allows that."""
-    unit = candidate_at(problem, x, 1.0)
+    unit = problem.candidate(x, 1.0)
     if not problem.scaled:
         return unit
     ratio = problem.demands.largest(unit.informations, default=0.0)
     s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
     if problem.goal == "samples":
         s = 1.2 * scaled_up(problem, x, 1.0, []).s
-    return candidate_at(problem, s * x, s)
+    return problem.candidate(s * x, s)
 
 
 def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: list[Place]) -> list[Place]:

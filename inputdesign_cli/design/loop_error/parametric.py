@@ -20,9 +20,9 @@ from inputdesign_cli.accuracy import Cut, inverse_factor
 from inputdesign_cli.accuracy.cuts import VarianceCut
 from inputdesign_cli.accuracy.requirement import OneCondition
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import LinesBasis
 

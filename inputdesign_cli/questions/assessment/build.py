@@ -19,11 +19,17 @@ from inputdesign_cli.questions.assessment.identify import Identification, ModelQ
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
-from inputdesign_cli.questions.building.parameters import build_earlier, stated_prior
 from inputdesign_cli.questions.building.rebuild import restated
 from inputdesign_cli.questions.building.requirements import build_requirements
 from inputdesign_cli.questions.building.signal_settings import operating_points
-from inputdesign_cli.questions.building.system import build_experiment, build_model, prior_record, record_step
+from inputdesign_cli.questions.building.system import (
+    build_earlier,
+    build_experiment,
+    build_model,
+    prior_record,
+    record_step,
+    stated_prior,
+)
 from inputdesign_cli.questions.building.uncertainty import (
     build_foreseen,
     build_knowledge,

@@ -35,7 +35,12 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     check_record(spec, parameters)
     step, limits, signal = record_step(spec), spec.limits, spec.signal
     lo, hi = excitation_band(spec)
-    stated = ("limits.amplitude", "limits.rate", "limits.moves", "signal.quantisation")
+    stated = {
+        "limits.amplitude": limits.amplitude,
+        "limits.rate": limits.rate,
+        "limits.moves": limits.moves,
+        "signal.quantisation": signal.quantisation,
+    }
     return RecordRequest(
         settings=build_signal_settings(spec),
         bounds=build_bounds(spec),
@@ -51,7 +56,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         others=()
         if limits.moves is not None
         else tuple(build_signal_settings(spec, method) for method in _methods(spec)[1:]),
-        limit_keys=tuple(key for key in stated if spec.at(*key.split(".")) is not None),
+        limit_keys=tuple(key for key, value in stated.items() if value is not None),
         operating_points=None if signal.offset is None else operating_points(spec),
         also=(*(signal.also or ()), *(signal.export or ())),
         full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),

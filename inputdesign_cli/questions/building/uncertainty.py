@@ -1,4 +1,4 @@
-"""`uncertainty` -> knowledge of the plant before any data, the plants it may be, rival dead times."""
+"""Spec -> what the plant may be: known before any data, the plants to serve, the true one of `simulate`."""
 
 from __future__ import annotations
 
@@ -9,21 +9,32 @@ from functools import cached_property
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Paid
-from inputdesign_cli.design.convex.question import Alternative
+from inputdesign_cli.design.convex.demands import Alternative
+from inputdesign_cli.design.convex.limits import Paid
 from inputdesign_cli.design.convex.scenario_theory import samples_for
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.questions.building import system
 from inputdesign_cli.questions.building.demand import check_effects, on_finite_information
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import confidence_factor, unstated_errors
-from inputdesign_cli.questions.building.parameters import build_earlier, check_known, embedded, inverse
 from inputdesign_cli.questions.building.requirements import build_asked
+from inputdesign_cli.questions.building.system import (
+    build_cost,
+    build_earlier,
+    build_loop,
+    build_model,
+    check_known,
+    embedded,
+    held_plant,
+    inverse,
+)
 from inputdesign_cli.questions.common.foresight import Foreseen, Foresight, Knowledge
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
-from inputdesign_cli.specification import Spec, load_estimate
+from inputdesign_cli.questions.common.simulation import Simulation
+from inputdesign_cli.specification import Simulation as SimulationSection, Spec, load_estimate
+from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
 from inputdesign_cli.spectrum import Basis
@@ -386,3 +397,48 @@ def build_foresight(spec: Spec, nominal: Experiment) -> Foresight | None:
         knowledge=build_knowledge(spec),
         looks=spec.solver.any_spectrum,
     )
+
+
+def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
+    """Return the study of `simulate` without its excitation, for the nominal experiment with its prior.
+
+    Raises `SpecError`: a loop that is unstable with the true plant.
+    """
+    study = spec.simulation or SimulationSection()
+    return Simulation(
+        units=build_units(spec),
+        nominal=nominal,
+        truth=_true_system(spec, nominal),
+        relative_noise=None if study.noise is None else study.noise.relative_std,
+        runs=study.runs,
+        seed=study.seed,
+        renewed=study.excitation == "new",
+        compare=study.compare,
+        cost=build_cost(spec),
+        entries=unstated_errors(spec, nominal),
+    )
+
+
+def _true_system(spec: Spec, nominal: Experiment) -> Experiment | None:
+    """Return the experiment on the system of `simulation`, or None; `SpecError` if its loop is unstable."""
+    study = spec.simulation
+    if study is None or (study.plant is None and study.noise is None):
+        return None
+    plant, noise = study.plant or spec.plant, spec.noise
+    if study.noise is not None:
+        stated = study.noise
+        noise = Noise.model_construct(
+            C=stated.C, D=stated.D, drift=stated.drift, known=stated.known, variance=stated.variance or 1.0
+        )
+    if plant.kind == "continuous" and spec.plant.kind == "polynomial":
+        plant = held_plant(plant, spec.sample_time)
+    model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
+    controller = spec.experiment.controller
+    try:
+        loop = None if controller is None else build_loop(spec, model, controller)
+    except SpecError as error:
+        found = error.diagnostics[0]
+        message = f"with the true plant {found.message}"
+        hint = "give a true plant that the controller stabilises as well"
+        raise bad_spec(found.code, message, hint=hint, key="simulation.plant") from error
+    return replace(nominal, model=model, loop=loop)

@@ -10,9 +10,8 @@ import numpy as np
 from inputdesign_cli.questions.assessment.build import build_identification, question_at
 from inputdesign_cli.questions.building.rebuild import Rebuild
 from inputdesign_cli.questions.building.signal_settings import operating_points
-from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, record_step
-from inputdesign_cli.questions.building.uncertainty import farthest_radius
+from inputdesign_cli.questions.building.uncertainty import build_simulation, farthest_radius
 from inputdesign_cli.questions.campaign.directory import Rounds
 from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn

@@ -8,19 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError, time_for_hints
-from inputdesign_cli.design.convex.demands import Asked
+from inputdesign_cli.design.convex.demands import Asked, Question
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
-from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.record import RecordRequest
-from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.spectrum import LinesBasis
 
 _TOLERANCE, _EXACT = 1e-5, 1e-6
@@ -31,10 +27,6 @@ _NO_SHARE = 1e-5
 # A limit takes part in the conflict when its share of the proof's weight is above this.
 _TAKES_PART = 1e-4
 _MOST_PLACES = 3
-# The cost beyond that of the design, relative to it, from which on a record has nothing to do with it.
-_HOPELESS = 1e3
-# The share of the record from which on the dead time is the reason.
-_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -181,7 +173,7 @@ def explain(
         times = f"{nearest.certificate.bound:.4g} times as large for the lower ones to be reached"
         why = f"contradict each other: the upper ones would have to be {times}"
         return contradictory(sorted(involved, key=lambda limit: limit.upper), why)
-    missed = (problem.demands.requirement(index) for index, _ in nearest.active)
+    missed = (problem.demands.asked[index].requirement for index, _ in nearest.active)
     names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
     parts = [f"{names} cannot be met within the limits: {bought.sentence}"]
     remedies = [
@@ -310,26 +302,3 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
             enough=lambda objective, _: objective < 1.0 - 1e-3,
         )
     return low if np.isfinite(high) else None
-
-
-def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:
-    """Raise `InfeasibleError` (`record-too-short`) if dead times take nearly all of a record."""
-    size = len(record.samples)
-    late = experiment.memory > _SHARE * size * request.step
-    undetermined = not np.isfinite(record.worst_ratio)
-    if not (request.meets and late and (undetermined or record.extra_power > _HOPELESS)):
-        return
-    times = f"costs {1.0 + record.extra_power:.2g} times what the designed spectrum does"
-    what = "determines all parameters" if undetermined else f"meets the accuracy at a fair price: one {times}"
-    message = f"no record of {size} samples {what}; the dead time takes too many of them"
-    key = "experiment.samples" if request.samples is None else "signal.samples"
-    section = key.partition(".")[0]
-    hint = f"take more samples, {request.units.length(2 * size, section)} or more; or look at time_unit"
-    raise InfeasibleError.because("record-too-short", message, hint, key)
-
-
-def no_record(request: RecordRequest, samples: int, best: str, hint: str) -> InfeasibleError:
-    """Return the error `limits-too-tight`: what the best record of this length that was tried reaches."""
-    keys = request.limit_keys
-    message = f"no record of {samples} samples within {' and '.join(keys)} was found that {best}"
-    return InfeasibleError.because("limits-too-tight", message, hint, keys[0])

@@ -9,11 +9,12 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.accuracy import Requirement, criterion_of, least_ratio, worst_ratio
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, weights_of
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.design.convex.limits import Weight, weights_of
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
@@ -27,10 +28,11 @@ from inputdesign_cli.signal.selection import Record, best_record
 from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum
 
-# Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
-# rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
-_UNTOLD = 1e-12
 _TAKES_PART = 1e-6
+# The cost beyond that of the design, relative to it, from which on a record has nothing to do with it.
+_HOPELESS = 1e3
+# The share of the record from which on the dead time is the reason.
+_LATE = 0.8
 
 Family = Basis | TabulatedSpectrum
 
@@ -120,7 +122,7 @@ def make_record(
     meets = problem.goal != "factor" and request.meets
     plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
-    bounding = [_least_ratio(scenario.requirements) for scenario in problem.scenarios]
+    bounding = [least_ratio(scenario.requirements) for scenario in problem.scenarios]
     spectrum = spectrum_of(request, design.result.basis, design.result.x)
 
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
@@ -137,14 +139,22 @@ def make_record(
         values = generator.values(np.random.default_rng(settings.seed))
         limiting += beyond_peaks(np.repeat(values, settings.hold, axis=0), range(1, len(plants)))
 
-    def together(which: Sequence[int]) -> FiniteRecords:
+    def together(which: Sequence[int]) -> FiniteRecord:
+        if len(plants) == 1:
+            return others[0]
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
     def at_worst(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
-        return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+        largest = -np.inf
+        for n, M in zip(numbers, informations, strict=True):
+            largest = max(largest, of[n](M))
+        return largest
 
-    cost, bounded = design_cost(design, request.cost), partial(at_worst, bounding) if meets else None
-    target = Target(partial(at_worst, scores), meets, request.cost, cost, bounded)
+    cost = design_cost(design, request.cost)
+    score, bound = scores[0], bounding[0]
+    if len(plants) > 1:
+        score, bound = partial(at_worst, scores), partial(at_worst, bounding)
+    target = Target(score, meets, request.cost, cost, bound if meets else None)
     while True:
         at, limits = together(numbers), together(limiting)
         record = best_record(generator, at, target, bounds, first=first, limiting=limits)
@@ -292,7 +302,7 @@ def ratio_before(design: Design, step: float) -> float:
     ratios = []
     for scenario in design.problem.scenarios:
         silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)
-        score = _least_ratio(scenario.requirements)
+        score = least_ratio(scenario.requirements)
         try:
             ratios.append(score(silent.information(np.zeros((1, scenario.experiment.inputs)))))
         except np.linalg.LinAlgError:
@@ -341,30 +351,6 @@ def least_period(inputs: int) -> int:
     return 2 if inputs == 1 else 8 * inputs
 
 
-def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    """Return the largest ratio of requirements as a function of the information of a record; 0 for none.
-
-    It raises `LinAlgError` if rounding would decide: the record hardly determines all parameters.
-    """
-    return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
-
-
-def _least_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    return _largest(requirements, lambda requirement, information: requirement.least(information))
-
-
-def _largest(
-    requirements: Sequence[Requirement], of: Callable[[Requirement, Array], float]
-) -> Callable[[Array], float]:
-    def ratio(information: Array) -> float:
-        eigenvalues = np.linalg.eigvalsh(information)
-        if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
-            raise np.linalg.LinAlgError
-        return max([of(requirement, information) for requirement in requirements], default=0.0)
-
-    return ratio
-
-
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
     """Return the score that ranks records: a criterion, negated, or the worst ratio of requirements."""
     criterion = criterion_of(requirements)
@@ -377,3 +363,26 @@ def design_cost(design: Design, weights: Mapping[PowerKind, Weight]) -> float:
     """Return the cost of the powers of a design at these weights."""
     at, x = design.problem.on(design.result.basis), design.result.x
     return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))
+
+
+def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:
+    """Raise `InfeasibleError` (`record-too-short`) if dead times take nearly all of a record."""
+    size = len(record.samples)
+    late = experiment.memory > _LATE * size * request.step
+    undetermined = not np.isfinite(record.worst_ratio)
+    if not (request.meets and late and (undetermined or record.extra_power > _HOPELESS)):
+        return
+    times = f"costs {1.0 + record.extra_power:.2g} times what the designed spectrum does"
+    what = "determines all parameters" if undetermined else f"meets the accuracy at a fair price: one {times}"
+    message = f"no record of {size} samples {what}; the dead time takes too many of them"
+    key = "experiment.samples" if request.samples is None else "signal.samples"
+    section = key.partition(".")[0]
+    hint = f"take more samples, {request.units.length(2 * size, section)} or more; or look at time_unit"
+    raise InfeasibleError.because("record-too-short", message, hint, key)
+
+
+def no_record(request: RecordRequest, samples: int, best: str, hint: str) -> InfeasibleError:
+    """Return the error `limits-too-tight`: what the best record of this length that was tried reaches."""
+    keys = request.limit_keys
+    message = f"no record of {samples} samples within {' and '.join(keys)} was found that {best}"
+    return InfeasibleError.because("limits-too-tight", message, hint, keys[0])

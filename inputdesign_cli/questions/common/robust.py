@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.design.convex.cost import Paid
+from inputdesign_cli.design.convex.demands import Alternative, Question
 from inputdesign_cli.design.convex.designs import Design, solve_design
+from inputdesign_cli.design.convex.limits import Paid
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import jointly_whitened
 from inputdesign_cli.questions.common.foresight import Knowledge

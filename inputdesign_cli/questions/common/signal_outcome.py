@@ -44,6 +44,7 @@ def signal_of(
     Other requirements have their worst ratio.
     """
     units, samples, made = request.units, record.samples, record.method != "given"
+    held = request.settings.hold > 1
     plant = FiniteRecord(experiment, len(samples), units.step)
     criterion, value, efficiency = criterion_of(requirements), None, None
     ratio = record.worst_ratio if requirements and np.isfinite(record.worst_ratio) else None
@@ -72,24 +73,13 @@ def signal_of(
         spectral_factor_residual=record.factor_residual,
         operating_point=None if points is None or not made else _channels(points),
         wav_full_scale=_full_scale(request, record) if "wav" in request.also else None,
-        moves=_moves(samples, units.sample_time) if made and _of_moves(request) else None,
-        details=_details(request, record),
+        # An operator would make moves that are held, or few.
+        moves=_moves(samples, units.sample_time) if made and (held or request.bounds.moves) else None,
+        details={
+            **({"phases": request.settings.phases} if record.method == "multisine" else {}),
+            **({"hold": request.settings.hold} if made and held else {}),
+        },
     )
-
-
-def _details(request: RecordRequest, record: Record) -> dict[str, object]:
-    """Return further entries of a record: how its phases were chosen, and for how long values are held."""
-    found: dict[str, object] = {}
-    if record.method == "multisine":
-        found["phases"] = request.settings.phases
-    if record.method != "given" and request.settings.hold > 1:
-        found["hold"] = request.settings.hold
-    return found
-
-
-def _of_moves(request: RecordRequest) -> bool:
-    """Return whether an operator would make the moves of the record: they are held, or few."""
-    return request.settings.hold > 1 or request.bounds.moves is not None
 
 
 def _moves(samples: Array, sample_time: float) -> Moves:

@@ -18,7 +18,7 @@ from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.findings import simulated_runs
 from inputdesign_cli.information import Experiment, PowerKind

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
+from inputdesign_cli.accuracy import OnModelError, Requirement, model_errors, worst_ratio
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import seconds_left
@@ -23,25 +23,26 @@ from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.bound import Informed, Pairs
 from inputdesign_cli.questions.common.delivery import Delivered, adding
 from inputdesign_cli.questions.common.foresight import Foresight
-from inputdesign_cli.questions.common.record import RecordRequest, worst_ratio
+from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.signal_outcome import with_record
 from inputdesign_cli.questions.common.simulation import Simulation, simulate
 from inputdesign_cli.signal.selection import Record
 
 # Errors that grow by less than this, relative, where the start is unknown are not mentioned.
 _MATTERS = 0.2
+# An upper bound this small shows that without knowing them. A start is forgotten at e^-8 of itself.
+_SURELY, _FORGOTTEN = 0.19, 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumTask(ABC):
     """Asks about the spectrum of an experiment, with its record and its trial.
 
-    Without a requirement on them `unstated` are the errors that have r_u; `ellipses` are None for a choice.
+    Without a requirement on errors those of the simulation have r_u; `ellipses` are None for a choice.
     """
 
     header: Header
     record: RecordRequest
-    unstated: Sequence[ModelError]
     ellipses: Pairs | None
     simulation: Simulation
     foresight: Foresight | None
@@ -64,7 +65,8 @@ class SpectrumTask(ABC):
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
         """Return the model errors asked about, or r_u of all entries of G, and whether any is asked about."""
         stated = model_errors(asked)
-        return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
+        every = self.simulation.entries
+        return stated or [replace(error, experiment=experiment) for error in every], bool(stated)
 
     def applied(
         self,
@@ -120,15 +122,28 @@ class SpectrumTask(ABC):
 def growth_by_start(
     experiment: Experiment, record: Array, step: float, requirements: Sequence[Requirement]
 ) -> float:
-    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown."""
-    from inputdesign_cli.identification import information_begun_anywhere
+    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown.
 
+    Where it hardly matters it is an upper bound: samples after the start has been forgotten, without their
+    means, know nothing of either.
+    """
     plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
-    u, y = plant.signals("input", record), plant.signals("output", record)
+    poles = np.concatenate([experiment.singularities, experiment.model.singularities])
+    damping = max(float(np.min(poles.imag, initial=1.0 / step)), 1e-9)
+    begins = int(np.ceil((_FORGOTTEN / damping + experiment.memory) / step))
     try:
         at_rest = error(plant.information(record))
         if at_rest <= 0.0:
             return 1.0
+        if 2 * begins < len(record):
+            psi = plant.gradient(record)[begins:]
+            psi = psi - psi.mean(axis=0)
+            bound = error(plant.known + np.tensordot(psi, psi, axes=([0, 2], [0, 2]))) / at_rest
+            if bound <= 1.0 + _SURELY:
+                return bound
+        from inputdesign_cli.identification import information_begun_anywhere
+
+        u, y = plant.signals("input", record), plant.signals("output", record)
         anywhere = information_begun_anywhere(experiment.model, u, y, step)
         return error(plant.known + experiment.whiten_matrix(anywhere)) / at_rest
     except np.linalg.LinAlgError:

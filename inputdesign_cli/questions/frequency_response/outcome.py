@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
-from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.limits import PowerLimit, Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
 from inputdesign_cli.findings.designs import limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts
@@ -25,6 +24,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.common.bound import hermitian_columns
 from inputdesign_cli.questions.common.delivery import (
     APART,
     KINDS,
@@ -37,7 +37,6 @@ from inputdesign_cli.questions.common.delivery import (
 )
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.signal_outcome import signal_of, with_record
-from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.signal.selection import Record
 

@@ -25,8 +25,8 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.delivery import timing, with_study
-from inputdesign_cli.questions.common.infeasible import contradictory, named, no_record
-from inputdesign_cli.questions.common.record import RecordRequest
+from inputdesign_cli.questions.common.infeasible import contradictory, named
+from inputdesign_cli.questions.common.record import RecordRequest, no_record
 from inputdesign_cli.questions.common.simulation import Simulation
 from inputdesign_cli.questions.frequency_response import outcome
 from inputdesign_cli.questions.frequency_response.outcome import KEY, Planned, ResponseTerms, audit_response

@@ -10,21 +10,18 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import InPhase
-from inputdesign_cli.questions.building.header import build_header, build_units
-from inputdesign_cli.questions.building.limits import build_power_limits
-from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
+from inputdesign_cli.questions.building.header import build_header, build_units, refuse_unhandled
+from inputdesign_cli.questions.building.model_error import build_confidence
 from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
-from inputdesign_cli.questions.building.simulation import build_simulation
-from inputdesign_cli.questions.building.spectra import read_given_spectrum
+from inputdesign_cli.questions.building.spectra import build_power_limits, read_given_spectrum
 from inputdesign_cli.questions.building.system import (
     build_cost,
     build_experiment,
     read_excitation_record,
     record_step,
 )
-from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants
-from inputdesign_cli.questions.building.unhandled import refuse_unhandled
+from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants, build_simulation
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
@@ -62,7 +59,6 @@ def build_given(spec: Spec) -> GivenTask:
         plants=_build_plants(spec, experiment),
         header=build_header(spec),
         record=build_record_request(spec, experiment.size),
-        unstated=unstated_errors(spec, experiment),
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
         foresight=build_foresight(spec, experiment),

@@ -9,14 +9,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, Requirement, worst
+from inputdesign_cli.accuracy import Criterion, Requirement, worst, worst_ratio
 from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
-from inputdesign_cli.design.convex.demands import RequirementFactory
-from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.question import Alternative
+from inputdesign_cli.design.convex.demands import Alternative, RequirementFactory
+from inputdesign_cli.design.convex.limits import PowerLimit, Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.findings.designed_records import too_long
 from inputdesign_cli.findings.designs import limits_not_kept, met_within_table
@@ -26,20 +24,12 @@ from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectr
 from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.bound import Informed
+from inputdesign_cli.questions.common.bound import Informed, spectrum_curves
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
-from inputdesign_cli.questions.common.record import (
-    as_long,
-    given_record,
-    least_period,
-    ratio_at,
-    redrawn,
-    worst_ratio,
-)
+from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, redrawn
 from inputdesign_cli.questions.common.robust import MET, Kept, Plants
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.spectrum import spectrum_curves
 from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
 from inputdesign_cli.questions.least_cost.robust_outcome import (

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.accuracy.requirement import OverFrequency
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
+from inputdesign_cli.design.convex.limits import paid_for, weights_of
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import Outcome, plain, read_plain
 from inputdesign_cli.plant import graded_grid
@@ -28,14 +28,14 @@ from inputdesign_cli.questions.least_cost.outcome import Designed
 
 # A plant that keeps less than this share of the limit is not looked at again.
 _DOUBTFUL = 0.9
-_NODES_AT_ONCE = 1024
+_NODES_AT_ONCE = 4096
 # Steps of the grid, a fortieth of the distance to a pole each, to an interval of the rule; fewer where the
 # spectrum itself varies faster.
 _STEPS = 4
 _FAST = 200
 # The highest peaks on the grid are looked at more closely, `_INSIDE` points at a time. Where r_adm of a plant
 # passes that of its floor they have kinks, at which what is missed is in proportion to the last step.
-_PEAKS, _ZOOMS, _INSIDE = 8, 8, 17
+_PEAKS, _ZOOMS, _INSIDE = 8, 4, 129
 _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 

@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from inputdesign_cli.design.convex.problem import Goal
-from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.demands import Question
+from inputdesign_cli.design.convex.limits import Goal
 from inputdesign_cli.errors import refuse
-from inputdesign_cli.questions.building.demand import check_design
-from inputdesign_cli.questions.building.header import build_header
-from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
-from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
-from inputdesign_cli.questions.building.parameters import check_known
+from inputdesign_cli.questions.building.demand import check_design, check_every_direction_counts, check_reach
+from inputdesign_cli.questions.building.header import build_header, refuse_unhandled
+from inputdesign_cli.questions.building.model_error import build_confidence
 from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
-from inputdesign_cli.questions.building.simulation import build_simulation
-from inputdesign_cli.questions.building.spectra import build_basis
-from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
-from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
-from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants
-from inputdesign_cli.questions.building.unhandled import refuse_unhandled
+from inputdesign_cli.questions.building.spectra import (
+    build_basis,
+    build_density_limits,
+    build_power_limits,
+    implied_limits,
+)
+from inputdesign_cli.questions.building.system import (
+    build_cost,
+    build_experiment,
+    check_known,
+    excitation_band,
+)
+from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants, build_simulation
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.questions.least_cost.sought import FewColumns, GridMethod, Sought
@@ -64,12 +69,12 @@ def build_convex(spec: Spec) -> ConvexTask:
     # What no spectrum attains is proved as what every spectrum reaches.
     loose = basis.free and goal == "factor" and not reach.attained
     tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
-    stated, exact = build_confidence(spec, experiment), None
+    header, stated, exact = build_header(spec), build_confidence(spec, experiment), None
     if stated.calibration is not None:
         exact = ExactConfidence(stated.calibration, stated.usual, question, stated.simulator)
     return ConvexTask(
         asked=Sought(
-            build_header(spec),
+            header,
             question,
             cost,
             stated.usual,
@@ -84,9 +89,8 @@ def build_convex(spec: Spec) -> ConvexTask:
             _few_columns(spec, basis),
             windows=solver.windows,
         ),
-        header=build_header(spec),
+        header=header,
         record=build_record_request(spec, experiment.size),
-        unstated=unstated_errors(spec, experiment),
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
         foresight=build_foresight(spec, experiment),

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.accuracy import worst_ratio
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage, with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
-from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.common.confidence import (
     SETTLED,
@@ -20,7 +21,7 @@ from inputdesign_cli.questions.common.confidence import (
     bounded_errors,
     settled_alpha,
 )
-from inputdesign_cli.questions.common.record import Made, RecordRequest, as_long, redrawn, worst_ratio
+from inputdesign_cli.questions.common.record import Made, RecordRequest, as_long, redrawn
 from inputdesign_cli.questions.least_cost.outcome import Designed
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.signal.selection import Record

@@ -11,19 +11,19 @@ import numpy as np
 from inputdesign_cli import outcome as out
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, paid_for, weighted_sum
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.design.convex.limits import Weight, paid_for, weighted_sum
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings import designs
-from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.common.bound import described_spectrum, distinct
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.delivery import KINDS
 from inputdesign_cli.questions.common.robust import Plants, delivered
-from inputdesign_cli.questions.common.spectrum import described_spectrum, distinct
 from inputdesign_cli.spectrum import Basis, flat_basis, matrices
 
 # A limit binds when the design uses all but this share of it.
@@ -84,14 +84,15 @@ class Designed:
 def design_outcome(done: Designed) -> Outcome:
     """Return the outcome of a design without its record and its time."""
     found, problem, answer = done.design.result, done.design.problem, done.answer
-    cost = paid_for(problem.paid, costs_of(done, found.basis, found.x))
+    used, costs = spent(done, found.basis, found.x)
+    cost = paid_for(problem.paid, costs)
     outcome = Outcome(
         title=done.header.title,
         status=answer.status,
         objective=_objective(done.design),
         cost=cost,
         samples=done.experiment.samples,
-        power=powers(problem, found.basis, found.x),
+        power=used,
         limits=(*_power_limits(done), *_density_limits(done)) or None,
         information=information_of(done.experiment, done.information),
         spectrum=described_spectrum(done.header.units, found.basis, found.x),
@@ -103,7 +104,7 @@ def design_outcome(done: Designed) -> Outcome:
             done.header.units, done.confidence, done.asked, done.information, found.active_frequencies
         )
         outcome = replace(outcome, model_error=error, requirements=listed)
-    return outcome.saying(_findings(done))
+    return outcome.saying(_findings(done, used))
 
 
 def information_of(experiment: Experiment, information: Array) -> out.Information:
@@ -127,7 +128,9 @@ def accuracy_of(
 ) -> tuple[ModelError, tuple[RequirementMet, ...] | None]:
     """Return the largest ratio of the model error, and each requirement with its own, by M (k, k)."""
     listed: list[RequirementMet] = []
-    error = ModelError(confidence.alpha, confidence=confidence.reported)
+    error = ModelError(
+        confidence.alpha, confidence=None if confidence.coverage is None else confidence.reported
+    )
     for requirement in requirements:
         if isinstance(requirement, Criterion):
             continue
@@ -160,28 +163,11 @@ def requirement_met(units: Units, requirement: Requirement, information: Array) 
     )
 
 
-def powers_by_kind(
-    problem: Problem, basis: Basis, x: Array, scenario: int = 0
-) -> dict[PowerKind, list[float]]:
-    """Return the powers of input, output and excitation at a plant, one entry a channel."""
-    at, model = problem.on(basis), problem.experiment.model
-    channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
-    # A channel without power may come out below zero by rounding.
-    return {
-        kind: [max(at.power(kind, c, scenario).at(x), 0.0) for c in range(channels[kind])]
-        for kind in POWER_KINDS
-    }
-
-
-def powers(problem: Problem, basis: Basis, x: Array) -> out.Powers:
-    """Return the mean squares by kind at the plant of the spec."""
-    return out.Powers.of(powers_by_kind(problem, basis, x))
-
-
-def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
-    """Return the cost of a spectrum at each plant that is paid for."""
-    problem = done.design.problem
-    return [weighted_sum(done.cost, powers_by_kind(problem, basis, x, at)) for at in problem.paying]
+def spent(done: Designed, basis: Basis, x: Array) -> tuple[out.Powers, list[float]]:
+    """Return the mean squares of a spectrum at the plant of the spec, and its cost at each that pays."""
+    problem = done.design.problem.on(basis)
+    used = [problem.powers(x, at) for at in problem.paying]
+    return out.Powers.of(used[0]), [weighted_sum(done.cost, one) for one in used]
 
 
 def _stated(problem: Problem, value: float) -> float:
@@ -220,10 +206,11 @@ def _white(done: Designed, cost: float) -> out.White:
     """Return flat excitation that meets the same requirements, or exhausts the same limits."""
     design, problem = done.design, done.design.problem
     basis, x = flat_basis(problem.experiment), np.array([design.white_power])
-    white_cost = paid_for(problem.paid, costs_of(done, basis, x))
+    used, costs = spent(done, basis, x)
+    white_cost = paid_for(problem.paid, costs)
     return out.White(
         cost=white_cost,
-        power=powers(problem, basis, x),
+        power=used,
         ratio=white_cost / cost if cost > 0 else 1.0,
         samples=int(np.ceil(design.white.s * (1 - 1e-9))) if problem.goal == "samples" else None,
         value=_stated(problem, design.white.objective) if problem.goal == "factor" else None,
@@ -264,13 +251,15 @@ def _density_limits(done: Designed) -> Iterator[LimitUse]:
         )
 
 
-def _findings(done: Designed) -> list[Finding]:
+def _findings(done: Designed, used: out.Powers) -> list[Finding]:
     """Return the findings that a user should know before trusting a number."""
     found, problem = done.design.result, done.problem
     if not done.excites:
         return [designs.nothing_needed(done.experiment, at_every_plant=bool(done.kept))]
-    excited = powers(problem, found.basis, found.x).excitation or ()
-    findings = [*designs.inputs_without_power(excited), *designs.short_experiment(done.experiment)]
+    findings = [
+        *designs.inputs_without_power(used.excitation or ()),
+        *designs.short_experiment(done.experiment),
+    ]
     findings += designs.sign_open(problem.requirements)
     if done.header.units.closed_loop and not found.basis.has_density:
         lines, powers_of_lines = found.basis.lines(found.x)

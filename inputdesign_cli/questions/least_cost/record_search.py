@@ -15,15 +15,13 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
-from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Goal
-from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.limits import Goal, PowerLimit
 from inputdesign_cli.design.convex.record_bound import RecordBound, bound_over_records
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.findings.designed_records import other_signal, other_spectrum
-from inputdesign_cli.questions.common.infeasible import no_record, refuse_too_short
 from inputdesign_cli.questions.common.record import (
     Made,
     RecordRequest,
@@ -31,8 +29,10 @@ from inputdesign_cli.questions.common.record import (
     least_period,
     level_search,
     make_record,
+    no_record,
     of_samples,
     ratio_before,
+    refuse_too_short,
 )
 from inputdesign_cli.questions.common.searched_record import searches
 from inputdesign_cli.signal.evaluation import MET

@@ -17,8 +17,8 @@ import numpy as np
 from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import Counted, OutOfTimeError, seconds_left, tell
+from inputdesign_cli.design.convex.demands import Alternative, Question
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
@@ -29,6 +29,7 @@ from inputdesign_cli.outcome import robust as parts
 from inputdesign_cli.outcome.curves import Curves, FanCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.bound import axis
 from inputdesign_cli.questions.common.robust import (
     CONFIDENCE,
     MET,
@@ -43,8 +44,7 @@ from inputdesign_cli.questions.common.robust import (
     kept_by,
     tried_on,
 )
-from inputdesign_cli.questions.common.spectrum import axis
-from inputdesign_cli.questions.least_cost.outcome import Answer, Designed, costs_of
+from inputdesign_cli.questions.least_cost.outcome import Answer, Designed, spent
 
 # Steps towards the farthest point, of a difference, and of an ascent at most.
 _LENGTHS, _DIFFERENCE, _STEPS = (1.0, 0.5, 0.25, 0.1, 0.03), 0.01, 15
@@ -191,7 +191,7 @@ def robust_result(
     found = plants_kept(done.header.units, plants, kept, at_each, binding)
     entry, promised = replace(found.entry, support=support), None
     if plants.paid == "worst" and problem.goal == "cost":
-        costs, promised = costs_of(done, problem.basis, done.design.result.x), done.design.result.objective
+        (_, costs), promised = spent(done, problem.basis, done.design.result.x), done.design.result.objective
         dearest = int(np.argmax(costs))
         entry = replace(entry, dearest=parts.DearestPlant(numbers[dearest], costs[dearest]))
     fresh, fewer = fresh_plants(plants, partial(tried_on, done.design, samples), peak, promised)

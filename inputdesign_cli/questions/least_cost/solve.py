@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.accuracy import OnModelError, worst_ratio
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.errors import InaccurateError
@@ -21,20 +21,18 @@ from inputdesign_cli.outcome import Outcome, White
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.questions.common.bound import Informed, equal_white
+from inputdesign_cli.questions.common.bound import (
+    Informed,
+    equal_white,
+    optimality_curves,
+    spectrum_curves,
+    with_periodogram,
+)
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
-from inputdesign_cli.questions.common.record import (
-    Made,
-    design_cost,
-    peak_at,
-    redrawn,
-    spectrum_of,
-    worst_ratio,
-)
+from inputdesign_cli.questions.common.record import Made, design_cost, peak_at, redrawn, spectrum_of
 from inputdesign_cli.questions.common.searched_record import distance_to_best
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
@@ -185,7 +183,8 @@ class ConvexTask(SpectrumTask):
         coverage = None if error is None else error.confidence
         if record is None:
             missing = of_records.too_long(request.length(done.experiment.samples), request.longest)
-            found = [*confidence_missed(coverage, None), *made.findings, *missing]
+            missed = [] if coverage is None else confidence_missed(coverage, None)
+            found = [*missed, *made.findings, *missing]
             return adding(results, results.outcome, found)
         design, exact = made.design, self.asked.exact
         signal = signal_of(
@@ -205,7 +204,7 @@ class ConvexTask(SpectrumTask):
         held = limited or request.bounds.hard or request.settings.level is not None
         asked = request.samples or done.experiment.samples
         findings = [
-            *confidence_missed(coverage, signal.confidence),
+            *([] if coverage is None else confidence_missed(coverage, signal.confidence)),
             *made.findings,
             *of_records.accuracy_missed(record, held=held),
             *of_records.length_of_record(record, asked, block, shares),

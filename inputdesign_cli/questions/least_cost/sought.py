@@ -12,11 +12,11 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import out_of_time, what_ended
-from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
-from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.limits import Weight
 from inputdesign_cli.design.convex.record_bound import bound_over_records
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError

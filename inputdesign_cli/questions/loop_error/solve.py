@@ -13,7 +13,7 @@ import numpy as np
 from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of
 from inputdesign_cli.design.loop_error.parametric import LossTheory, ParametricCriterion, loss_theory
@@ -31,8 +31,8 @@ from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInpu
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
 from inputdesign_cli.questions.common import delivery
+from inputdesign_cli.questions.common.bound import hermitian_columns
 from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
-from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.signal.limits import Bounds
 from inputdesign_cli.signal.lines import Lines, grid_lines
 from inputdesign_cli.signal.periodic import even_multisine, harmonics, periodogram

@@ -243,7 +243,7 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
     def requirements(self) -> tuple[str, ...]:
         """Return the keys of the requirements that are given, in the order of the contract."""
         names = (key for key in type(self).model_fields if key not in _NO_REQUIREMENTS)
-        bounded = self.at("mean_squared_error", "target") is not None
+        bounded = self.mean_squared_error is not None and self.mean_squared_error.target is not None
         return self.stated(*names, *(("mean_squared_error",) if bounded else ()))
 
     @property

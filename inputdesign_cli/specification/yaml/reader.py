@@ -144,9 +144,9 @@ class _Document:
         self._spend(node, len(path))
         place, mapping = self.begin(node), isinstance(node, yaml.MappingNode)
         self.tree.places.values[path] = key if mapping and key else place
-        whole = format_key(path) or "the spec"
         if node.tag not in _TAGS.values():
             hint = "remove the tag: a spec holds plain numbers, texts, lists and mappings"
+            whole = format_key(path) or "the spec"
             self._complain("yaml-tag", f"{whole} carries the tag {clip(node.tag)}", hint, path, place)
         if mapping:
             return self._mapping(node, path)
@@ -155,6 +155,7 @@ class _Document:
         if node.style in (None, ""):
             return resolve(node.value)
         if bad := FORBIDDEN_IN_TEXT.search(node.value):
+            whole = format_key(path) or "the spec"
             message = f"{whole} holds the unprintable character U+{ord(bad.group()):04X}"
             self._complain("bad-text", message, "remove the escape that makes it", path, place, lost=path)
             return ""

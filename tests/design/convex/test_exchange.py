@@ -7,10 +7,10 @@ import pytest
 
 from inputdesign_cli.accuracy import Absolute, Criterion
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel

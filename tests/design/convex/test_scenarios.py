@@ -11,10 +11,9 @@ import scipy.optimize
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import Criterion
-from inputdesign_cli.design.convex.demands import Demands
+from inputdesign_cli.design.convex.demands import Alternative, Demands, Question
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before, samples_for, unlikely
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.building.system import build_model
