@@ -12,16 +12,14 @@ ONE_PLANT = "remove uncertainty, or ask for a design with model_error, informati
 
 
 def refuse_unhandled(
-    spec: Spec,
-    question: str,
-    remedies: Mapping[str, str],
-    handled: Mapping[str, tuple[str, ...]] | None = None,
+    spec: Spec, question: str, remedies: dict[str, str], handled: Mapping[str, tuple[str, ...]] | None = None
 ) -> None:
     """Raise `SpecError` (`not-supported`) at the first key of `remedies` that the `question` does not handle.
 
     `handled` are values of some of these keys that it handles.
     """
-    for key, remedy in remedies.items():
+    parts = {} if spec.campaign is not None else {"signal.least_move": "it is for the parts of a campaign"}
+    for key, remedy in (remedies | parts).items():
         value = spec.at(*key.split("."))
         if value is not None and value not in (handled or {}).get(key, ()):
             stated = f"{key}: {value}" if isinstance(value, str) else key
