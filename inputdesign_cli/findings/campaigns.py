@@ -188,8 +188,8 @@ def planned_otherwise(
     beyond: bool,
     part_cost: float,
     fragile: bool,
-    alone: bool,
-    parts: bool,
+    alone: bool = False,
+    parts: bool = False,
 ) -> list[Finding]:
     """Return findings for a plan that is not as the spec asks.
 
