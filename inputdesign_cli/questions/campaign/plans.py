@@ -16,7 +16,7 @@ from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
 from inputdesign_cli.findings.rivals import beyond
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.monte_carlo.excitations import Redrawn, spectral_information
+from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind
 from inputdesign_cli.plant import Model, close_loop
 from inputdesign_cli.plant.model import SampledPlant
@@ -113,8 +113,8 @@ class Planner:
     ) -> Planned:
         """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
-        Data that would suffice now, or after the next part, may leave several models open. Then the next
-        part is planned to tell their minima apart, or, if tests are the reason, as if there were no data.
+        Data that suffice now, or with the next part, may leave several models open. Then the next part is
+        also to tell minima apart. If tests are the reason, a sufficient part is planned as if without data.
 
         Args:
             known: None before any data.
@@ -128,10 +128,9 @@ class Planner:
         cap = rules.cap(first)
         if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
             cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
-        alone = known is not None and known.open and (last or known.met)
-        if alone and known is not None and known.others:
-            with suppress(IdesignError, np.linalg.LinAlgError):
-                return self._kept(self._parting(known, take, seed, cap), rules, cap, known, earlier)
+        several = known is not None and known.open and (last or known.met)
+        apart = known if several and known is not None and known.others else None
+        alone = several and apart is None and known is not None and known.met
         change = Change(
             samples=take if alone else rest,
             seed=seed,
@@ -140,19 +139,17 @@ class Planner:
             white=rules.white,
             goes_on=rules.stops or not last,
         )
-        model = None if known is None else known.model
-        if rules.robust_last and last and known is not None and not alone:
-            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
-            with suppress(IdesignError):
-                found = self._designed(model, replace(change, uncertainty="data"))
-                if found.cost <= cap * REACHED:
-                    return self._kept(replace(found.planned, take=take), rules, cap, known, earlier)
         try:
-            plan = self._affordable(model, change, cap, rules.end - done)
+            if apart is None or not apart.met:
+                robust = rules.robust_last and last and known is not None and not alone
+                plan = self._sufficient(known, change, cap, rules.end - done, robust=robust)
+            else:
+                plan = Planned(np.zeros((take, self.nominal.inputs)), take, 0.0, 0.0, "parting")
+            if apart is not None:
+                plan = self._parting(plan, apart, take, seed)
             # The first plan sets the cap, which its own part keeps as well.
             own = rules.cap(plan.cost) if first is None else np.inf
-            plan = replace(plan, take=take, alone=alone)
-            return self._kept(plan, rules, min(cap, own), known, earlier)
+            return self._kept(replace(plan, take=take, alone=alone), rules, min(cap, own), known, earlier)
         except IdesignError as error:
             if known is None:
                 raise
@@ -161,6 +158,19 @@ class Planner:
             gap = replace(self._stopgap(rules, cost, rest, seed, error), take=take)
             return self._kept(gap, rules, cap, None, earlier)
 
+    def _sufficient(
+        self, known: Standing | None, change: Change, cap: float, longest: int, *, robust: bool
+    ) -> Planned:
+        """Return the plan that makes the data suffice, at all plants that they leave open if `robust`."""
+        model = None if known is None else known.model
+        if robust:
+            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
+            with suppress(IdesignError):
+                found = self._designed(model, replace(change, uncertainty="data"))
+                if found.cost <= cap * REACHED:
+                    return found.planned
+        return self._affordable(model, change, cap, longest)
+
     def _pilot(self, rules: Rules, power: float, take: int, seed: int) -> Planned:
         """Return white noise of a power, even over the inputs."""
         powers, hold = np.full(self.nominal.inputs, power / self.nominal.inputs), rules.schedule.hold
@@ -168,14 +178,13 @@ class Planner:
         record = drawn.draw(1, take, np.random.default_rng(seed))[0]
         return Planned(record, take, power_of(record), 0.0, "pilot")
 
-    def _parting(self, known: Standing, take: int, seed: int, cap: float) -> Planned:
-        """Return a part that tells the minima of the likelihood apart, and makes the data suffice.
+    def _parting(self, plan: Planned, known: Standing, take: int, seed: int) -> Planned:
+        """Return a plan whose part also tells the minima of the likelihood apart.
 
-        Its spectrum is the squared difference of the predictions of two models, where their inputs are
-        alike: the expected difference of -2 log likelihood is the power in that difference, as in
-        T-optimal designs ([atkinson-fedorov-1975]).
+        The spectrum of what is added is the squared difference of the predictions of the models. Its power
+        is the expected difference of -2 log likelihood, as in T-optimal designs ([atkinson-fedorov-1975]).
         """
-        experiment = replace(self._experiment(known.model), samples=take, prior=None)
+        experiment = replace(self._experiment(known.model), samples=take)
         lo, hi = experiment.band
         w = np.linspace(max(lo, _LOWEST * hi), hi, _LINES)
         apart = [self._apart(experiment, known.model.at(theta), w) for theta in known.others]
@@ -184,17 +193,18 @@ class Planner:
         shape = np.sum(squares / np.abs(squares).max(axis=(1, 2, 3), keepdims=True), axis=0)
         table = TabulatedSpectrum(w, shape * np.pi / np.trapezoid(np.einsum("nii->n", shape).real, w))
         gains = np.trapezoid(np.einsum("mnij,nji->mn", squares, table.phi).real, w) / np.pi
-        power = _APART / (take * float(np.min(gains)))
-        question = self.question(known.model, known.information)
-        more = spectral_information(table, np.ones(1), replace(experiment, factor=question.experiment.factor))
-        while power < cap < np.inf and question.ratio(question.information + power * more) > REACHED:
-            power *= _RAISED
-        task = self.designs.at(known.model, Change(take, seed))
-        record = given_record(task.record, experiment, table, np.array([power]), lambda information: 0.0)
-        if record is None:
-            raise InfeasibleError.because("not-supported", "no record is as short as the part")
-        cost = self.cost_of(experiment, record.samples)
-        return Planned(record.samples, take, power_of(record.samples), cost, "parting")
+        request = self.designs.at(known.model, Change(take, seed)).record
+        power = np.array([_APART / (take * float(np.min(gains)))])
+        more = given_record(request, experiment, table, power, lambda information: 0.0)
+        if more is None:
+            return plan
+        # Records within limits may exceed them together.
+        record = more.samples[:take] + plan.record[:take]
+        plant = FiniteRecord(experiment, take, self.step)
+        u, y = (plant.signals(kind, record) for kind in ("input", "output"))
+        record /= max(1.0, *request.bounds.shares(u, y).values())
+        cost = self.cost_of(experiment, record)
+        return replace(plan, record=record, power=power_of(record), cost=cost, kind="parting", claim=None)
 
     def _apart(self, experiment: Experiment, other: Model, w: Array) -> ComplexArray:
         """Return the difference of the predictions that two models make of an excitation, (n, p, r).

@@ -99,7 +99,15 @@ class CampaignTask:
     has_prior: bool
 
     def solve(self) -> Results:
-        """Design the whole experiment at the plant of the spec, see `ConvexTask.solve`."""
+        """Design the whole experiment at the plant of the spec, see `ConvexTask.solve`.
+
+        Raises:
+            SpecError: `not-supported` for `signal.least_move`, which the parts of a campaign keep.
+        """
+        if self.ways["campaign"].least is not None:
+            message = "the record of a whole experiment does not keep signal.least_move"
+            hint = "begin the campaign (`idesign campaign SPEC -o DIR`), or remove the key"
+            raise bad_spec("not-supported", message, hint=hint, key="signal.least_move")
         return self.design.solve()
 
     def simulate(self, executor: Executor | None = None) -> Results:
