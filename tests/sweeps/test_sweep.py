@@ -20,7 +20,7 @@ from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings
 from inputdesign_cli.sweeps.points import Layout
-from inputdesign_cli.sweeps.running import Row, list_points, scalars, table_lines
+from inputdesign_cli.sweeps.running import list_points, row_of, scalars, table_lines
 from tests.support.processes import running
 from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files, timeless_rows
 
@@ -175,7 +175,7 @@ def test_the_table_holds_short_lists_and_the_fewest_digits():
     result = {"a": [1.0, 2.0], "moments": {"R": [[1.0, 2.0]], "c": list(range(9))}, "solver": {"n": 1}}
     assert scalars(result) == {"a[0]": 1.0, "a[1]": 2.0, "moments.R[0][0]": 1.0, "moments.R[0][1]": 2.0}
     result = {"status": "optimal", "a": 0.1, "b": 1 / 3, "c": 2.0, "n": 7}
-    head, row = table_lines(["samples"], [(("100",), Row.of("0", result))])
+    head, row = table_lines(["samples"], [(("100",), row_of("0", result))])
     found = dict(zip(head.strip().split(","), row.strip().split(","), strict=True))
     assert [found[name] for name in "abcn"] == ["0.1", "0.3333333333333333", "2", "7"]
 
@@ -303,13 +303,13 @@ def test_sweeps_that_are_refused(settings, code, spec, stub):
 @pytest.mark.parametrize("lengths", [(1,), (3, 1), (2, 4, 3), (1, 2, 1, 2)])
 def test_a_grid_is_the_product_of_its_axes(lengths):
     axes = [SweepAxis(f"k{i}", tuple(map(str, range(n)))) for i, n in enumerate(lengths)]
-    assert list(Grid(tuple(axes))) == list(itertools.product(*(axis.values for axis in axes)))
+    assert Grid(tuple(axes)).points == list(itertools.product(*(axis.values for axis in axes)))
 
 
 def test_a_zipped_grid_goes_side_by_side():
     grid = build_grid(None, [SweepAxis("a", ("1", "2")), SweepAxis("b", ("3", "4"))], zipped=True)
-    assert list(grid) == [("1", "3"), ("2", "4")]
-    assert grid.overrides(grid[1]) == ["a=2", "b=4"]
+    assert grid.points == [("1", "3"), ("2", "4")]
+    assert grid.overrides(1) == ["a=2", "b=4"]
 
 
 def test_the_block_of_a_spec_and_the_command_line():

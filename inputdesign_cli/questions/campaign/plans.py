@@ -194,7 +194,7 @@ class Planner:
         table = TabulatedSpectrum(w, shape * np.pi / np.trapezoid(np.einsum("nii->n", shape).real, w))
         gains = np.trapezoid(np.einsum("mnij,nji->mn", squares, table.phi).real, w) / np.pi
         request = self.designs.at(known.model, Change(take, seed)).record
-        power = np.array([_APART / (take * float(np.min(gains)))])
+        power = _APART / (take * np.min(gains, keepdims=True))
         more = given_record(request, experiment, table, power, lambda information: 0.0)
         if more is None:
             return plan

@@ -175,7 +175,7 @@ def ways_of(rules: Rules, *, uncertain: bool, white: bool) -> dict[str, Rules]:
     """
     whole = rules.schedule.samples
     pilot = rules.schedule.parts[:1] if rules.pilot_power is not None else ()
-    once = Schedule((*pilot, whole - sum(pilot)), whole, whole, whole)
+    once = Schedule((*pilot, whole - sum(pilot)), whole, whole, whole, rules.schedule.hold)
     one = replace(rules, schedule=once, power_cap=None, stops=False, robust_last=False)
     ways = {"campaign": rules, "one_shot": one}
     if uncertain:
@@ -342,7 +342,7 @@ class _Run:
         """Return the verdict on all data; where they leave several models open, the next plan will know."""
         known = self.known
         if full is None or known is None:
-            return "missed"
+            return "met" if self._met else "missed"
         question = self.planner.question(known.model, known.information)
         others = other_minima(known.model, full, question)
         against = bool(full.tests.failed or others or not full.search.converged)

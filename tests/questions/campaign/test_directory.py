@@ -12,6 +12,7 @@ from inputdesign_cli import parse_spec
 from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.campaign.memory import held
+from inputdesign_cli.questions.campaign.plans import usefully_moved
 from tests.support.campaigns import SPEC, answered, applied, found, planned, written
 
 
@@ -274,23 +275,36 @@ def test_what_no_part_has_is_refused(begin, asked, code):
     assert not directory.exists()
 
 
-@pytest.mark.parametrize(("hold", "least"), [(1, 0.4), (4, None), (7, 0.3), ("auto", 0.2)])
+@pytest.mark.first(1)
+@pytest.mark.parametrize(("hold", "least"), [(7, 0.3), (1, 0.4), (4, None), ("auto", 0.2)])
 def test_moves_of_parts_are_large_and_dwell(begin, run, tmp_path, hold, least):
-    """From part to part, too; a part of larger moves has the power of its plan."""
-    hold_of = {"auto": 1}.get(hold, hold)
+    """From part to part, too."""
+    shortest = {"auto": 1}.get(hold, hold)
     own = [f"signal.hold={hold}"] + ([] if least is None else [f"signal.least_move={least}"])
     directory, code, err = begin("c", "campaign.block=30", "campaign.pilot=30", "signal.offset=3", *own)
     assert code == 0, err
-    for number in (1, 2):
-        record = applied(directory, tmp_path / f"r{number}.csv")
-        assert run("next", "c", record, "--no-figures")[0] == 0
+    assert run("next", "c", applied(directory, tmp_path / "r.csv"), "--no-figures")[0] == 0
     moves = np.diff(planned(directory)[:, 1], prepend=3.0)
     assert np.abs(moves[moves != 0.0]).min() >= (least or 0.0) * (1 - 1e-9)
-    assert np.all(np.flatnonzero(moves) % hold_of == 0)
-    for entry in read_run(directory)["campaign"]["rounds"]:
-        plan = entry["plan"]
-        assert plan["samples"] % hold_of == 0
-        assert plan["part_power"] >= 0.5 * plan["power"]
+    assert np.all(np.flatnonzero(moves) % shortest == 0)
+    plans = [entry["plan"] for entry in read_run(directory)["campaign"]["rounds"]]
+    assert [plan["samples"] % shortest for plan in plans] == [0, 0]
+
+
+@pytest.mark.parametrize("least", [0.1, 1.0, 2.5])
+def test_a_part_of_larger_moves_has_its_power(least):
+    """Though its plan moves by less; only a limit keeps it weaker."""
+    record = np.random.default_rng(1).standard_normal((80, 2)) * [1.0, 0.5]
+    start, reach = np.array([0.0, 2.0]), np.array([6.0, 3.0])
+    moved = usefully_moved(record, start, np.array([least, 0.5 * least]), reach)
+    moves = np.abs(np.diff(moved, axis=0, prepend=start[None]))
+    assert np.all((moves == 0.0) | (moves >= [least, 0.5 * least]))
+    assert np.mean(moved**2) >= 0.95 * np.mean(record**2)
+    assert np.all(np.abs(moved).max(axis=0) <= reach)
+    low = usefully_moved(
+        0.1 * record, 0.0 * start, np.array([least, least]), 0.15 * np.abs(record).max(axis=0)
+    )
+    assert np.abs(low).max() <= 0.15 * np.abs(record).max()
 
 
 def test_a_least_move_is_for_campaigns(run):
