@@ -224,7 +224,7 @@ def test_each_estimate_keeps_its_own_zeros_in_the_loop(name):
 @pytest.mark.parametrize("name", ["zero outside", "two channels"])
 def test_losses_with_zeros_outside_agree_with_theory(name):
     problem = internal_model(name, variance=0.01)
-    samples, runs, n = 1000, 200, problem.plant.outputs
+    samples, runs, n = 2000, 300, problem.plant.outputs
     criterion, lines = problem.parametric(), even_lines(samples, n)
     found = study_losses(problem, {"white": lines}, samples=samples, runs=runs, seed=0)["white"]
     assert found.unstable == 0

@@ -7,7 +7,6 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +29,7 @@ from inputdesign_cli.outcome.campaign import Campaign, PlannedPart, Round, State
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.text_formats import csv_text
+from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.assess import judge
 from inputdesign_cli.questions.assessment.identify import Identification, estimated, mismeasured, told
 from inputdesign_cli.questions.campaign.acceptance import accepted, table_of
@@ -320,20 +320,18 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
             raise
         return replace(now, findings=tuple(no_estimate_yet(told(error))))
     estimate = found.estimate
-    local = partial(
-        information_of_data,
-        u=data.u,
-        y=data.y,
-        step=units.step,
-        lengths=data.lengths,
-        free=estimate.start.free,
-        earlier=identification.earlier,
-    )
+
+    def informed(model: Model) -> Array:
+        if model is found.model:
+            return estimate.information
+        free, earlier = estimate.start.free, identification.earlier
+        return information_of_data(
+            model, data.u, data.y, units.step, lengths=data.lengths, free=free, earlier=earlier
+        )
+
     assessment = judge(identification, found, started, first=last is None)
     sound = nominal if last is None else nominal.at(np.array(list(last.values()), dtype=float))
-    stands = standing(
-        task.planner, found.model, lambda at: estimate.information if at is found.model else local(at), sound
-    )
+    stands = standing(task.planner, found.model, informed, sound)
     findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
     verdict, suffices = assessment.verdict, stands is not None and stands.met
     if stands is not None:

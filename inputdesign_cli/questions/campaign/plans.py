@@ -128,9 +128,9 @@ class Planner:
         cap = rules.cap(first)
         if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
             cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
-        several = known is not None and known.open and (last or known.met)
-        apart = known if several and known is not None and known.others else None
-        alone = several and apart is None and known is not None and known.met
+        left = known if known is not None and known.open and (last or known.met) else None
+        apart = left if left is not None and left.others else None
+        alone = left is not None and apart is None and left.met
         change = Change(
             samples=take if alone else rest,
             seed=seed,
