@@ -56,6 +56,18 @@ PART_NOT_ROBUST = note(
     "experiment within `campaign.power_cap` and `limits` is enough.",
     "Raise `campaign.power_cap` or a limit, or write `campaign.last: nominal`.",
 )
+PART_ALONE = note(
+    "part-alone",
+    "The next part is planned as if there were no data. By their accuracy the data would suffice, but tests "
+    "leave the model undecided.",
+    "Apply the part.",
+)
+PART_BETWEEN_MINIMA = note(
+    "part-between-minima",
+    "The next part is to tell minima of the likelihood apart. Other parameters explain the data nearly as "
+    "well. The part excites the frequencies at which the two models differ.",
+    "Apply the part.",
+)
 _NEARLY = 0.9  # a part of less than this share of its power is named
 
 
@@ -168,7 +180,16 @@ def campaign_refuted(
 
 
 def planned_otherwise(
-    file: str, *, why: str, capped: bool, share: float, beyond: bool, part_cost: float, fragile: bool
+    file: str,
+    *,
+    why: str,
+    capped: bool,
+    share: float,
+    beyond: bool,
+    part_cost: float,
+    fragile: bool,
+    alone: bool = False,
+    parts: bool = False,
 ) -> list[Finding]:
     """Return findings for a plan that is not as the spec asks.
 
@@ -179,6 +200,8 @@ def planned_otherwise(
         share: of its power that the part has.
         beyond: whether a sample costs more than the cap; it costs `part_cost`.
         fragile: whether a robust last part was wanted and not found.
+        alone: whether it is planned without the data.
+        parts: whether it is to tell minima apart.
     """
     percent, cost = f"{100 * share:.0f} % of the power of {file}", f"{part_cost:.4g} a sample"
     return [
@@ -187,4 +210,6 @@ def planned_otherwise(
         *PART_SCALED.when(share < _NEARLY, percent, where=file, share=share),
         *EARLIER_PARTS_COST.when(beyond, cost, where=file, cost=part_cost),
         *PART_NOT_ROBUST.when(fragile, file, where=file),
+        *PART_ALONE.when(alone, file, where=file),
+        *PART_BETWEEN_MINIMA.when(parts, file, where=file),
     ]

@@ -65,12 +65,16 @@ _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
 
 class Ended(NamedTuple):
-    """The end of a search: whether it settled, after `steps` from the best of `starts`, and other minima."""
+    """The end of a search: whether it settled, after `steps` from the best of `starts`, and other minima.
+
+    `rivals` are far from the best minimum; `beside` are beyond sampling instants, and widen the covariance.
+    """
 
     converged: bool
     steps: int
     starts: int
     rivals: tuple[Rival, ...]
+    beside: tuple[Rival, ...] = ()
 
 
 class Begun(NamedTuple):
@@ -339,7 +343,13 @@ def concluded(
         noise,
         point.errors,
         records.lengths,
-        Ended(found.converged, found.steps, found.starts, found.rivals),
+        Ended(
+            found.converged,
+            found.steps,
+            found.starts,
+            found.rivals,
+            tuple(Rival(one.theta, excess) for one, excess in found.beside),
+        ),
         Begun(records.free, found.rest_refuted, first),
         simulation,
         prior,

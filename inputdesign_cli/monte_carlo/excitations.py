@@ -62,12 +62,19 @@ class Redrawn:
 
     @classmethod
     def flat(
-        cls, name: str, method: str, powers: Array, band: tuple[float, float], samples: int, step: float
+        cls,
+        name: str,
+        method: str,
+        powers: Array,
+        band: tuple[float, float],
+        samples: int,
+        step: float,
+        hold: int = 1,
     ) -> Redrawn:
         """Build independent inputs of these powers (r,), flat over a band in the unit of the experiment."""
         white = TabulatedSpectrum.white(powers, band)
         spectrum = DesignedSpectrum.of(white, np.ones(1), inputs=powers.size, step=step)
-        settings = SignalSettings(method, phases="orthogonal" if powers.size > 1 else "random")
+        settings = SignalSettings(method, "orthogonal" if powers.size > 1 else "random", hold=hold)
         edges = (band[0] * step, band[1] * step)
         return cls(name, SignalGenerator(spectrum, settings, samples, edges), white, np.ones(1))
 

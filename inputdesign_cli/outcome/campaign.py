@@ -9,7 +9,7 @@ from typing import Literal
 from inputdesign_cli.outcome.design import Objective, Spectrum
 
 State = Literal["running", "stopped", "missed", "undecided"]
-PlanKind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
+PlanKind = Literal["pilot", "nominal", "robust", "white", "stopgap", "parting"]
 
 
 @dataclass(frozen=True)

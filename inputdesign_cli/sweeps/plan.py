@@ -6,12 +6,14 @@ A trade of time against amplitude against accuracy is a sweep with settings and 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import get_args
 
@@ -45,7 +47,7 @@ _QUANTITIES = ("signal.worst_ratio", "objective.value")
 
 @dataclass(frozen=True)
 class Grid:
-    """Generates the points as tuples of texts, one per axis, when asked for. The last axis runs fastest."""
+    """Holds the axes of a sweep; a point is a tuple of texts, one per axis. The last axis runs fastest."""
 
     axes: tuple[SweepAxis, ...]
     zipped: bool = False
@@ -54,21 +56,15 @@ class Grid:
         lengths = [len(axis.values) for axis in self.axes]
         return (min(lengths) if self.zipped else math.prod(lengths)) if lengths else 0
 
-    def __getitem__(self, index: int) -> tuple[str, ...]:
-        if not 0 <= index < len(self):
-            raise IndexError(index)
-        texts = []
-        for axis in reversed(self.axes):
-            index, place = (index, index) if self.zipped else divmod(index, len(axis.values))
-            texts.append(axis.values[place])
-        return tuple(reversed(texts))
+    @cached_property
+    def points(self) -> Sequence[tuple[str, ...]]:
+        """Return all points, in order."""
+        values = [axis.values for axis in self.axes]
+        return list(zip(*values, strict=True) if self.zipped else itertools.product(*values))
 
-    def __iter__(self) -> Iterator[tuple[str, ...]]:
-        return (self[i] for i in range(len(self)))
-
-    def overrides(self, point: tuple[str, ...]) -> list[str]:
-        """Return the point as `--set` takes it."""
-        return [f"{axis.key}={text}" for axis, text in zip(self.axes, point, strict=True)]
+    def overrides(self, index: int) -> list[str]:
+        """Return a point as `--set` takes it."""
+        return [f"{axis.key}={text}" for axis, text in zip(self.axes, self.points[index], strict=True)]
 
     def block(self) -> dict[str, object]:
         """Return the grid as the `sweep` block of a spec."""
@@ -180,26 +176,23 @@ class Plan:
     grid: Grid
     verb: Verb
     source: Path
-    _keys: list[str] = field(default_factory=list, repr=False)
+    _keys: dict[int, str] = field(default_factory=dict, repr=False)
 
     def key(self, index: int) -> str:
         """Return the key of a point, which the spec, its files, the verb and the version determine."""
-        while len(self._keys) <= index:
-            overrides = self.grid.overrides(self.grid[len(self._keys)])
+        if index not in self._keys:
+            overrides = self.grid.overrides(index)
             try:
                 found = self.draft.digest(self.draft.variant(overrides))
             except SpecError:
                 found = json.dumps([self.draft.digest(self.draft.data), overrides])
-            name = f"{__version__} {self.verb} {found}"
-            self._keys.append(
-                hashlib.sha256(name.encode(errors="backslashreplace")).hexdigest()[:_KEY_LENGTH]
-            )
+            name = f"{__version__} {self.verb} {found}".encode(errors="backslashreplace")
+            self._keys[index] = hashlib.sha256(name).hexdigest()[:_KEY_LENGTH]
         return self._keys[index]
 
     def job(self, index: int, root: Path | None, *, figures: str) -> PointJob:
         """Return the job of a point for a worker; without `root` it carries the files that the spec names."""
-        overrides = tuple(self.grid.overrides(self.grid[index]))
-        files = None
+        overrides, files = tuple(self.grid.overrides(index)), None
         if root is None:
             with suppress(SpecError):
                 names = [*self.draft.included, *self.draft.files(self.draft.variant(overrides))]
@@ -209,7 +202,7 @@ class Plan:
     def resolved(self, index: int) -> str | None:
         """Return the `spec.yaml` of a point, or None for an invalid spec."""
         try:
-            return self.draft.spec(self.grid.overrides(self.grid[index])).to_yaml()
+            return self.draft.spec(self.grid.overrides(index)).to_yaml()
         except SpecError:
             return None
 
@@ -295,7 +288,7 @@ def build_plan(
     # What is wrong as a whole (a misspelt key) is refused, rather than fail in every point.
     for index in dict.fromkeys(i * (len(grid) - 1) // _TRIED for i in range(_TRIED + 1)):
         try:
-            draft.spec(grid.overrides(grid[index]))
+            draft.spec(grid.overrides(index))
         except SpecError as error:
             first = first or error
         else:

@@ -46,42 +46,33 @@ _LEFT_OUT = frozenset(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Row:
-    """Holds the row of a point in the table: `numbers` of its result by their paths, or why it has none."""
-
-    status: str = PENDING
-    numbers: Mapping[str, object] = field(default_factory=dict)
-    seconds: object = None
-    code: str = ""
-    reason: str = ""
-    run: str = ""
-
-    @classmethod
-    def of(cls, key: str, content: Mapping[str, Any] | None) -> Row:
-        """Return the row of a point from its result, its failure (which has a `code`), or neither."""
-        if content is None:
-            return cls()
-        status, seconds = content.get("status", "done"), content.get("timing_s", {}).get("point")
-        if "code" in content:
-            return cls(status, {}, seconds, content["code"], content["message"])
-        return cls(status, scalars(content), seconds, run=f"points/{key}")
+def row_of(key: str, content: Mapping[str, Any] | None) -> dict[str, object]:
+    """Return the cells of a point from its result, its failure (which has a `code`), or neither."""
+    if content is None:
+        return {"status": PENDING}
+    known = {"status": content.get("status", "done"), "time_s": content.get("timing_s", {}).get("point")}
+    if "code" in content:
+        return known | {"code": content["code"], "reason": content["message"]}
+    return scalars(content) | known | {"run": f"points/{key}"}
 
 
-def table_lines(axes: Sequence[str], rows: Sequence[tuple[Sequence[str], Row]]) -> Iterator[str]:
+def table_lines(
+    axes: Sequence[str], rows: Sequence[tuple[Sequence[str], Mapping[str, object]]]
+) -> Iterator[str]:
     """Return the lines of the table.
 
     Args:
         axes: the keys that are varied.
-        rows: each point, as the texts of its values, with its row.
+        rows: each point, as the texts of its values, with its cells.
     """
-    found = dict.fromkeys(name for _, row in rows for name in row.numbers)
-    names = [*(n for n in FIRST if n in found), *(n for n in found if n not in FIRST)]
-    yield csv_line([*axes, "status", *names, *LAST])
+    found = dict.fromkeys(name for _, row in rows for name in row if name not in ("status", *LAST))
+    columns = ["status", *(n for n in FIRST if n in found), *(n for n in found if n not in FIRST), *LAST]
+    yield csv_line([*axes, *columns])
     for point, row in rows:
-        values = (*(row.numbers.get(name) for name in names), row.seconds)
-        cells = (shortest(v) if isinstance(v, float) else "" if v is None else str(v) for v in values)
-        yield csv_line([*point, row.status, *cells, row.code, row.reason, row.run])
+        cells = map(row.get, columns)
+        yield csv_line(
+            [*point, *(shortest(v) if isinstance(v, float) else "" if v is None else str(v) for v in cells)]
+        )
 
 
 def scalars(value: object, path: str = "") -> dict[str, object]:
@@ -118,7 +109,7 @@ class Listing(NamedTuple):
 def list_points(plan: Plan, directory: Path) -> Iterator[Listing]:
     """Yield the points of a sweep and whether they are done; nothing is computed or written."""
     layout, names = Layout(directory), [axis.key for axis in plan.grid.axes]
-    for index, point in enumerate(plan.grid):
+    for index, point in enumerate(plan.grid.points):
         key = plan.key(index)
         try:
             content = layout.read(key, plan.resolved(index))
@@ -157,7 +148,7 @@ class SweepRun:
     statuses: dict[str, int] = field(default_factory=dict, init=False)
     files: list[Path] = field(default_factory=list, init=False)
     # By the key of a point that was looked at: its row, None while it is computed.
-    rows: dict[str, Row | None] = field(default_factory=dict, init=False)
+    rows: dict[str, dict[str, object] | None] = field(default_factory=dict, init=False)
     passed: int = field(default=0, init=False)
     computed: int = field(default=0, init=False)
     failed: int = field(default=0, init=False)
@@ -224,16 +215,16 @@ class SweepRun:
     def _write_table(self) -> None:
         """Write sweep.csv as things stand, and count the points by status."""
         grid = self.plan.grid
-        rows = [(point, self._row(self.plan.key(index))) for index, point in enumerate(grid)]
+        rows = [(point, self._row(self.plan.key(index))) for index, point in enumerate(grid.points)]
         replace_text(self.directory / points.TABLE, table_lines([axis.key for axis in grid.axes], rows))
-        self.statuses = dict(sorted(Counter(row.status for _, row in rows).items()))
+        self.statuses = dict(sorted(Counter(str(row["status"]) for _, row in rows).items()))
 
-    def _row(self, key: str) -> Row:
+    def _row(self, key: str) -> dict[str, object]:
         """Return the row of a point, from its files where it is computed or was not looked at."""
         try:
-            return self.rows.get(key) or Row.of(key, self.layout.read(key))
+            return self.rows.get(key) or row_of(key, self.layout.read(key))
         except DataError:
-            return Row()
+            return row_of(key, None)
 
     def _jobs(self, shares_files: bool) -> Iterator[PointJob]:
         root, drawn = self.directory if shares_files else None, self.figure_format if self.figures else ""
@@ -243,7 +234,7 @@ class SweepRun:
             key = self.plan.key(index)
             if key not in self.rows:
                 content = self._known(index, key)
-                self.rows[key] = Row.of(key, content) if content else None
+                self.rows[key] = row_of(key, content) if content else None
                 if content is None:
                     yield self.plan.job(index, root, figures=drawn)
                     continue
@@ -279,18 +270,18 @@ class SweepRun:
                 failure = failure_of(points.BROKEN, strange.diagnostics[0])
         if failure is None:
             self.layout.failure(job.key).unlink(missing_ok=True)
-            self.rows[job.key] = Row.of(job.key, self.layout.read(job.key))
+            self.rows[job.key] = row_of(job.key, self.layout.read(job.key))
         else:
             if not lost:  # or else it is not the fault of the point: the next call tries it again
                 self.layout.write_failure(job.key, failure)
-            self.rows[job.key] = Row.of(job.key, failure)
+            self.rows[job.key] = row_of(job.key, failure)
             self._note_failure(job.index, failure)
         self._report()
 
     def _note_failure(self, index: int, content: Mapping[str, object]) -> None:
         self.failed += 1
         if self.first_failure is None:
-            point = " ".join(f"--set {text}" for text in self.plan.grid.overrides(self.plan.grid[index]))
+            point = " ".join(f"--set {text}" for text in self.plan.grid.overrides(index))
             code, status, message, hint, key = (
                 str(content[name]) for name in ("code", "status", "message", "hint", "key")
             )

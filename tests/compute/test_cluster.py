@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,23 +30,23 @@ PATHS = str(Path(__file__).parents[2])
 class Loopback:
     """A scheduler and its workers, each a process of its own (no nanny: a killed worker stays dead)."""
 
-    def __init__(self, folder: Path) -> None:
-        self.file = folder / "scheduler.json"
+    def __init__(self, folder: Path, host: str = "127.0.0.1", certificates: tuple[str, ...] = ()) -> None:
+        self.folder, self.file, self.certificates = folder, folder / "scheduler.json", certificates
         self.environment = {**os.environ, "PYTHONPATH": PATHS, "OPENBLAS_NUM_THREADS": "1"}
-        options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show", "--no-jupyter"]
+        options = ["--host", host, "--port", "0", "--no-dashboard", "--no-show", "--no-jupyter"]
         self.processes = [self.start("scheduler", *options, "--scheduler-file", str(self.file))]
         deadline = time.monotonic() + 30
         while not self.file.exists():
             assert time.monotonic() < deadline
             time.sleep(0.05)
-        self.folder = folder
 
     def start(self, *arguments: str) -> subprocess.Popen:
-        command = [sys.executable, "-m", "dask", *arguments]
+        command = [sys.executable, "-m", "dask", *arguments, *self.certificates]
         return subprocess.Popen(command, env=self.environment, **SILENT)
 
     def add_worker(self) -> subprocess.Popen:
-        options = ["--no-nanny", "--no-dashboard", "--nthreads", "1", "--host", "127.0.0.1"]
+        options = ["--no-nanny", "--no-dashboard", "--nthreads", "1"]
+        options += [] if self.certificates else ["--host", "127.0.0.1"]
         place = ["--local-directory", str(self.folder / "scratch")]
         worker = self.start("worker", "--scheduler-file", str(self.file), *options, *place)
         self.processes.append(worker)
@@ -187,6 +188,48 @@ def test_simulated_runs_are_the_same_wherever_they_are_computed(loopback, name, 
     )
     assert here == there
     assert here == beyond
+
+
+NAMED = {
+    "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": "ca.pem",
+    "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT": "cert.pem",
+    "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY": "key.pem",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+def test_a_sweep_goes_through_tls(tmp_path):
+    """As docs/security.md sets it up: with certificates it computes, without it says so."""
+    made = "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -keyout key.pem -out ca.pem"
+    subprocess.run(made.split(), cwd=tmp_path, check=True, **SILENT)
+    shutil.copy(tmp_path / "ca.pem", tmp_path / "cert.pem")
+    (tmp_path / "spec.yaml").write_text(SPEC)
+    files = {"ca-file": "ca.pem", "cert": "cert.pem", "key": "key.pem"}
+    stated = [part for name, file in files.items() for part in (f"--tls-{name}", str(tmp_path / file))]
+    cluster = Loopback(tmp_path, "tls://127.0.0.1", tuple(stated))
+    cluster.add_worker()
+
+    def swept(out, *address, **more):
+        command = [sys.executable, "-m", "inputdesign_cli", "sweep", "spec.yaml", "-o", out]
+        command += ["--set", "spectrum.order=1,2", *address]
+        environment = cluster.environment | more
+        return subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+        )
+
+    try:
+        there = swept("there", "--cluster", cluster.address, **NAMED)
+        assert there.returncode == 0, there.stderr
+        assert swept("here").returncode == 0
+        assert timeless_rows(tmp_path / "there") == timeless_rows(tmp_path / "here")
+        without = swept("without", "--cluster", cluster.address)
+        assert (without.returncode, "cluster-unreachable" in without.stderr) == (2, True)
+        assert "docs/security.md" in without.stderr
+        plain = swept("plain", "--cluster", cluster.address.replace("tls://", "tcp://"), **NAMED)
+        assert (plain.returncode, "cluster-unreachable" in plain.stderr) == (2, True)
+    finally:
+        cluster.end()
 
 
 def timeless(outcome):

@@ -54,6 +54,8 @@ FOUND = {
     "part-scaled": planned(share=0.5),
     "earlier-parts-cost": planned(beyond=True),
     "part-not-robust": planned(fragile=True),
+    "part-alone": planned(alone=True),
+    "part-between-minima": planned(parts=True),
     "part-repeated": followed(other="plan_01.csv"),
     "record-scaled": [*followed(scale=0.5), *followed(likeness=-0.99, scale=0.5)],
     "record-unlike-plan": [*followed(likeness=0.7), *followed(likeness=0.1, follows=False)],

@@ -1,8 +1,6 @@
 """Simulated runs: batches, statistics, excitations, and losses of loops that agree with theory."""
 
-import os
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -26,56 +24,40 @@ from inputdesign_cli.plant.polynomial import determinant_and_adjugate, multiply
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.periodic import harmonics
 from inputdesign_cli.spectrum import LinesBasis
+from tests.support import jobs
 from tests.support.loop_error import column, matrix_plant, random_plant
-
-
-def draw(job, runs, rng):
-    return job * rng.standard_normal(runs)
-
-
-def complain(job, runs, rng):
-    raise ValueError(f"{job}: {runs}")
-
-
-def end(runs, rng):
-    os._exit(1)
 
 
 @pytest.mark.parametrize(("runs", "size", "lengths"), [(7, 3, [3, 3, 1]), (6, 3, [3, 3]), (2, 9, [2])])
 def test_runs_are_split_into_batches_with_streams_of_their_own(runs, size, lengths):
-    parts = run_batches(partial(draw, 2.0), runs=runs, size=size, seed=1)
+    parts = run_batches(jobs.drawn, runs=runs, size=size, seed=1)
     assert [part.size for part in parts] == lengths
     for index, part in enumerate(parts):
         rng = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(index,)))
-        np.testing.assert_array_equal(part, 2.0 * rng.standard_normal(part.size))
-
-
-def test_children_of_a_seed_give_other_streams():
-    first, second = np.random.SeedSequence(1).spawn(2)
-    one, two, again = (
-        run_batches(partial(draw, 1.0), runs=2, size=1, seed=s) for s in (first, second, first)
-    )
+        np.testing.assert_array_equal(part, rng.standard_normal(part.size))
+    children = np.random.SeedSequence(1).spawn(2)
+    one, two, again = (run_batches(jobs.drawn, runs=2, size=1, seed=children[n]) for n in (0, 1, 0))
     np.testing.assert_array_equal(one, again)
     assert len(np.unique(np.concatenate([*one, *two]))) == 4
 
 
 def test_two_processes_give_the_numbers_of_one():
     one, two = (
-        np.concatenate(run_batches(partial(draw, 1.0), runs=50, size=4, seed=3, executor=executor))
+        np.concatenate(run_batches(jobs.drawn, runs=50, size=4, seed=3, executor=executor))
         for executor in (InProcess(), Processes(2))
     )
     np.testing.assert_array_equal(one, two)
 
 
 def test_errors_of_a_batch_are_raised():
-    with pytest.raises(ValueError, match="job: 4"):
-        run_batches(partial(complain, "job"), runs=4, size=4, seed=0)
+    with pytest.raises(ValueError, match="of 4"):
+        run_batches(jobs.complain, runs=4, size=4, seed=0)
 
 
 @pytest.mark.slow
 def test_a_batch_whose_processes_are_killed_is_said():
     with pytest.raises(IdesignError, match="a batch of 2 simulated runs has no result") as caught:
-        run_batches(end, runs=2, size=2, seed=0, executor=Processes(1))
+        run_batches(jobs.end, runs=2, size=2, seed=0, executor=Processes(1))
     assert caught.value.diagnostics[0].code == "worker-lost"
 
 
@@ -89,13 +71,10 @@ def test_whitened_eigenvalues_do_not_depend_on_coordinates():
     rng = np.random.default_rng(1)
     M = np.array([[4.0, 1.0], [1.0, 1.0]])
     theta = rng.standard_normal((400, 2)) @ np.linalg.inv(np.linalg.cholesky(M))
-    values = whitened_eigenvalues(theta, M)
-    T = np.array([[1e3, 2.0], [0.0, 1e-2]])
+    values, T = whitened_eigenvalues(theta, M), np.array([[1e3, 2.0], [0.0, 1e-2]])
     changed = whitened_eigenvalues(theta @ T.T, np.linalg.inv(T).T @ M @ np.linalg.inv(T))
     np.testing.assert_allclose(values, changed, rtol=1e-9)
-    np.testing.assert_allclose(
-        values, np.linalg.eigvals(np.cov(theta.T) @ M)[np.argsort(np.linalg.eigvals(np.cov(theta.T) @ M))]
-    )
+    np.testing.assert_allclose(values, np.sort(np.linalg.eigvals(np.cov(theta.T) @ M)))
     low, high = wishart_range(2, 400, rng)
     assert low < values[0] <= values[1] < high
 
@@ -148,16 +127,13 @@ def test_the_information_of_sinusoids_is_that_of_their_records(channels):
 
 @pytest.mark.parametrize("method", ["white", "prbs", "multisine", "binary"])
 def test_flat_excitations_have_their_power_exactly(method):
-    records = flat(method, 2, 300).draw(5, 300, np.random.default_rng(2))
-    np.testing.assert_allclose(np.mean(records**2, axis=1), np.tile(POWERS, (5, 1)))
-
-
-def test_reapplied_records_are_those_of_the_excitation_so_many_times_each():
-    drawn = Redrawn.flat("design", "white", np.array([2.0]), (0.0, np.pi), 40, 1.0)
-    once = drawn.draw(3, 40, np.random.default_rng(7))
-    again = Reapplied(drawn, 3).draw(7, 40, np.random.default_rng(7))
-    np.testing.assert_array_equal(again, once[[0, 0, 0, 1, 1, 1, 2]])
-    assert not np.array_equal(once[0], once[1])
+    """And a reapplied excitation applies each of its records a number of times."""
+    tried = flat(method, 2, 300)
+    records = tried.draw(3, 300, np.random.default_rng(2))
+    np.testing.assert_allclose(np.mean(records**2, axis=1), np.tile(POWERS, (3, 1)))
+    again = Reapplied(tried, 3).draw(7, 300, np.random.default_rng(2))
+    np.testing.assert_array_equal(again, records[[0, 0, 0, 1, 1, 1, 2]])
+    assert not np.array_equal(records[0], records[1])
 
 
 W = np.linspace(0.05, 3.1, 9)
@@ -185,27 +161,23 @@ def test_adjugate_and_determinant(n):
     matrix = np.random.default_rng(n).standard_normal((4, n, n, 3))
     det, adj = determinant_and_adjugate(matrix)
     product = multiply(matrix, adj)
-    for i in range(n):
-        for j in range(n):
-            expected = np.zeros((4, product.shape[-1]))
-            if i == j:
-                expected[:, : det.shape[-1]] = det
-            np.testing.assert_allclose(product[:, i, j], expected, atol=1e-10)
+    expected = np.zeros(product.shape)
+    expected[:, np.arange(n), np.arange(n), : det.shape[-1]] = det[:, None]
+    np.testing.assert_allclose(product, expected, atol=1e-10)
 
 
-def filtered(plant, desired, theta):
-    """Return the filters (runs, len(W), n, n) behind r - v, and their denominators."""
+def check_filters(plant, law, law_of, desired, theta):
+    """Check the filters behind r - v of estimates: the loop of each less the loop that the law asks for."""
     numerator, denominator = error_filters(plant, desired, *estimated_polynomials(plant, theta))
     q = np.exp(-1j * W)
     above = np.einsum("kl,rijl->rkij", q[:, None] ** np.arange(numerator.shape[-1]), numerator)
     below = denominator @ (q ** np.arange(denominator.shape[-1])[:, None])
-    return above / below[:, :, None, None] @ prefilter(desired).at(W), denominator
-
-
-def difference(plant, law, controller):
-    """Return the loop with a controller (len(W), n, n) less the loop that the law asks for."""
-    L = plant.plant_at(W) @ controller
-    return np.linalg.solve(np.eye(plant.outputs) + L, L) - law.complementary(W)
+    found = above / below[:, :, None, None] @ prefilter(desired).at(W)
+    for run, own in enumerate(map(plant.at, theta)):
+        L = plant.plant_at(W) @ law_of(own).controller(own.plant_at(W), W)
+        expected = np.linalg.solve(np.eye(plant.outputs) + L, L) - law.complementary(W)
+        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
+    return denominator
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -214,14 +186,10 @@ def difference(plant, law, controller):
 def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
     rng = np.random.default_rng(10 * n + matrix)
     bare = arx(column().plant if common and n == 2 else random_plant(rng, n))
-    T = target(n, matrix=matrix)
-    law, theta = ModelReference(T), bare.theta
+    T, theta = target(n, matrix=matrix), bare.theta
+    law = ModelReference(T)
     theta = theta + 0.01 * rng.standard_normal((2, theta.size)) * np.abs(theta)
-    found, denominator = filtered(bare, DesiredLoop(T), theta)
-    for run in range(2):
-        expected = difference(bare, law, law.controller(bare.at(theta[run]).plant_at(W), W))
-        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
-        assert abs(denominator[run, 0]) > 0
+    assert np.all(check_filters(bare, law, lambda _: law, DesiredLoop(T), theta)[:, 0] != 0)
 
 
 INVERSE = {
@@ -232,40 +200,34 @@ INVERSE = {
 }
 
 
+def internal(plant):
+    return InternalModel.build(plant, Rational.build([0.4], [1, -0.6]))
+
+
 def internal_model(name, variance=0.1):
-    B = INVERSE[name]
-    n = len(B)
-    plant = matrix_plant(A=[[1, -0.8], [1, -0.5]][:n], B=B, covariance=variance * np.eye(n))
-    law = InternalModel.build(plant, Rational.build([0.4], [1, -0.6]))
-    return LoopErrorProblem(plant, law, (PowerLimit("input", 1.0),), np.ones(n))
+    n = len(INVERSE[name])
+    plant = matrix_plant(A=[[1, -0.8], [1, -0.5]][:n], B=INVERSE[name], covariance=variance * np.eye(n))
+    return LoopErrorProblem(plant, internal(plant), (PowerLimit("input", 1.0),), np.ones(n))
 
 
 @pytest.mark.parametrize("name", INVERSE)
 def test_each_estimate_keeps_its_own_zeros_in_the_loop(name):
     """The filters against the loop of the controller that the law designs on each estimate."""
     problem = internal_model(name)
-    plant, desired = problem.plant, problem.law.desired
-    rng = np.random.default_rng(5)
-    theta = plant.theta * (1 + 0.05 * rng.standard_normal((4, plant.theta.size)))
-    found, denominator = filtered(plant, desired, theta)
-    for run in range(4):
-        model = plant.at(theta[run])
-        law = InternalModel.build(model, Rational.build([0.4], [1, -0.6]))
-        expected = difference(plant, problem.law, law.controller(model.plant_at(W), W))
-        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
-        # No factor outside the circle is left: a loop with such a model is stable.
-        assert np.abs(np.roots(denominator[run])).max() < 1
+    plant, law = problem.plant, problem.law
+    theta = plant.theta * (1 + 0.05 * np.random.default_rng(5).standard_normal((4, plant.theta.size)))
+    denominator = check_filters(plant, law, internal, law.desired, theta)
+    # No factor outside the circle is left: a loop with such a model is stable.
+    assert all(np.abs(np.roots(row)).max() < 1 for row in denominator)
 
 
 @pytest.mark.parametrize("name", ["zero outside", "two channels"])
 def test_losses_with_zeros_outside_agree_with_theory(name):
     problem = internal_model(name, variance=0.01)
     samples, runs, n = 2000, 300, problem.plant.outputs
-    found = study_losses(problem, {"white": even_lines(samples, n)}, samples=samples, runs=runs, seed=0)[
-        "white"
-    ]
-    assert found.unstable == 0
     criterion, lines = problem.parametric(), even_lines(samples, n)
+    found = study_losses(problem, {"white": lines}, samples=samples, runs=runs, seed=0)["white"]
+    assert found.unstable == 0
     information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
     squares = found.exact**2
     error = squares.std(ddof=1) / np.sqrt(runs)
@@ -277,32 +239,23 @@ def test_losses_with_zeros_outside_agree_with_theory(name):
 def test_least_squares_without_noise_is_exact():
     plant = arx(random_plant(np.random.default_rng(0), 2))
     u = np.random.default_rng(1).standard_normal((3, 400, 2))
-    y = np.zeros_like(u)
-    for i in range(2):
-        for j in range(2):
-            y[..., i] += scipy.signal.lfilter(plant.B[i][j], plant.A[i], u[..., j])
-    theta = least_squares(plant, u, y)
+    y = [sum(scipy.signal.lfilter(plant.B[i][j], plant.A[i], u[..., j]) for j in range(2)) for i in range(2)]
+    theta = least_squares(plant, u, np.stack(y, axis=-1))
     np.testing.assert_allclose(theta, np.broadcast_to(plant.theta, theta.shape), atol=1e-9)
 
 
 def test_least_squares_is_weighted_with_the_noise():
     """Against the normal equations written out for one run with correlated noise and a common A."""
-    problem = column(variance=1.0)
     covariance = np.array([[1.0, 0.6], [0.6, 2.0]])
-    plant = arx(problem.plant)
-    plant = replace(plant, covariance=covariance)
-    rng = np.random.default_rng(2)
-    u, y = rng.standard_normal((1, 200, 2)), rng.standard_normal((1, 200, 2))
-    inverse = np.linalg.inv(covariance)
-    normal, rhs = np.zeros((5, 5)), np.zeros(5)
-    for t in range(1, 200):
-        Phi = np.zeros((2, 5))
-        Phi[:, 0] = -y[0, t - 1]
-        Phi[0, 1:3] = u[0, t - 1]
-        Phi[1, 3:5] = u[0, t - 1]
-        normal += Phi.T @ inverse @ Phi
-        rhs += Phi.T @ inverse @ y[0, t]
-    np.testing.assert_allclose(least_squares(plant, u, y)[0], np.linalg.solve(normal, rhs), rtol=1e-9)
+    plant = replace(arx(column(variance=1.0).plant), covariance=covariance)
+    u, y = np.random.default_rng(2).standard_normal((2, 200, 2))
+    Phi = np.zeros((199, 2, 5))
+    Phi[:, :, 0], Phi[:, 0, 1:3], Phi[:, 1, 3:5] = -y[:-1], u[:-1], u[:-1]
+    weighted = np.einsum("tik,ij->tkj", Phi, np.linalg.inv(covariance))
+    normal, rhs = np.einsum("tkj,tjl->kl", weighted, Phi), np.einsum("tkj,tj->k", weighted, y[1:])
+    np.testing.assert_allclose(
+        least_squares(plant, u[None], y[None])[0], np.linalg.solve(normal, rhs), rtol=1e-9
+    )
 
 
 def test_the_loss_of_the_column_agrees_with_theory():
@@ -319,20 +272,16 @@ def test_the_loss_of_the_column_agrees_with_theory():
 
 
 def test_a_study_is_repeatable_and_treats_inputs_alike():
-    problem = column()
     both = {"a": even_lines(500), "b": even_lines(500)}
-    study = study_losses(problem, both, samples=500, runs=7, seed=3)
+    study, again = (study_losses(column(), both, samples=500, runs=7, seed=3) for _ in range(2))
     np.testing.assert_array_equal(study["a"].loss, study["b"].loss)
-    again = study_losses(problem, both, samples=500, runs=7, seed=3)
     np.testing.assert_array_equal(study["a"].loss, again["a"].loss)
 
 
 def test_unstable_loops_are_counted_and_left_out():
-    plant = arx(random_plant(np.random.default_rng(0), 1))
-    noisy = replace(plant, covariance=np.array([[400.0]]))
-    problem = LoopErrorProblem(
-        noisy, ModelReference(target(1, matrix=False)), (PowerLimit("input", 1.0),), np.ones(1)
-    )
+    noisy = replace(arx(random_plant(np.random.default_rng(0), 1)), covariance=np.array([[400.0]]))
+    law, limits = ModelReference(target(1, matrix=False)), (PowerLimit("input", 1.0),)
+    problem = LoopErrorProblem(noisy, law, limits, np.ones(1))
     found = study_losses(problem, {"white": even_lines(60, 1)}, samples=60, runs=80, seed=0)["white"]
     assert found.unstable > 0
     assert found.loss.size == 80 - found.unstable

@@ -5,16 +5,13 @@ import pytest
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.questions.campaign.build import build_rules
-from inputdesign_cli.questions.campaign.plans import standing
-from tests.support.campaigns import SPEC, planner, record
+from tests.support.campaigns import SPEC, planner, stands
 
 
 def test_a_plan_beyond_the_cap_is_longer_and_at_last_weaker():
-    u, y = record(40)
     at = planner()
-    known = standing(at, at.nominal.model, lambda m: 0.01 * information_of_data(m, u, y), at.nominal.model)
+    known = stands(at, share=0.01)
     rules = build_rules(parse_spec(SPEC, overrides=["campaign.power_cap=0.5"]))
     free = at.plan(rules, known, 60, 5, None)
     assert len(free.record) == 140
@@ -50,9 +47,7 @@ def test_no_estimate_makes_a_part_dearer_than_the_cap(name, block, cost):
     spec = parse_spec(SPEC, overrides=text)
     at, rules = planner(SPEC, *text), build_rules(spec)
     first = at.plan(rules, None, 0, 1, None)
-    u, y = record(40)
-    model = at.nominal.model.at(np.array(WILD[name]), np.array([[1.0]]))
-    known = standing(at, model, lambda m: 1e-3 * information_of_data(m, u, y), at.nominal.model)
+    known = stands(at, WILD[name], share=1e-3)
     for seed in (1, 2):
         part = at.plan(rules, known, 40, seed, first.cost).applied[:, 0]
         caused = lfilter([0, 3.6], [1, -0.7], part)
@@ -103,11 +98,9 @@ def test_each_part_in_a_loop_keeps_the_cap_at_its_estimate_and_at_the_plant_of_t
     """With what the parts before have left, which moves on in the plant."""
     at, rules = planner(IN_A_LOOP), build_rules(parse_spec(IN_A_LOOP))
     known, first, r, binding = None, None, np.zeros((0, 1)), 0
-    u, y = record(40)
     for number, theta in enumerate([[-0.9, 0.5], [-0.85, 0.55], [-0.92, 0.45], [-0.8, 0.4], [-0.9, 0.6]]):
         if number:
-            model = at.nominal.model.at(np.array(theta), np.array([[1.0]]))
-            known = standing(at, model, lambda m: 0.005 * information_of_data(m, u, y), at.nominal.model)
+            known = stands(at, theta, share=0.005)
         plan = at.plan(rules, known, len(r), number, first, r)
         first = plan.cost if first is None else first
         start, r = len(r), np.concatenate([r, plan.applied])
@@ -124,10 +117,7 @@ def test_what_earlier_parts_have_left_beyond_the_cap_is_told():
     at, rules = planner(IN_A_LOOP), build_rules(parse_spec(IN_A_LOOP))
     first = at.plan(rules, None, 0, 1, None)
     before = np.full((40, 1), 20.0 * np.sqrt(first.cost))
-    model = at.nominal.model
-    u, y = record(40)
-    known = standing(at, model, lambda m: 0.05 * information_of_data(m, u, y), model)
-    plan = at.plan(rules, known, 40, 2, first.cost, before)
+    plan = at.plan(rules, stands(at, share=0.05), 40, 2, first.cost, before)
     whole = np.concatenate([before, plan.applied])[:, 0]
     assert plan.beyond
     assert plan.part_cost == pytest.approx(spent_in_the_loop(whole, -0.9, 0.5, 40), rel=1e-9)
@@ -137,9 +127,6 @@ def test_what_earlier_parts_have_left_beyond_the_cap_is_told():
 def test_the_first_plan_after_a_pilot_is_bounded_by_that_of_the_spec():
     at, text = planner(), "campaign={block: 60, pilot: {samples: 30, power: 0.1}}"
     rules = build_rules(parse_spec(SPEC, overrides=[text]))
-    u, y = record(40)
-    model = at.nominal.model.at(np.array([1e-3, -0.1]), np.array([[1.0]]))
-    known = standing(at, model, lambda m: information_of_data(m, u, y), at.nominal.model)
-    plan = at.plan(rules, known, 30, 1, None)
+    plan = at.plan(rules, stands(at, [1e-3, -0.1]), 30, 1, None)
     wanted = solve(parse_spec(SPEC, overrides=["campaign=null"])).result["cost"]
     assert np.mean(plan.applied**2) <= 10 * wanted * (1 + 1e-6)

@@ -1,13 +1,16 @@
 """A campaign on a simulated plant, one part after the other, as a user applies them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec
+from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.questions.campaign.build import build_planner
-from inputdesign_cli.questions.campaign.plans import Planner
+from inputdesign_cli.questions.campaign.plans import Planner, standing
+from inputdesign_cli.questions.campaign.schedule import Standing
 
 SPEC = """
 title: in parts
@@ -60,6 +63,15 @@ def record(samples: int = 200, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """(n, 1), (n, 1): white noise, and what the true plant answers."""
     u = np.random.default_rng(seed).standard_normal(samples)
     return u[:, None], answered(u)[:, None]
+
+
+def stands(at: Planner, theta: Sequence[float] = (), share: float = 1.0, samples: int = 40) -> Standing:
+    """What plans are built on at some parameters, with a share of the information of a record."""
+    (u, y), model = record(samples), at.nominal.model
+    model = model.at(np.array(theta), np.array([[1.0]])) if theta else model
+    known = standing(at, model, lambda m: share * information_of_data(m, u, y), at.nominal.model)
+    assert known is not None
+    return known
 
 
 def found(result: dict, code: str) -> list[dict]:

@@ -36,3 +36,15 @@ def threads(_):
 def slow_identity(x):
     time.sleep(0.3)
     return x, os.getpid()
+
+
+def drawn(runs, rng):
+    return rng.standard_normal(runs)
+
+
+def complain(runs, rng):
+    raise ValueError(f"a batch of {runs}")
+
+
+def end(runs, rng):
+    os._exit(1)

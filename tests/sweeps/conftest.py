@@ -1,5 +1,6 @@
 """A sweep of small designs, and a stand-in for the solver."""
 
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,22 @@ from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.outcome.results import Results, Table
 from tests.support.outcomes import typed
 from tests.support.sweep_files import SPEC
+
+DRAW = "inputdesign_cli.figures.sweep.draw_sweep"
+
+
+@pytest.fixture(autouse=True)
+def undrawn(monkeypatch):
+    """Leave the figures of sweeps out."""
+    real = importlib.import_module("inputdesign_cli.figures.sweep").draw_sweep
+    monkeypatch.setattr(DRAW, lambda *_: [])
+    return real
+
+
+@pytest.fixture
+def drawn(undrawn, monkeypatch):
+    """Draw the figures after all."""
+    monkeypatch.setattr(DRAW, undrawn)
 
 
 @pytest.fixture

@@ -16,16 +16,24 @@ from inputdesign_cli.report.render import report_text
 from inputdesign_cli.sweeps.plan import build_plan
 from inputdesign_cli.sweeps.running import list_points
 from tests.support.processes import running
-from tests.support.sweep_files import rows, run_sweep, timeless_files, timeless_rows
+from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files, timeless_rows
 
 SETTINGS = ["experiment.samples=60,80"]
 
 
+@pytest.fixture(scope="module")
+def designed(tmp_path_factory):
+    """A sweep of real designs."""
+    folder = tmp_path_factory.mktemp("swept")
+    (folder / "small.yaml").write_text(SPEC)
+    run_sweep(folder / "small.yaml", SETTINGS, directory=folder / "out")
+    return folder / "out"
+
+
 @pytest.fixture
-def swept(spec, tmp_path):
-    """A sweep of real designs, and the files of its first point."""
-    out = tmp_path / "out"
-    run_sweep(spec, SETTINGS, directory=out)
+def swept(spec, designed, tmp_path):
+    """A copy of it, and the files of its first point."""
+    out = shutil.copytree(designed, tmp_path / "out")
     return out, out / rows(out)[0]["run"]
 
 

@@ -46,8 +46,10 @@ def refuse_unhandled(
 
     `handled` are values of some of these keys that it handles.
     """
-    values = [spec.at(*key.split(".")) for key in remedies]
-    for (key, remedy), value in zip(remedies.items(), values, strict=True):
+    parts = {} if spec.campaign is not None else {"signal.least_move": "it is for the parts of a campaign"}
+    refused = {**remedies, **parts}
+    values = [spec.at(*key.split(".")) for key in refused]
+    for (key, remedy), value in zip(refused.items(), values, strict=True):
         if value is not None and value not in (handled or {}).get(key, ()):
             stated = f"{key}: {value}" if isinstance(value, str) else key
             raise bad_spec("not-supported", f"{question} does not handle {stated}", hint=remedy, key=key)

@@ -63,6 +63,7 @@ class Rebuild(Generic[Built]):
         stated, signal = self.sections.uncertainty, self.sections.signal
         yield from (("campaign", None), ("simulation", None), ("solver.any_spectrum", False))
         yield from (("experiment.samples", change.samples), ("signal.samples", None))
+        yield "signal.least_move", None  # which the part keeps, not the design
         yield "signal.seed", change.seed
         if self.sections.experiment.duration is not None:
             yield "experiment.duration", None

@@ -9,7 +9,13 @@ import numpy as np
 
 from inputdesign_cli.questions.assessment.build import build_identification, question_at
 from inputdesign_cli.questions.building.rebuild import Rebuild
-from inputdesign_cli.questions.building.signal_settings import operating_points
+from inputdesign_cli.questions.building.signal_settings import (
+    build_signal_settings,
+    chosen_hold,
+    operating_points,
+    per_channel,
+    stated_peaks,
+)
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, record_step
 from inputdesign_cli.questions.building.uncertainty import build_simulation, farthest_radius
 from inputdesign_cli.questions.campaign.directory import Rounds
@@ -45,6 +51,7 @@ def build_rules(spec: Spec) -> Rules:
         robust_last=stated.last == "robust",
         stops=stated.stop == "data",
         rate=rate,
+        least=_least_moves(spec),
         seed=spec.signal.seed or 0,
     )
 
@@ -71,7 +78,28 @@ def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
     for key, wrong, message, hint in conflicts:
         if wrong:
             raise spec.complain("conflicting-keys", message, hint=hint, key=f"campaign.{key}")
-    return Schedule(parts, block, samples, most)
+    return Schedule(parts, block, samples, most, chosen_hold(spec))
+
+
+def _least_moves(spec: Spec) -> tuple[float, ...] | None:
+    """Return `signal.least_move` of each input; raise `SpecError` (`not-supported`) where it is not kept."""
+    least = per_channel(spec.signal.least_move, spec.plant.inputs)
+    if least is None:
+        return None
+    amplitude = spec.limits.amplitude
+    for beside, what in (
+        (spec.closed_loop, "a loop, whose controller moves the input"),
+        (spec.limits.rate is not None, "limits.rate: a move that waits is faster"),
+        (amplitude is not None and amplitude.output is not None, "limits.amplitude.output"),
+    ):
+        if beside:
+            message, hint = f"signal.least_move does not go with {what}", "remove one of them"
+            raise spec.complain("not-supported", message, hint=hint, key="signal.least_move")
+    peak = stated_peaks(spec)[0]
+    if peak is not None and np.any(least > peak):
+        message = "moves of at least signal.least_move exceed limits.amplitude"
+        raise spec.complain("conflicting-keys", message, hint="lower it", key="signal.least_move")
+    return tuple(least.tolist())
 
 
 def _check(spec: Spec, stated: Campaign) -> None:
@@ -95,7 +123,12 @@ def _check(spec: Spec, stated: Campaign) -> None:
 
 def build_planner(spec: Spec) -> Planner:
     """Return the planner of the parts; it raises as `build_experiment` and `farthest_radius` do."""
-    nominal = build_experiment(spec)
+    nominal, inputs = build_experiment(spec), spec.plant.inputs
+    peak = stated_peaks(spec)[0]
+    converter = spec.signal.quantisation is not None  # other scales are none of its values
+    sections = spec
+    if spec.signal.hold == "auto":  # for the plant of the spec, once and for all
+        sections = spec.revised({"signal.hold": chosen_hold(spec)})
     return Planner(
         nominal=nominal,
         farthest=farthest_radius(spec, nominal),
@@ -103,8 +136,10 @@ def build_planner(spec: Spec) -> Planner:
         step=record_step(spec),
         bounded=spec.limits.bounds_power,
         seed=spec.signal.seed or 0,
-        designs=Rebuild(spec, build_convex),
+        designs=Rebuild(sections, build_convex),
         asked=partial(question_at, spec),
+        block=build_signal_settings(sections).block,
+        reach=np.zeros(inputs) if converter else np.full(inputs, np.inf) if peak is None else peak,
     )
 
 

@@ -27,7 +27,6 @@ from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PlannedPart, Round, State
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
-from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.text_formats import csv_text
 from inputdesign_cli.plant import Model
@@ -35,12 +34,11 @@ from inputdesign_cli.questions.assessment.assess import judge
 from inputdesign_cli.questions.assessment.identify import Identification, estimated, mismeasured, told
 from inputdesign_cli.questions.campaign.acceptance import accepted, table_of
 from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests, signals_in
-from inputdesign_cli.questions.campaign.plans import Planner, standing
+from inputdesign_cli.questions.campaign.plans import Planner, other_minima, standing
 from inputdesign_cli.questions.campaign.schedule import Rules, Standing, power_of
 from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.regular_file import read_regular
 
-_ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided": "undecided"}
 # Data that say nothing yet; more of them will.
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
 # Records whose times differ by one sample time, give or take this share of it, are one.
@@ -269,7 +267,9 @@ def _next_part(
         share=plan.share,
         beyond=plan.beyond,
         part_cost=plan.part_cost,
-        fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal",
+        fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal" and not plan.alone,
+        alone=plan.alone,
+        parts=plan.kind == "parting",
     )
     # The times of a part continue the times of the last one.
     time_of = units.sample_time * np.arange(done, done + plan.take, dtype=np.float64)
@@ -319,31 +319,36 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
         if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
             raise
         return replace(now, findings=tuple(no_estimate_yet(told(error))))
-    estimate, earlier = found.estimate, identification.earlier
+    estimate = found.estimate
 
     def informed(model: Model) -> Array:
         if model is found.model:
             return estimate.information
+        free, earlier = estimate.start.free, identification.earlier
         return information_of_data(
-            model, data.u, data.y, units.step, lengths=data.lengths, free=estimate.start.free, earlier=earlier
+            model, data.u, data.y, units.step, lengths=data.lengths, free=free, earlier=earlier
         )
 
     assessment = judge(identification, found, started, first=last is None)
     sound = nominal if last is None else nominal.at(np.array(list(last.values()), dtype=float))
-    stands, looks = standing(task.planner, found.model, informed, sound), rules.schedule.looks
+    stands = standing(task.planner, found.model, informed, sound)
     findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
-    now = replace(now, standing=stands, assessed=assessment.results)
-    files = [name for name, _ in data.files]
-    if differences(estimate, files, looks) or contradictions(estimate, looks):
-        now = replace(now, state="undecided")
-    elif rules.over(done, met=stands is not None and stands.met):
-        now = replace(now, state=_ENDED[assessment.verdict])
-    # Faulty measurements can be mended, and users may go on.
-    elif not campaign.regardless and rules.refuted(estimate) and not mismeasured(identification, found):
-        now = replace(now, state="undecided", refuted=True)
-    elif assessment.verdict == "undecided":
+    verdict, suffices = assessment.verdict, stands is not None and stands.met
+    if stands is not None:
+        others = other_minima(found.model, estimate, found.question)
+        stands = replace(stands, open=verdict == "undecided" or bool(others), others=others)
+    if verdict == "met" and not suffices:
+        verdict = "missed"
+    files, looks = [name for name, _ in data.files], rules.schedule.looks
+    contradicted = bool(differences(estimate, files, looks) or contradictions(estimate, looks))
+    # Faulty measurements can be mended, and users may go on as long as the data do not suffice.
+    ends = rules.refuted(estimate) and not mismeasured(identification, found)
+    ends = ends and (suffices or not campaign.regardless)
+    state = rules.state(done, verdict, refuted=contradicted or ends)
+    if state == "running" and verdict == "undecided":
         findings += campaign_doubted()
-    return replace(now, findings=tuple(findings))
+    refuted = ends and done < rules.end and not (contradicted or campaign.regardless)
+    return Judged(state, stands, assessment.results, tuple(findings), refuted)
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Record:

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
+from typing import cast
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
+from inputdesign_cli.findings.rivals import beyond
+from inputdesign_cli.identification import Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind
 from inputdesign_cli.plant import Model, close_loop
+from inputdesign_cli.plant.model import SampledPlant
 from inputdesign_cli.questions.assessment.identify import ModelQuestion
 from inputdesign_cli.questions.building.rebuild import Change, Rebuild
 from inputdesign_cli.questions.campaign.schedule import REACHED, Planned, Rules, Standing, power_of
@@ -25,7 +29,7 @@ from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
-from inputdesign_cli.spectrum import FlatBasis
+from inputdesign_cli.spectrum import FlatBasis, TabulatedSpectrum
 
 # A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
 _CLOSE, _MOSTLY = 1.1, 0.5
@@ -33,6 +37,13 @@ _LONGER = 4.0  # a length grows at most by this factor at once
 # Cost of a part at the plant of the spec in units of the cap, if costs depend on the plant. Likewise cost of
 # the first plan after a pilot, in units of the design for that plant.
 _ELSEWHERE = 10.0
+# A minimum beside the estimate counts up to this excess of -2 log likelihood: a hundredth of its weight. A
+# part that is to tell minima apart makes one of them this much less likely, on average.
+_LIKELY, _APART = 9.0, 36.0
+# Frequencies at which models are compared, and the lowest as a share of the highest.
+_LINES, _LOWEST = 200, 1e-3
+# A part of large moves has this share of its power, and is raised by this factor until it has.
+_ENOUGH, _RAISED = 0.95, 1.05
 # Shares of the way from the last estimate that could be built on to one that cannot.
 _SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
@@ -50,6 +61,8 @@ class Planner:
         seed: of the record of the whole experiment.
         designs: builds the design of a plan.
         asked: the accuracy question at a model; see `Identification.at`.
+        block: the length of a record is a multiple of it, since periods and values are whole.
+        reach: (r,), the largest deviation of each input; infinite without a limit.
     """
 
     nominal: Experiment
@@ -60,6 +73,8 @@ class Planner:
     seed: int
     designs: Rebuild[ConvexTask]
     asked: Callable[[Model, int, Array, str], ModelQuestion]
+    block: int
+    reach: Array
 
     def radius(self, model: Model) -> float:
         """Return the radius of the farthest pole of the plant, or of its loop; infinite if it is unstable."""
@@ -98,44 +113,43 @@ class Planner:
     ) -> Planned:
         """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
+        Data that suffice now, or with the next part, may leave several models open. Then the next part is
+        also to tell minima apart. If tests are the reason, a sufficient part is planned as if without data.
+
         Args:
             known: None before any data.
             first: cost of a sample of the first plan, which the cap is relative to.
             before: (n, r), applied so far about the operating point; None before any.
         """
-        take, rest = rules.schedule.take(done), rules.schedule.rest(done)
+        take, rest, last = rules.schedule.take(done), rules.schedule.rest(done), rules.schedule.last(done)
         earlier = np.zeros((0, self.nominal.inputs)) if before is None else before
         if known is None and done == 0 and rules.pilot_power is not None:
-            # White noise of this power, even over the inputs.
-            powers = np.full(self.nominal.inputs, rules.pilot_power / self.nominal.inputs)
-            drawn = Redrawn.flat("pilot", "white", powers, self.nominal.band, take, self.step)
-            record = drawn.draw(1, take, np.random.default_rng(seed))[0]
-            pilot = Planned(record, take, power_of(record), 0.0, "pilot")
-            return self._kept(pilot, rules, np.inf, None, earlier)
+            return self._kept(self._pilot(rules, rules.pilot_power, take, seed), rules, np.inf, None, earlier)
         cap = rules.cap(first)
         if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
             cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
-        last = rules.schedule.last(done)
+        left = known if known is not None and known.open and (last or known.met) else None
+        apart = left if left is not None and left.others else None
+        alone = left is not None and apart is None and left.met
         change = Change(
-            samples=rest,
+            samples=take if alone else rest,
             seed=seed,
-            information=None if known is None else known.information,
+            information=None if known is None or alone else known.information,
             uncertainty="stated" if known is None and rules.robust_last else "none",
             white=rules.white,
             goes_on=rules.stops or not last,
         )
-        model = None if known is None else known.model
-        if rules.robust_last and last and known is not None:
-            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
-            with suppress(IdesignError):
-                found = self._designed(model, replace(change, uncertainty="data"))
-                if found.cost <= cap * REACHED:
-                    return self._kept(replace(found.planned, take=take), rules, cap, known, earlier)
         try:
-            plan = replace(self._affordable(model, change, cap, rules.end - done), take=take)
+            if apart is None or not apart.met:
+                robust = rules.robust_last and last and known is not None and not alone
+                plan = self._sufficient(known, change, cap, rules.end - done, robust=robust)
+            else:
+                plan = Planned(np.zeros((take, self.nominal.inputs)), take, 0.0, 0.0, "parting")
+            if apart is not None:
+                plan = self._parting(plan, apart, take, seed)
             # The first plan sets the cap, which its own part keeps as well.
             own = rules.cap(plan.cost) if first is None else np.inf
-            return self._kept(plan, rules, min(cap, own), known, earlier)
+            return self._kept(replace(plan, take=take, alone=alone), rules, min(cap, own), known, earlier)
         except IdesignError as error:
             if known is None:
                 raise
@@ -143,6 +157,65 @@ class Planner:
             cost = np.inf if first is None else min(cap, first)
             gap = replace(self._stopgap(rules, cost, rest, seed, error), take=take)
             return self._kept(gap, rules, cap, None, earlier)
+
+    def _sufficient(
+        self, known: Standing | None, change: Change, cap: float, longest: int, *, robust: bool
+    ) -> Planned:
+        """Return the plan that makes the data suffice, at all plants that they leave open if `robust`."""
+        model = None if known is None else known.model
+        if robust:
+            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
+            with suppress(IdesignError):
+                found = self._designed(model, replace(change, uncertainty="data"))
+                if found.cost <= cap * REACHED:
+                    return found.planned
+        return self._affordable(model, change, cap, longest)
+
+    def _pilot(self, rules: Rules, power: float, take: int, seed: int) -> Planned:
+        """Return white noise of a power, even over the inputs."""
+        powers, hold = np.full(self.nominal.inputs, power / self.nominal.inputs), rules.schedule.hold
+        drawn = Redrawn.flat("pilot", "white", powers, self.nominal.band, take, self.step, hold)
+        record = drawn.draw(1, take, np.random.default_rng(seed))[0]
+        return Planned(record, take, power_of(record), 0.0, "pilot")
+
+    def _parting(self, plan: Planned, known: Standing, take: int, seed: int) -> Planned:
+        """Return a plan whose part also tells the minima of the likelihood apart.
+
+        The spectrum of what is added is the squared difference of the predictions of the models. Its power
+        is the expected difference of -2 log likelihood, as in T-optimal designs ([atkinson-fedorov-1975]).
+        """
+        experiment = replace(self._experiment(known.model), samples=take)
+        lo, hi = experiment.band
+        w = np.linspace(max(lo, _LOWEST * hi), hi, _LINES)
+        apart = [self._apart(experiment, known.model.at(theta), w) for theta in known.others]
+        squares = np.array([np.einsum("npi,npj->nij", one.conj(), one) for one in apart])
+        # Of power one: the mean over both signs of w.
+        shape = np.sum(squares / np.abs(squares).max(axis=(1, 2, 3), keepdims=True), axis=0)
+        table = TabulatedSpectrum(w, shape * np.pi / np.trapezoid(np.einsum("nii->n", shape).real, w))
+        gains = np.trapezoid(np.einsum("mnij,nji->mn", squares, table.phi).real, w) / np.pi
+        request = self.designs.at(known.model, Change(take, seed)).record
+        power = _APART / (take * np.min(gains, keepdims=True))
+        more = given_record(request, experiment, table, power, lambda information: 0.0)
+        if more is None:
+            return plan
+        # Records within limits may exceed them together.
+        record = more.samples[:take] + plan.record[:take]
+        plant = FiniteRecord(experiment, take, self.step)
+        u, y = (plant.signals(kind, record) for kind in ("input", "output"))
+        record /= max(1.0, *request.bounds.shares(u, y).values())
+        cost = self.cost_of(experiment, record)
+        return replace(plan, record=record, power=power_of(record), cost=cost, kind="parting", claim=None)
+
+    def _apart(self, experiment: Experiment, other: Model, w: Array) -> ComplexArray:
+        """Return the difference of the predictions that two models make of an excitation, (n, p, r).
+
+        In units of the noise, at frequencies `w` (n,); the models have the same excitation and noise.
+        """
+        model = cast(SampledPlant, experiment.model)
+        off = model.plant_at(w) - other.plant_at(w)
+        left = model.left_at(w)[0] @ off @ experiment.response("input", w)
+        white = np.linalg.solve(model.forcing_at(w), left)
+        return np.linalg.solve(np.linalg.cholesky(model.covariance)[None], white)
 
     @cached_property
     def _unlearned(self) -> float:
@@ -159,29 +232,37 @@ class Planner:
 
         A part may be stronger than its plan is on average. An experiment that costs little at a wrong
         estimate may cost any amount at the plant if outputs are paid for. The cap is wide at the plant of
-        the spec, since plants differ. Noise does not count, as in the cost of a design.
+        the spec, since plants differ. Noise does not count, as in the cost of a design. Moves of the part are
+        as slow, and as large, as the rules ask.
         """
-        lead = 0
-        if rules.rate is not None and before.size and np.any(before[-1]):
+        lead, last = 0, before[-1] if before.size else np.zeros(self.nominal.inputs)
+        if rules.rate is not None and np.any(last):
             # A record starts within one move of zero: moves of at most the rate lead back to it.
-            last, rate = before[-1], np.asarray(rules.rate)
-            lead = int(np.max(np.ceil(np.abs(last) / rate)))
-            left = np.maximum(np.abs(last) - np.arange(1, lead + 1)[:, None] * rate, 0.0)
-            plan = replace(plan, record=np.concatenate([np.sign(last) * left, plan.record]))
+            rate = np.asarray(rules.rate)
+            moves = np.arange(1, int(np.max(np.ceil(np.abs(last) / rate))) + 1)[:, None]
+            back = np.sign(last) * np.maximum(np.abs(last) - moves * rate, 0.0)
+            back = np.repeat(back, rules.schedule.hold, axis=0)
+            lead, plan = len(back), replace(plan, record=np.concatenate([back, plan.record]))
         caps = [(self.nominal, cap)]
         if known is not None:
             wide = _ELSEWHERE if any(map(self.nominal.depends_on_plant, self.cost)) else 1.0
             caps = [(self._experiment(known.model), cap), (self.nominal, wide * cap)]
 
-        def cost(experiment: Experiment, scale: float) -> float:
-            """Return the cost of a sample of the part, all of it but the lead at a scale."""
-            factors = np.where(np.arange(plan.take) < lead, 1.0, scale)[: len(plan.applied), None]
-            return self.cost_of(experiment, np.concatenate([before, factors * plan.applied]), len(before))
+        def part(scale: float) -> Array:
+            """Return the part, all of it but the lead at a scale."""
+            factors = np.where(np.arange(plan.take) < lead, 1.0, scale)
+            return factors[: len(plan.applied), None] * plan.applied
 
-        scale = min(_largest_scale(partial(cost, at), most) for at, most in caps)
-        beyond = any(cost(at, scale) > most * REACHED for at, most in caps)
-        part_cost, record = cost(caps[0][0], scale), plan.record.copy()
-        record[lead : plan.take] *= scale
+        def cost(experiment: Experiment, applied: Array) -> float:
+            return self.cost_of(experiment, np.concatenate([before, applied]), len(before))
+
+        scale = min(_largest_scale(lambda x, at=at: cost(at, part(x)), most) for at, most in caps)
+        applied = part(scale)
+        if rules.least is not None:
+            applied = usefully_moved(applied, last, np.asarray(rules.least), self.reach)
+        beyond = any(cost(at, applied) > most * REACHED for at, most in caps)
+        record = np.concatenate([applied, plan.record[plan.take :]])
+        part_cost = cost(caps[0][0], applied)
         return replace(plan, record=record, share=scale**2, part_cost=part_cost, beyond=beyond)
 
     def cost_of(self, experiment: Experiment, record: Array, begin: int = 0) -> float:
@@ -238,14 +319,16 @@ class Planner:
         return replace(plan, record=weaker, power=plan.power * share, cost=cap, capped=True)
 
     def _designed(self, model: Model | None, change: Change) -> _Found:
-        task = self.designs.at(model, change)
+        whole = -(-change.samples // self.block) * self.block
+        task = self.designs.at(model, replace(change, samples=whole))
         task = replace(task, asked=replace(task.asked, windows=0))  # a part is not the whole record
         kind: PlanKind = "white" if change.white else "nominal" if task.asked.plants is None else "robust"
         return _Found(task, task.designed(), kind)
 
     def _stopgap(self, rules: Rules, cost: float, rest: int, seed: int, why: IdesignError) -> Planned:
         """Return white noise of this cost a sample; of the power of the pilot if nothing else was applied."""
-        nominal, task = self.nominal, self.designs.at(None, Change(rest, seed))
+        nominal, rest = self.nominal, -(-rest // self.block) * self.block
+        task = self.designs.at(None, Change(rest, seed))
         unit = weighted_sum(task.asked.cost, GivenExcitation.even(nominal, 1.0).power)
         power = cost / unit if np.isfinite(cost) else rules.pilot_power or 0.0
         flat = FlatBasis(nominal.inputs, nominal.band)
@@ -311,6 +394,41 @@ def standing(
         if np.isfinite(ratio):
             return Standing(model, information, ratio, share)
     return None
+
+
+def other_minima(model: Model, estimate: Estimate, question: ModelQuestion | None) -> tuple[Array, ...]:
+    """Return the parameters (k,) of minima about as likely as the estimate that leave its accuracy open.
+
+    G is another one there, by more than is admitted, or the minima widen the covariance of the estimate.
+    """
+    close = [one for one in estimate.search.beside if one.excess < _LIKELY]
+    if question is not None:
+        information = None if question.asked else question.information
+        close += [one.rival for one in beyond(model, estimate, question.errors, information)]
+    return tuple(one.theta for one in close)
+
+
+def usefully_moved(record: Array, start: Array, least: Array, reach: Array) -> Array:
+    """Return a record (n, r) that moves by `least` (r,) or more, or not at all, beginning at `start` (r,).
+
+    Each input waits until the record is that far away. The record is raised if it loses power by waiting,
+    up to the `reach` (r,) of the inputs.
+    """
+    peaks = np.abs(record).max(axis=0)
+    most = float(np.min(np.divide(reach, peaks, out=np.full(peaks.size, np.inf), where=peaks > 0.0)))
+    scale, moved = 1.0, _waiting(record, start, least)
+    while power_of(moved) < _ENOUGH * power_of(record) and scale < most:
+        scale = min(_RAISED * scale, most)
+        moved = _waiting(scale * record, start, least)
+    return moved
+
+
+def _waiting(record: Array, start: Array, least: Array) -> Array:
+    moved, now = np.empty_like(record), start.copy()
+    for t, goal in enumerate(record):
+        now = np.where(np.abs(goal - now) >= least, goal, now)
+        moved[t] = now
+    return moved
 
 
 def _largest_scale(cost: Callable[[float], float], cap: float) -> float:

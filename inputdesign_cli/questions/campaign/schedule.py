@@ -15,13 +15,15 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind
+from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind, State
+from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.plant import Model
 
 REACHED = 1.0 + 1e-9
 """A ratio no larger than this meets what is asked."""
 # The rest of a part is a part of its own if it has more than this share of its samples.
 _REMAINDER = 0.1
+_ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided": "undecided"}
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,14 @@ class Schedule:
     Attributes:
         parts: samples of the first parts; later parts have `block`.
         samples: of the whole experiment as it is planned; `most`: where it ends at the latest.
+        hold: samples for which each value stands; a part has whole values.
     """
 
     parts: tuple[int, ...]
     block: int
     samples: int
     most: int
+    hold: int = 1
 
     def take(self, done: int) -> int:
         """Return the samples of the part that begins after `done` samples; 0 at the end.
@@ -47,7 +51,7 @@ class Schedule:
         left = [end - done for end, part in ends if end - done > _REMAINDER * part]
         whole = self.samples - done
         part = left[0] if left else min(self.block, whole) if whole > _REMAINDER * self.block else self.block
-        return max(min(part, self.most - done), 0)
+        return max(min(-(-part // self.hold) * self.hold, self.most - done), 0)
 
     def rest(self, done: int) -> int:
         """Return the samples that the plan of that part is for: the rest of the whole experiment."""
@@ -78,6 +82,7 @@ class Rules:
     stops: bool = True
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
+    least: tuple[float, ...] | None = None  # smallest useful move of each input
     seed: int = 0  # of the signal, as the spec states it
 
     def seed_of(self, number: int) -> int:
@@ -94,15 +99,20 @@ class Rules:
         """Return the number of samples after which the experiment is over, whatever was reached."""
         return self.schedule.most if self.stops else min(self.schedule.samples, self.schedule.most)
 
-    def over(self, done: int, *, met: bool) -> bool:
-        """Return whether nothing more is applied after `done` samples."""
-        return done >= self.end or (met and self.stops)
+    def state(self, done: int, verdict: Verdict, *, refuted: bool = False) -> State:
+        """Return how a campaign stands after `done` samples; while nothing is decided, it goes on.
+
+        Args:
+            verdict: of all data, `met` if they suffice at the estimate itself.
+            refuted: whether the data contradict the structure, or each other, which more data do not mend.
+        """
+        if refuted:
+            return "undecided"
+        over = done >= self.end or (self.stops and verdict == "met")
+        return _ENDED[verdict] if over else "running"
 
     def refuted(self, estimate: Estimate) -> bool:
-        """Return whether the campaign ends since tests refute the structure, which more samples do not mend.
-
-        The tests are repeated after every part, and the parts share their level.
-        """
+        """Return whether tests refute the structure; they are repeated, and all parts share their level."""
         return self.stops and bool(estimate.tests.failed_within(self.schedule.looks))
 
 
@@ -116,12 +126,16 @@ class Standing:
         ratio: the largest r_u / r_adm, or of another requirement, at the model.
         share: of the way from the last estimate to the new one. Below 1 if the new one has no stable loop, or
             the accuracy cannot be evaluated at it.
+        open: whether the data leave it undecided: other minima of the likelihood, or tests.
+        others: parameters (k,) of these minima.
     """
 
     model: Model
     information: Array
     ratio: float
     share: float = 1.0
+    open: bool = False
+    others: tuple[Array, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -144,6 +158,7 @@ class Planned:
         part_cost: of a sample of the next part at the plant that it is planned for, with the effects of
             earlier parts.
         beyond: whether `part_cost` exceeds the cap, whatever is applied.
+        alone: whether the part is planned without the data, which leave the model undecided.
     """
 
     record: Array
@@ -157,6 +172,7 @@ class Planned:
     share: float = 1.0
     part_cost: float = 0.0
     beyond: bool = False
+    alone: bool = False
 
     @property
     def applied(self) -> Array:

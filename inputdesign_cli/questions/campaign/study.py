@@ -16,7 +16,6 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
@@ -28,18 +27,20 @@ from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.monte_carlo.study import responses
 from inputdesign_cli.outcome import Simulation
+from inputdesign_cli.outcome.campaign import State
 from inputdesign_cli.outcome.curves import Curves, RatioCurves, TradeCurves
+from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.campaign.plans import Planner, standing
+from inputdesign_cli.questions.campaign.plans import Planner, other_minima, standing
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule, Standing
 from inputdesign_cli.questions.common.delivery import with_study
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 
-Ending = Literal["stopped", "missed", "undecided", "unplanned"]
+Ending = State | Literal["unplanned"]
 Reference = Literal["true", "estimate", "design"]
-_ENDINGS: tuple[Ending, ...] = get_args(Ending)
+_ENDINGS: tuple[Ending, ...] = ("stopped", "missed", "undecided", "unplanned")
 _REFERENCES: tuple[Reference, ...] = get_args(Reference)
 _SEEDS = 2**31
 
@@ -98,7 +99,15 @@ class CampaignTask:
     has_prior: bool
 
     def solve(self) -> Results:
-        """Design the whole experiment at the plant of the spec, see `ConvexTask.solve`."""
+        """Design the whole experiment at the plant of the spec, see `ConvexTask.solve`.
+
+        Raises:
+            SpecError: `not-supported` for `signal.least_move`, which the parts of a campaign keep.
+        """
+        if self.ways["campaign"].least is not None:
+            message = "the record of a whole experiment does not keep signal.least_move"
+            hint = "begin the campaign (`idesign campaign SPEC -o DIR`), or remove the key"
+            raise bad_spec("not-supported", message, hint=hint, key="signal.least_move")
         return self.design.solve()
 
     def simulate(self, executor: Executor | None = None) -> Results:
@@ -166,7 +175,7 @@ def ways_of(rules: Rules, *, uncertain: bool, white: bool) -> dict[str, Rules]:
     """
     whole = rules.schedule.samples
     pilot = rules.schedule.parts[:1] if rules.pilot_power is not None else ()
-    once = Schedule((*pilot, whole - sum(pilot)), whole, whole, whole)
+    once = Schedule((*pilot, whole - sum(pilot)), whole, whole, whole, rules.schedule.hold)
     one = replace(rules, schedule=once, power_cap=None, stops=False, robust_last=False)
     ways = {"campaign": rules, "one_shot": one}
     if uncertain:
@@ -295,24 +304,24 @@ class _Run:
             signals = responses(self.true, self.r[None], self.e[None, : len(self.r)], planner.step)
             u, y = (total[0] for _, total in signals)
             self.parts += 1
-            model, found = self.last, None
+            done, model, found = len(self.r), self.last, None
             if self.known is not None:
                 found = fit_batch(model, u[None], y[None], planner.step, start=model.theta)
             if found is not None and found.converged[0]:
                 self._stand(model.at(found.theta[0], found.noise[0]), u, y)
             else:
                 self._identified(u, y)
-            over = rules.over(len(self.r), met=self._met)
-            asks = rules.stops and not over and self.known is not None
-            near = self._identified(u, y, near=True) if asks else None
-            if not over and (near is None or not rules.refuted(near)):
-                continue
+            # Only a first suspicion, or the end, is worth a search from several starts.
+            if rules.state(done, "met" if self._met else "missed") == "running":
+                asks = rules.stops and self.known is not None
+                near = self._identified(u, y, near=True) if asks else None
+                if near is None or not rules.refuted(near):
+                    continue
             full = self._identified(u, y)
-            if full is not None and not over and rules.refuted(full):
-                return self._ended("undecided")
-            if rules.over(len(self.r), met=self._met):
-                against = full is not None and self._speaks_against(full)
-                return self._ended("undecided" if against else "stopped" if self._met else "missed")
+            refuted = full is not None and rules.refuted(full)
+            state = rules.state(done, self._verdict(full), refuted=refuted)
+            if state != "running":
+                return self._ended(state)
 
     @property
     def _met(self) -> bool:
@@ -329,16 +338,19 @@ class _Run:
             self._stand(model.at(found.theta, found.noise), u, y)
         return found
 
-    def _speaks_against(self, full: Estimate) -> bool:
-        """Return whether the estimate contradicts the structure at the end."""
-        if full.tests.failed or not full.search.converged:
-            return True
+    def _verdict(self, full: Estimate | None) -> Verdict:
+        """Return the verdict on all data; where they leave several models open, the next plan will know."""
         known = self.known
-        if known is None or not known.met:  # more parameters miss it all the more
-            return False
+        if full is None or known is None:
+            return "met" if self._met else "missed"
         question = self.planner.question(known.model, known.information)
-        errors = model_errors(question.requirements)
-        return bool(mattering(neglected(known.model, full, errors, question.information)))
+        others = other_minima(known.model, full, question)
+        against = bool(full.tests.failed or others or not full.search.converged)
+        if not against and known.met:  # more parameters miss it all the more
+            found = neglected(known.model, full, question.asked, question.information)
+            against = bool(mattering(found))
+        self.known = replace(known, open=against, others=others)
+        return "undecided" if against else "met" if known.met else "missed"
 
     def _stand(self, estimate: Model, u: Array, y: Array) -> None:
         informed = partial(information_of_data, u=u, y=y, step=self.planner.step)
@@ -371,7 +383,7 @@ class _Run:
         planner, true = self.planner, self.true.model
         model = {"true": true, "estimate": self.last, "design": planner.nominal.model}[of]
         try:
-            errors = model_errors(planner.question(model, np.eye(len(model.names))).requirements)
+            errors = planner.question(model, np.eye(len(model.names))).asked
         except IdesignError:
             return None
         kept = []

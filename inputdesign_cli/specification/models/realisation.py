@@ -83,6 +83,9 @@ class Signal(Section):
     hold: Hold | None = optional(
         "Samples for which each value is held; auto: about a tenth of the slowest time constant."
     )
+    least_move: fields.PerChannel[fields.Positive] | None = optional(
+        "Smallest useful move of an input in the parts of a campaign; a number or one per input."
+    )
     tolerance: fields.Fraction = Field(
         default=0.02,
         description="A search for the best record within limits.amplitude ends this near to its bound "

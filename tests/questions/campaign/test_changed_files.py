@@ -40,13 +40,6 @@ def test_what_was_edited_by_hand_is_told(name, run, once, tmp_path):
         assert "run-unreadable" in err or "campaign-changed" in err
 
 
-@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"time,u1\n0,x\n", b"time,u1\n0,nan\n"])
-def test_plans_that_are_no_plans_any_more_are_told(content, run, begun):
-    (begun / "plan_01.csv").write_bytes(content)
-    code, _, err = run("status", "c")
-    assert (code, "campaign-changed" in err) == (2, True)
-
-
 def halved(text):
     lines = text.splitlines()
     return "\n".join(lines[: len(lines) // 2]) + "\n"
@@ -85,26 +78,37 @@ def test_a_record_that_was_changed_decides_nothing(damage, run, once, tmp_path):
     assert run("next", "c", "--no-figures")[0] == 0
 
 
-def test_a_plan_that_was_changed_decides_nothing(run, once, tmp_path):
+def test_where_files_are_gone_the_records_are_not_given_up(run, once, tmp_path):
     record = applied(once, tmp_path / "r2.csv")
-    for name in ("plan_01.csv", "plan_02.csv"):
-        kept = (once / name).read_text()
-        (once / name).write_text(kept[:-3] + "9\n")
-        code, _, err = run("next", "c", record)
-        assert (code, "campaign-changed" in err, f"c/{name}" in err) == (2, True, True)
-        (once / name).write_text(kept)
-    assert (once / "signal.csv").read_text() == kept  # which the message says of the plan that is due
+    for name, error in (("result.json", "run-missing"), ("record_01.csv", "run-incomplete")):
+        kept = (once / name).read_bytes()
+        (once / name).unlink()
+        for command in (("next", "c", record), ("next", "c"), ("status", "c")):
+            code, _, err = run(*command)
+            assert (code, error in err, "put it back" in err, "idesign identify" in err) == (
+                2,
+                True,
+                True,
+                True,
+            )
+            assert "run the spec again" not in err
+            assert "solve SPEC" not in err
+        (once / name).write_bytes(kept)
+    assert run("next", "c", record, "--no-figures")[0] == 0
+    told = run("next", "nowhere", record)[2]
+    assert ("run-missing" in told, "idesign campaign SPEC" in told) == (True, True)
 
 
-def test_a_record_that_is_gone_is_to_be_put_back(run, once, tmp_path):
-    (once / "record_01.csv").unlink()
-    code, _, err = run("next", "c")
-    assert (code, "run-incomplete" in err, "put it back" in err) == (2, True, True)
-    assert "run the spec again" not in err
+def written(content):
+    return lambda path: path.write_bytes(content)
 
 
-def appended(path):
-    path.write_bytes(path.read_bytes() + b"\n")
+def appended(path, more=b"\n"):
+    path.write_bytes(path.read_bytes() + more)
+
+
+def another_digit(path):
+    path.write_bytes(path.read_bytes()[:-3] + b"9\n")
 
 
 def asked_less(path):
@@ -117,13 +121,14 @@ def decided_otherwise(path):
     path.write_text(json.dumps(result))
 
 
+NO_PLANS = [written(x) for x in (b"", b"\xff\xfe\x00", b"time,u1\n0,x\n", b"time,u1\n0,nan\n")]
 DECIDING = {
-    "spec.yaml": asked_less,
-    "signal.csv": lambda path: path.write_text(path.read_text() + "999,3\n"),
-    "plan_01.csv": appended,
-    "plan_02.csv": appended,
-    "record_01.csv": appended,
-    "result.json": decided_otherwise,
+    "spec.yaml": [asked_less],
+    "signal.csv": [appended, lambda path: appended(path, b"999,3\n")],
+    "plan_01.csv": [appended, another_digit],
+    "plan_02.csv": [appended, another_digit, *NO_PLANS],
+    "record_01.csv": [appended],
+    "result.json": [decided_otherwise],
 }
 
 
@@ -133,39 +138,20 @@ def test_every_file_that_decides_is_known_by_its_digest(run, once, tmp_path):
     told = set()
     for path in sorted(once.iterdir()):
         kept = path.read_bytes()
-        DECIDING.get(path.name, appended)(path)
-        code, _, err = run("status", "c")
-        if code:
-            told.add(path.name)
-            assert "campaign-changed" in err
-            assert f"c/{path.name}" in err
-            assert "put it back" in err
-            changed = (once / "result.json").read_bytes()
-            assert run("next", "c", record, "--no-figures")[0] == 2
-            assert (once / "result.json").read_bytes() == changed
-        path.write_bytes(kept)
+        for change in DECIDING.get(path.name, [appended]):
+            change(path)
+            code, _, err = run("status", "c")
+            if code:
+                told.add(path.name)
+                assert ("campaign-changed" in err, f"c/{path.name}" in err, "put it back" in err) == (
+                    True,
+                ) * 3
+                changed = (once / "result.json").read_bytes()
+                assert run("next", "c", record, "--no-figures")[0] == 2
+                assert (once / "result.json").read_bytes() == changed
+            if path.name == "signal.csv":  # what is said mends it
+                assert "plan_02.csv in the same directory" in err
+                assert (once / "plan_02.csv").read_bytes() == kept
+            path.write_bytes(kept)
     assert told == set(DECIDING)
     assert run("next", "c", record, "--no-figures")[0] == 0
-
-
-def test_what_is_told_of_a_changed_signal_mends_it(run, begun, tmp_path):
-    appended(begun / "signal.csv")
-    assert "plan_01.csv in the same directory" in run("status", "c")[2]
-    (begun / "signal.csv").write_bytes((begun / "plan_01.csv").read_bytes())
-    assert run("status", "c")[0] == 0
-
-
-def test_where_the_result_is_gone_the_records_are_not_given_up(run, once, tmp_path):
-    record, kept = applied(once, tmp_path / "r2.csv"), (once / "result.json").read_bytes()
-    (once / "result.json").unlink()
-    for command in (("next", "c", record), ("next", "c"), ("status", "c")):
-        code, _, err = run(*command)
-        assert (code, "run-missing" in err) == (2, True)
-        assert "put it back from a copy" in err
-        assert "idesign identify" in err
-        assert "solve SPEC" not in err
-    (once / "result.json").write_bytes(kept)
-    assert run("next", "c", record, "--no-figures")[0] == 0
-    told = run("next", "nowhere", record)[2]
-    assert "run-missing" in told
-    assert "idesign campaign SPEC" in told

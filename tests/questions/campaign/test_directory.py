@@ -12,26 +12,55 @@ from inputdesign_cli import parse_spec
 from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.campaign.memory import held
+from inputdesign_cli.questions.campaign.plans import usefully_moved
 from tests.support.campaigns import SPEC, answered, applied, found, planned, written
 
 
-def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
-    assert len(planned(begun)) == 20  # a pilot of a tenth
+@pytest.fixture
+def taken(run):
+    """Gives a record to the campaign: its exit code, the result or nothing, and what stderr says."""
+
+    def take(*arguments):
+        code, out, err = run("next", "c", *arguments, "--json", "--no-figures")
+        return code, json.loads(out) if out else {}, err
+
+    return take
+
+
+@pytest.fixture
+def begin(run, tmp_path):
+    """Begins a campaign with overrides: its directory, exit code and what stderr says."""
+
+    def begin(name, *overrides):
+        sets = [part for one in overrides for part in ("--set", one)]
+        code, _, err = run("campaign", "s.yaml", "-o", name, "--no-figures", *sets)
+        return tmp_path / name, code, err
+
+    return begin
+
+
+def kept(directory):
+    return (directory / "result.json").read_bytes()
+
+
+def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begin, taken, tmp_path):
+    begun, _, _ = begin("c", "campaign.last=nominal")
+    # The power of the signal is said, not only of the whole plan, whose beginning is the part: a tenth.
+    plan, u = read_run(begun)["campaign"]["rounds"][-1]["plan"], planned(begun)[:, 1]
+    assert len(u) == 20
+    out = run("status", "c")[1]
+    assert f"apply 20 samples of power {np.mean(u**2):.4g} (signal.csv" in out
+    assert f"planned with {plan['power']:.4g}" in out
     for number in range(1, 12):
-        record = applied(begun, tmp_path / f"r{number}.csv")
-        code, out, err = run("next", "c", record, "--json", "--no-figures")
+        code, result, err = taken(applied(begun, tmp_path / f"r{number}.csv"))
         assert code == 0, err
-        result = json.loads(out)
         if result["status"] != "running":
             break
-    assert result["status"] == "stopped"
-    assert result["assessment"]["met"]
+    assert (result["status"], result["assessment"]["met"]) == ("stopped", True)
     assert not (begun / "signal.csv").exists()
     campaign = result["campaign"]
-    assert [entry["samples"] for entry in campaign["rounds"]] == [
-        0,
-        *np.cumsum([record["samples"] for record in campaign["records"]]).tolist(),
-    ]
+    samples = np.cumsum([0, *(record["samples"] for record in campaign["records"])])
+    assert [entry["samples"] for entry in campaign["rounds"]] == samples.tolist()
     # Every plan, record and estimate stays, and the times of the plans follow each other.
     for number in range(1, len(campaign["records"]) + 1):
         names = ("plan_{}.csv", "record_{}.csv", "record_{}_as_given.csv", "model_{}.yaml")
@@ -42,89 +71,88 @@ def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_pa
         assert entry["plan"]["cost"] == pytest.approx(objective["value"])
         assert 0.0 < objective["lower_bound"] <= objective["value"] * (1 + 1e-9)
         assert objective["relative_gap"] <= 1e-7
-    estimate = campaign["rounds"][-1]["estimate"]
-    spread = campaign["rounds"][-1]["standard_deviation"]
-    assert abs(estimate["b1"] - 3.5) < 4 * spread["b1"]
-    assert abs(estimate["f1"] + 0.72) < 4 * spread["f1"]
-    code, _, err = run("next", "c", tmp_path / "r1.csv")
-    assert code == 2
-    assert "campaign-over" in err
+    last = campaign["rounds"][-1]
+    for name, true in (("b1", 3.5), ("f1", -0.72)):
+        assert abs(last["estimate"][name] - true) < 4 * last["standard_deviation"][name]
+    code, _, err = taken(tmp_path / "r1.csv")
+    assert (code, "campaign-over" in err) == (2, True)
     code, out, _ = run("status", "c")
-    assert code == 0
-    assert "the data meet what is asked" in out
+    assert (code, "the data meet what is asked" in out) == (0, True)
 
 
-def test_the_power_that_is_told_is_that_of_the_signal(run, begun):
-    """Not that of the whole plan, of which the part is the beginning."""
-    part = np.loadtxt(begun / "signal.csv", delimiter=",", skiprows=1)
-    code, out, _ = run("status", "c")
-    assert code == 0
-    assert f"apply {len(part)} samples of power {np.mean(part[:, 1] ** 2):.4g} (signal.csv" in out
-    plan = read_run(begun)["campaign"]["rounds"][-1]["plan"]
-    assert f"planned with {plan['power']:.4g}" in out
-
-
-def test_a_withdrawn_record_does_not_count_and_stays(run, begun, tmp_path):
-    for number in (1, 2):
-        run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--no-figures")
-    before = read_run(begun)["campaign"]
-    code, out, _ = run("next", "c", "--withdraw", 2, "--json", "--no-figures")
-    result = json.loads(out)
+def test_a_withdrawn_record_does_not_count_and_stays(taken, once, tmp_path):
+    """That of another plant, which left the campaign undecided."""
+    other = applied(once, tmp_path / "b.csv", gain=-2.0, poles=(-0.5,))
+    code, result, _ = taken(other)
+    assert (code, result["status"]) == (5, "undecided")
+    before = result["campaign"]
+    code, result, _ = taken("--withdraw", 2)
     after, (gone,) = result["campaign"], found(result, "record-withdrawn")
     assert (code, gone["where"], gone["figures"]) == (0, "record_02.csv", {"record": 2})
     assert after["rounds"][-1]["records"] == [1]
     # It was applied: its samples and its energy are spent.
     assert after["rounds"][-1]["samples"] == before["rounds"][-1]["samples"]
     assert after["rounds"][-1]["estimate"] == pytest.approx(before["rounds"][1]["estimate"], rel=1e-6)
-    assert (begun / "record_02.csv").is_file()
-    code, _, err = run("next", "c", "--withdraw", 2)
-    assert code == 2
-    assert "record-unknown" in err
+    assert (once / "record_02.csv").is_file()
+    code, _, err = taken("--withdraw", 2)
+    assert (code, "record-unknown" in err) == (2, True)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("scale", [0.5, 2.0, -1.0])
-def test_a_record_at_another_scale_is_refused(run, begun, tmp_path, scale):
+def test_a_record_at_another_scale_is_refused(begun, taken, tmp_path, scale):
     record = applied(begun, tmp_path / "r.csv", scale=scale)
-    code, _, err = run("next", "c", record)
-    assert code == 2
-    assert "record-other-scale" in err
-    assert f"{scale:g} times" in err
-    code, out, _ = run("next", "c", record, "--as-applied", "--no-figures", "--json")
-    (scaled,) = found(json.loads(out), "record-scaled")
+    code, _, err = taken(record)
+    assert (code, "record-other-scale" in err, f"{scale:g} times" in err) == (2, True, True)
+    code, result, _ = taken(record, "--as-applied")
+    (scaled,) = found(result, "record-scaled")
     assert (code, scaled["figures"]["scale"]) == (0, pytest.approx(scale, rel=1e-6))
 
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("missing", [0, 4])
-def test_a_record_of_an_earlier_plan_is_refused(run, once, tmp_path, missing):
+def test_a_record_of_an_earlier_plan_is_refused(once, taken, tmp_path, missing):
     """The input of the pilot, applied again with other noise, where the second plan is due."""
     times, u = np.loadtxt(once / "plan_01.csv", delimiter=",", skiprows=1).T[:, missing:]
     record = written(tmp_path / "again.csv", times, u, answered(u, seed=11))
-    code, _, err = run("next", "c", record)
-    assert code == 2
-    assert "record-other-part" in err
-    code, out, _ = run("next", "c", record, "--as-applied", "--no-figures", "--json")
-    assert code == 0
-    (repeated,) = found(json.loads(out), "part-repeated")
-    assert repeated["where"] == "again.csv"
-    assert (repeated["figures"]["plan"], repeated["figures"]["other"]) == ("plan_02.csv", "plan_01.csv")
+    code, _, err = taken(record)
+    assert (code, "record-other-part" in err) == (2, True)
+    code, result, _ = taken(record, "--as-applied")
+    (repeated,) = found(result, "part-repeated")
+    plans = repeated["figures"]["plan"], repeated["figures"]["other"]
+    assert (code, repeated["where"], plans) == (0, "again.csv", ("plan_02.csv", "plan_01.csv"))
     # What is due is never taken for something else, with rows missing or not.
-    assert run("next", "c", applied(once, tmp_path / "r3.csv"), "--no-figures")[0] == 0
+    assert taken(applied(once, tmp_path / "r3.csv"))[0] == 0
 
 
-def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_path):
-    before = (begun / "result.json").read_bytes()
-    n = len(planned(begun)) + 1
-    long = written(tmp_path / "long.csv", np.arange(n), np.ones(n), np.arange(n) ** 0.5)
+def test_what_does_not_belong_is_refused_and_changes_nothing(run, once, taken, tmp_path):
+    """Too long, no file, no record, given before, mixed up; and other commands in the directory."""
+    before, times = kept(once), np.arange(200)
+    long = written(tmp_path / "long.csv", times, np.ones(200), times**0.5)
+    record = applied(once, tmp_path / "r2.csv")
+    head, *lines = [row.split(",") for row in record.read_text().splitlines()]
+    mixed = [[a[0], b[1], *a[2:]] for a, b in zip(lines, lines[::-1], strict=True)]
+    record.write_text("\n".join(",".join(row) for row in [head, *mixed]) + "\n")
     for arguments, error in [
         ((long,), "record-too-long"),
         ((tmp_path / "none.csv",), "data-unreadable"),
-        (("--withdraw", 1), "record-unknown"),
+        (("--withdraw", 2), "record-unknown"),
+        ((once / "record_01.csv",), "data-repeated"),
+        ((record,), "record-unlike"),
     ]:
-        code, _, err = run("next", "c", *arguments)
-        assert code == 2
-        assert error in err
-    assert (begun / "result.json").read_bytes() == before
+        code, _, err = taken(*arguments)
+        assert (code, error in err) == (2, True), error
+    for verb in ("solve", "campaign"):
+        code, _, err = run(verb, "s.yaml", "-o", "c")
+        assert (code, "campaign-exists" in err) == (2, True)
+    with held(once):
+        code, _, err = taken(record)
+        assert (code, "output-busy" in err) == (2, True)
+    assert kept(once) == before
+    result = taken(record, "--as-applied")[1]
+    (unlike,), last = found(result, "record-unlike-plan"), result["campaign"]["records"][-1]
+    assert (unlike["where"], unlike["figures"]["plan"]) == ("r2.csv", "plan_02.csv")
+    assert unlike["figures"]["correlation"] == last["likeness"] < 0.5
 
 
 def without_a_value(rows):
@@ -132,92 +160,34 @@ def without_a_value(rows):
 
 
 @pytest.mark.parametrize("mend", [without_a_value, lambda rows: rows[5:]])
-def test_rows_that_are_missing_leave_the_others_where_they_are(run, begun, tmp_path, mend):
-    """So many count as were applied, whether the record begins late or has a gap."""
+def test_rows_that_are_missing_leave_the_others_where_they_are(begun, taken, tmp_path, mend):
+    """The applied samples count, whether the record begins late or has a gap."""
     record = applied(begun, tmp_path / "r1.csv")
     head, *rows = record.read_text().splitlines()
     record.write_text("\n".join([head, *mend(rows)]) + "\n")
-    code, out, _ = run("next", "c", record, "--json", "--no-figures")
-    (kept,) = json.loads(out)["campaign"]["records"]
-    assert (code, kept["samples"]) == (0, len(rows))
-    assert kept["likeness"] == pytest.approx(1.0, abs=1e-6)
-
-
-def test_a_record_that_is_not_its_plan_is_refused(run, begun, tmp_path):
-    record = applied(begun, tmp_path / "r1.csv")
-    head, *rows = [row.split(",") for row in record.read_text().splitlines()]
-    mixed = [[a[0], b[1], *a[2:]] for a, b in zip(rows, rows[::-1], strict=True)]
-    record.write_text("\n".join(",".join(row) for row in [head, *mixed]) + "\n")
-    before = (begun / "result.json").read_bytes()
-    code, _, err = run("next", "c", record, "--no-figures")
-    assert code == 2
-    assert "record-unlike" in err
-    assert (begun / "result.json").read_bytes() == before
-    result = json.loads(run("next", "c", record, "--json", "--no-figures", "--as-applied")[1])
-    assert abs(result["campaign"]["records"][0]["likeness"]) < 0.5
-    (unlike,) = found(result, "record-unlike-plan")
-    assert (unlike["where"], unlike["figures"]["plan"]) == ("r1.csv", "plan_01.csv")
-    assert unlike["figures"]["correlation"] == result["campaign"]["records"][0]["likeness"]
-
-
-def test_moves_between_parts_keep_the_limit(run, begun, tmp_path):
-    limits = ["--set", "limits.rate=1.2", "--set", "signal.offset=40", "--set", "limits.amplitude=2.5"]
-    assert run("campaign", "s.yaml", "-o", "d", "--no-figures", *limits)[0] == 0
-    for number in (1, 2):
-        record = applied(tmp_path / "d", tmp_path / f"d{number}.csv")
-        assert run("next", "d", record, "--no-figures")[0] == 0
-    u = planned(tmp_path / "d")[:, 1] - 40.0
-    assert np.abs(np.diff(u, prepend=0.0)).max() <= 1.2 * (1 + 1e-9)
-    assert np.abs(u).max() <= 2.5 * (1 + 1e-9)
-
-
-def test_the_same_record_does_not_count_twice(run, begun, tmp_path):
-    record = applied(begun, tmp_path / "r.csv")
-    assert run("next", "c", record, "--no-figures")[0] == 0
-    code, _, err = run("next", "c", record)
-    assert code == 2
-    assert "data-repeated" in err
-
-
-def test_records_are_not_lost_to_another_run(run, once, tmp_path):
-    for verb in ("solve", "campaign"):
-        code, _, err = run(verb, "s.yaml", "-o", "c")
-        assert code == 2
-        assert "campaign-exists" in err
-    assert (once / "record_01.csv").is_file()
+    code, result, _ = taken(record)
+    (one,) = result["campaign"]["records"]
+    assert (code, one["samples"], one["likeness"]) == (0, len(rows), pytest.approx(1.0, abs=1e-6))
 
 
 def test_directories_of_another_kind_and_version_are_refused(run, begun):
     content = json.loads((begun / "result.json").read_text())
-    content["campaign"]["version"] = 7
-    (begun / "result.json").write_text(json.dumps(content))
-    assert "campaign-version" in run("next", "c")[2]
-    content["campaign"] |= {"version": 1, "rounds": [{}]}
-    (begun / "result.json").write_text(json.dumps(content))
-    told = run("next", "c")[2]
-    assert "run-unreadable" in told
-    assert "from a copy" in told  # to run the spec again, as after `solve`, would lose the records
-    del content["campaign"]
-    (begun / "result.json").write_text(json.dumps(content))
-    assert "campaign-missing" in run("next", "c")[2]
+    for change, error, advice in [
+        ({"version": 7}, "campaign-version", ""),
+        # To run the spec again, as after `solve`, would lose the records.
+        ({"version": 1, "rounds": [{}]}, "run-unreadable", "from a copy"),
+        (None, "campaign-missing", ""),
+    ]:
+        content["campaign"] = None if change is None else content["campaign"] | change
+        (begun / "result.json").write_text(json.dumps(content))
+        told = run("next", "c")[2]
+        assert (error in told, advice in told) == (True, True)
     told = run("status", "nowhere")[2]
-    assert "run-missing" in told
-    assert "idesign campaign SPEC" in told
-
-
-def test_data_of_another_plant_are_undecided(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "a.csv"), "--no-figures")[0] == 0
-    other = applied(begun, tmp_path / "b.csv", gain=-2.0, poles=(-0.5,))
-    code, out, _ = run("next", "c", other, "--json", "--no-figures")
-    assert code == 5
-    assert json.loads(out)["status"] == "undecided"
-    # Without it the campaign goes on.
-    assert run("next", "c", "--withdraw", 2, "--no-figures")[0] == 0
+    assert ("run-missing" in told, "idesign campaign SPEC" in told) == (True, True)
 
 
 def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
     record = applied(begun, tmp_path / "r.csv")
-    counted = set()
     for step in (1, 40, 400, 1200, 2000, 3000):
         child = os.fork()
         if child == 0:
@@ -238,7 +208,6 @@ def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
         campaign = read_run(begun)["campaign"]
         assert len(campaign["records"]) in (0, 1)
         assert len(campaign["rounds"]) == len(campaign["records"]) + 1
-        counted.add(len(campaign["records"]))
         if campaign["records"]:
             break
     assert run("status", "c")[0] == 0
@@ -246,71 +215,100 @@ def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("gain", "sign"), [(2.0, False), (-2.0, True)])
-def test_a_poor_plant_of_the_spec_is_told_once(run, begun, tmp_path, gain, sign):
+def test_a_poor_plant_of_the_spec_is_told_once(begun, taken, tmp_path, gain, sign):
     """It is why an experiment goes in parts; the plans after the first one rest on estimates."""
     told = []
     for number in (1, 2):
-        record = applied(begun, tmp_path / f"r{number}.csv", gain=gain)
-        out = run("next", "c", record, "--json", "--no-figures")[1]
-        result = json.loads(out)
+        result = taken(applied(begun, tmp_path / f"r{number}.csv", gain=gain))[1]
         assert result["assessment"]["nominal"]["deviations"] > 5.0
         told.append([note for note in result.get("notes", []) if "plant of the spec" in note])
     ((note,), later) = told
-    assert "standard deviations" in note
-    assert ("opposite sign" in note) == sign
+    assert ("standard deviations" in note, "opposite sign" in note, later) == (True, sign, [])
     assert len(note) < 200
-    assert later == []
 
 
-def test_one_process_decides_at_a_time(run, begun, tmp_path):
-    record = applied(begun, tmp_path / "r.csv")
-    with held(begun):
-        code, _, err = run("next", "c", record, "--no-figures")
-        assert (code, "output-busy" in err) == (2, True)
-    assert run("next", "c", record, "--no-figures")[0] == 0
+def test_moves_between_parts_keep_the_limit(begin, run, tmp_path):
+    directory, _, _ = begin("d", "limits.rate=1.2", "signal.offset=40", "limits.amplitude=2.5")
+    assert run("next", "d", applied(directory, tmp_path / "d1.csv"), "--no-figures")[0] == 0
+    u = planned(directory)[:, 1] - 40.0
+    assert np.abs(np.diff(u, prepend=0.0)).max() <= 1.2 * (1 + 1e-9)
+    assert np.abs(u).max() <= 2.5 * (1 + 1e-9)
 
 
-def begin(run, tmp_path, name, *overrides):
-    told = [part for one in overrides for part in ("--set", one)]
-    code, _, err = run("campaign", "s.yaml", "-o", name, "--no-figures", *told)
-    return tmp_path / name, code, err
-
-
-def test_every_part_has_a_record_by_the_seed_of_the_spec(run, tmp_path):
+def test_every_part_has_a_record_by_the_seed_of_the_spec(begin, run, tmp_path):
     """The same again by the same seed, and another by another."""
-    plans = {}
-    for name, seed in {"none": None, "0": 0, "6": 6, "again": 6}.items():
-        overrides = [] if seed is None else [f"signal.seed={seed}"]
-        directory, code, _ = begin(run, tmp_path, name, *overrides)
-        assert code == 0
-        if seed:
-            assert run("next", name, applied(directory, tmp_path / "r.csv"), "--no-figures")[0] == 0
-            seeds = [entry["plan"]["seed"] for entry in read_run(directory)["campaign"]["rounds"]]
-            assert len(set(seeds)) == len(seeds) == 2
-        plans[name] = planned(directory)
+    seeds = {"none": (), "0": ("signal.seed=0",), "6": ("signal.seed=6",), "again": ("signal.seed=6",)}
+    plans = {name: planned(begin(name, *own)[0]) for name, own in seeds.items()}
     assert np.array_equal(plans["none"], plans["0"])  # as everywhere, none is 0
-    assert not np.array_equal(plans["none"], plans["6"][: len(plans["none"])])
+    assert not np.array_equal(plans["none"], plans["6"])
     assert np.array_equal(plans["6"], plans["again"])
+    assert run("next", "6", applied(tmp_path / "6", tmp_path / "r.csv"), "--no-figures")[0] == 0
+    first, second = (one["plan"]["seed"] for one in read_run(tmp_path / "6")["campaign"]["rounds"])
+    assert first != second
 
 
-def test_parts_have_values_of_the_converter_only(run, tmp_path):
+def test_parts_have_values_of_the_converter_only(begin):
     """2^6 values over 20, so 0.3125 apart; the offset lies between two of them."""
-    converter = "signal.quantisation={bits: 6, range: 10}"
-    directory, code, _ = begin(run, tmp_path, "c", converter, "signal.offset=0.4")
-    assert code == 0
+    overrides = ["signal.quantisation={bits: 6, range: 10}", "signal.offset=0.4"]
+    directory, _, _ = begin("c", *overrides)
     steps = planned(directory)[:, 1] / (20.0 / 2**6)
     assert np.allclose(steps, np.rint(steps), atol=1e-9)
     (round_,) = read_run(directory)["campaign"]["rounds"]
     assert round_["plan"]["offset"] == [0.3125]  # 0.4 is nearer to it than to 0.625
     # Records vary about the same value.
-    spec = parse_spec(SPEC, overrides=[converter, "signal.offset=0.4"])
-    assert build_identification(spec).operating_point == {"u1": 0.3125}
+    assert build_identification(parse_spec(SPEC, overrides=overrides)).operating_point == {"u1": 0.3125}
 
 
-@pytest.mark.parametrize("asked", ["signal.samples=50", "signal.also=[mat]"])
-def test_what_no_part_has_is_refused(run, tmp_path, asked):
-    directory, code, err = begin(run, tmp_path, "c", asked)
-    assert code == 2
-    assert "not-supported" in err
-    assert asked.split("=")[0] in err
+@pytest.mark.parametrize(
+    ("asked", "code"),
+    [
+        (["signal.samples=50"], "not-supported"),
+        (["signal.also=[mat]"], "not-supported"),
+        (["signal.least_move=1", "limits.rate=2"], "not-supported"),
+        (["signal.least_move=1", "limits.amplitude={output: 2}"], "not-supported"),
+        (["signal.least_move=3", "limits.amplitude=2"], "conflicting-keys"),
+    ],
+)
+def test_what_no_part_has_is_refused(begin, asked, code):
+    directory, exit_code, err = begin("c", *asked)
+    assert (exit_code, code in err, asked[0].split("=")[0] in err) == (2, True, True)
     assert not directory.exists()
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize(("hold", "least"), [(7, 0.3), (1, 0.4), (4, None), ("auto", 0.2)])
+def test_moves_of_parts_are_large_and_dwell(begin, run, tmp_path, hold, least):
+    """From part to part, too."""
+    shortest = {"auto": 1}.get(hold, hold)
+    own = [f"signal.hold={hold}"] + ([] if least is None else [f"signal.least_move={least}"])
+    directory, code, err = begin("c", "campaign.block=30", "campaign.pilot=30", "signal.offset=3", *own)
+    assert code == 0, err
+    assert run("next", "c", applied(directory, tmp_path / "r.csv"), "--no-figures")[0] == 0
+    moves = np.diff(planned(directory)[:, 1], prepend=3.0)
+    assert np.abs(moves[moves != 0.0]).min() >= (least or 0.0) * (1 - 1e-9)
+    assert np.all(np.flatnonzero(moves) % shortest == 0)
+    plans = [entry["plan"] for entry in read_run(directory)["campaign"]["rounds"]]
+    assert [plan["samples"] % shortest for plan in plans] == [0, 0]
+
+
+@pytest.mark.parametrize("least", [0.1, 1.0, 2.5])
+def test_a_part_of_larger_moves_has_its_power(least):
+    """Though its plan moves by less; only a limit keeps it weaker."""
+    record = np.random.default_rng(1).standard_normal((80, 2)) * [1.0, 0.5]
+    start, reach = np.array([0.0, 2.0]), np.array([6.0, 3.0])
+    moved = usefully_moved(record, start, np.array([least, 0.5 * least]), reach)
+    moves = np.abs(np.diff(moved, axis=0, prepend=start[None]))
+    assert np.all((moves == 0.0) | (moves >= [least, 0.5 * least]))
+    assert np.mean(moved**2) >= 0.95 * np.mean(record**2)
+    assert np.all(np.abs(moved).max(axis=0) <= reach)
+    low = usefully_moved(
+        0.1 * record, 0.0 * start, np.array([least, least]), 0.15 * np.abs(record).max(axis=0)
+    )
+    assert np.abs(low).max() <= 0.15 * np.abs(record).max()
+
+
+def test_a_least_move_is_for_campaigns(run):
+    """One record in one shot does not keep it."""
+    for alone in ([], ["--set", "campaign=null"]):
+        code, _, err = run("solve", "s.yaml", "--set", "signal.least_move=1", *alone)
+        assert (code, "not-supported" in err, "signal.least_move" in err) == (2, True, True)
