@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error.closed_form import adjoint
-from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
-from inputdesign_cli.design.loop_error.laws import complement
+from inputdesign_cli.design.loop_error.laws import DesiredLoop, complement
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.identification.polynomial_rows import estimated_polynomials, least_squares

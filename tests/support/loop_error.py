@@ -53,15 +53,6 @@ def random_hermitian(rng, K, n):
     return X @ np.conj(np.swapaxes(X, 1, 2)) + 0.1 * np.eye(n)
 
 
-def jacobian(law, G, w):
-    """d vec C / d vec G of C = G^-1 X."""
-    return -kronecker(np.swapaxes(law.controller(G, w), 1, 2), np.linalg.inv(G))
-
-
-def kronecker(left, right):
-    return np.array([np.kron(a, b) for a, b in zip(left, right, strict=True)])
-
-
 def adjoint(X):
     return np.conj(np.swapaxes(X, -1, -2))
 

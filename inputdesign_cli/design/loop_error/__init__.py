@@ -15,9 +15,6 @@ from inputdesign_cli.design.loop_error.limits import (
     LimitedDesign as LimitedDesign,
     design_within as design_within,
 )
-from inputdesign_cli.design.loop_error.parametric import (
-    LineDesign as LineDesign,
-    ParametricCriterion as ParametricCriterion,
-)
+from inputdesign_cli.design.loop_error.parametric import ParametricCriterion as ParametricCriterion
 from inputdesign_cli.design.loop_error.plant import MatrixPlant as MatrixPlant
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem as LoopErrorProblem

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.loop_error.laws import kronecker
+from inputdesign_cli.design.loop_error.laws import sensitivity
 
 
 def eigen(matrix: ComplexArray) -> tuple[Array, ComplexArray]:
@@ -47,22 +47,16 @@ def adjoint(matrix: ComplexArray) -> ComplexArray:
     return np.conj(np.swapaxes(matrix, -1, -2))
 
 
-def weight(propagation: ComplexArray, entering: ComplexArray, noise: ComplexArray) -> ComplexArray:
-    """Return the weight Z of the variance of the plant estimate at a frequency in the error of the loop.
+def weight(T: ComplexArray, G: ComplexArray, entering: ComplexArray, noise: ComplexArray) -> ComplexArray:
+    """Return the weight Z (K, n, n) of the variance of the plant estimate in the error of a loop T at G.
 
-    [rojas-asymptotic] (13), (17) and (19) without the factor n/(2 pi N): for n = 1, N E||y - y0||^2 is the
-    mean over frequency of tr(Z Phi^-T). Z (K, n, n) follows from d vec(S G Delta C S) / d vec G (K, n^2,
-    n^2), see `laws.propagation`.
-
-    The middle factor of (13) is split as (S^T (x) S G)^* (Phi^* (x) I) (S^T (x) S G), which squares no
-    condition numbers.
+    [rojas-asymptotic] (19) without the factor n/(2 pi N): for n = 1, N E||y - y0||^2 is the mean over
+    frequency of tr(Z Phi^-T). C S = G^-1 T is finite where S has a zero and C a pole.
 
     Args:
         entering: Phi_r + Phi_v, what drives the error of the loop.
         noise: Phi_v.
     """
-    n = entering.shape[1]
-    middle = kronecker(np.conj(entering), np.broadcast_to(np.eye(n, dtype=complex), entering.shape))
-    F = adjoint(propagation) @ middle @ propagation
-    # (17): Z_kl = tr(F_kl Phi_v), F_kl the blocks of F.
-    return np.asarray(np.einsum("kaibj,kji->kab", F.reshape(-1, n, n, n, n), noise))
+    S, CS = sensitivity(T), np.linalg.inv(G) @ T
+    passed = np.trace(S @ noise @ adjoint(S), axis1=1, axis2=2).real
+    return np.asarray(passed[:, None, None] * np.conj(CS @ entering @ adjoint(CS)))

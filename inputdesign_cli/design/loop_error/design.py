@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import time_is_over
+from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.loop_error.closed_form import adjoint, error_of
-from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
+from inputdesign_cli.design.loop_error.parametric import ParametricCriterion, WeightedCovariance
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.errors import InaccurateError, bad_spec
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.information.quadrature import Quadrature
+from inputdesign_cli.spectrum import LinesBasis
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
@@ -21,6 +26,8 @@ _ALMOST = 100.0
 _SINGULAR = 1e-13
 # Means over frequency that halving the panels moves by more than this are not trusted.
 _UNSETTLED = 1e-8
+# Beyond what is asked: the bound is compared with a value that is computed anew.
+_MARGIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -47,12 +54,11 @@ class LoopErrorDesign:
         spectrum: (K, n, n) density there, or power matrices of the lines.
         weights: (K,) with which a sum over them is a mean over frequency; one for lines.
         value, lower_bound: N E||y - y0||^2 of the requested covariance, J_o included.
+        rule: of means over the band.
+        steps: of the dual, or rounds of the exchange.
         noise_part: J_o, which no input changes.
-        information: (k, k) for one sample.
-        powers: (p,) mean tr(M_i Phi) of the limits.
         multipliers: (p,) of the limits, which give the density at any frequency; None for lines.
         scale: that brings this density into the limits.
-        rule: of means over the band.
         settled: relative change of the mean over frequency on halving the panels.
     """
 
@@ -63,15 +69,12 @@ class LoopErrorDesign:
     weights: Array
     value: float
     lower_bound: float
-    noise_part: float
-    information: Array
-    powers: Array
-    multipliers: Array | None
-    scale: float
-    white: WhiteInput
     rule: Quadrature
     steps: int
-    settled: float
+    noise_part: float = 0.0
+    multipliers: Array | None = None
+    scale: float = 1.0
+    settled: float = 0.0
 
     @property
     def of_lines(self) -> bool:
@@ -93,6 +96,29 @@ class LoopErrorDesign:
         lo, hi = self.problem.band
         inside = ((w >= lo) & (w <= hi))[:, None, None]
         return np.where(inside, flat(self.white.level, w.size, self.problem.plant.inputs), 0.0)
+
+    @cached_property
+    def information(self) -> Array:
+        """Return the information matrix (k, k) for one sample."""
+        return self.criterion.information(self.frequencies, self.spectrum, self.weights)
+
+    @cached_property
+    def powers(self) -> Array:
+        """Return the mean tr(M_i Phi) (p,) of the limits."""
+        metrics = self.problem.metrics(self.frequencies)
+        return np.asarray(np.einsum("pkab,kba,k->p", metrics, self.spectrum, self.weights).real)
+
+    @cached_property
+    def white(self) -> WhiteInput:
+        """Return white noise of the same total power."""
+        rule, inputs = self.rule, self.problem.plant.inputs
+        level = float(np.trace(self.input_covariance)) / (inputs * float(rule.weights.sum()))
+        density = flat(level, rule.nodes.size, inputs)
+        information = self.criterion.information(rule.nodes, density, rule.weights)
+        if self.of_lines:
+            return WhiteInput(level, self.criterion.value(information), information)
+        error = float(error_of(self.problem.target(rule.nodes), density) @ rule.weights)
+        return WhiteInput(level, error + self.noise_part, information)
 
     @property
     def input_covariance(self) -> Array:
@@ -118,9 +144,16 @@ def design_loop_error(
     Raises:
         SpecError: `not-identifiable`.
         InaccurateError: `gap-not-closed` or `integral-inaccurate`.
+        OutOfTimeError: not even a first design was found in time.
     """
-    criterion = problem.parametric()
-    _check_identifiable(problem, criterion)
+    criterion, rule = problem.parametric(), problem.rule(1)
+    # White input must identify all parameters, in coordinates where each alone has information one.
+    M = criterion.information(rule.nodes, flat(1.0, rule.nodes.size, problem.plant.inputs), rule.weights)
+    size = np.sqrt(np.diag(M))
+    if np.any(size == 0) or np.linalg.eigvalsh(M / np.outer(size, size))[0] < _SINGULAR:
+        message = "white input leaves some parameters of the model indistinguishable"
+        hint = "lower an order, or cancel the common factor of two polynomials"
+        raise bad_spec("not-identifiable", message, hint=hint, key="plant")
     if covariance == "parametric":
         found = _parametric(problem, criterion, tolerance)
     else:
@@ -141,24 +174,6 @@ def flat(level: float, frequencies: int, inputs: int) -> ComplexArray:
     return np.broadcast_to(level * np.eye(inputs, dtype=complex), (frequencies, inputs, inputs))
 
 
-def _check_identifiable(problem: LoopErrorProblem, criterion: ParametricCriterion) -> None:
-    """Raise `SpecError` (`not-identifiable`) unless white input identifies all parameters.
-
-    The matrix is judged in coordinates where each parameter alone has information one.
-    """
-    rule = problem.rule(1)
-    white = flat(1.0, rule.nodes.size, problem.plant.inputs)
-    M = criterion.information(rule.nodes, white, rule.weights)
-    size = np.sqrt(np.diag(M))
-    if np.any(size == 0) or np.linalg.eigvalsh(M / np.outer(size, size))[0] < _SINGULAR:
-        raise bad_spec(
-            "not-identifiable",
-            "white input leaves some parameters of the model indistinguishable",
-            hint="lower an order, or cancel the common factor of two polynomials",
-            key="plant",
-        )
-
-
 def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> LoopErrorDesign:
     design, rule, settled = problem.asymptotic()
     if settled > _UNSETTLED:
@@ -169,30 +184,21 @@ def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> Lo
             key="plant",
         )
     part = problem.model_of_noise_part()
-    total = float(np.trace(design.spectrum, axis1=1, axis2=2).real @ rule.weights)
-    level, white = _white(problem, total, rule)
     # The nodes carry the spectrum already scaled into its limits; the same factor serves elsewhere.
     bare = problem.spectrum_at(rule.nodes[:1], design.multipliers)
     return LoopErrorDesign(
-        problem=problem,
-        criterion=criterion,
-        frequencies=rule.nodes,
-        spectrum=design.spectrum,
-        weights=rule.weights,
-        value=design.value + part,
-        lower_bound=min(design.lower_bound, design.value) + part,
+        problem,
+        criterion,
+        rule.nodes,
+        design.spectrum,
+        rule.weights,
+        design.value + part,
+        min(design.lower_bound, design.value) + part,
+        rule,
+        design.steps,
         noise_part=part,
-        information=criterion.information(rule.nodes, design.spectrum, rule.weights),
-        powers=design.powers,
         multipliers=design.multipliers,
         scale=float(np.trace(design.spectrum[0]).real / np.trace(bare[0]).real),
-        white=WhiteInput(
-            level,
-            float(error_of(problem.target(rule.nodes), white) @ rule.weights) + part,
-            criterion.information(rule.nodes, white, rule.weights),
-        ),
-        rule=rule,
-        steps=design.steps,
         settled=settled,
     )
 
@@ -200,32 +206,21 @@ def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> Lo
 def _parametric(
     problem: LoopErrorProblem, criterion: ParametricCriterion, tolerance: float
 ) -> LoopErrorDesign:
-    lines = problem.best_lines(criterion, tolerance=tolerance)
-    rule = problem.rule(1)
-    level, white = _white(problem, float(np.einsum("kaa->", lines.spectrum).real), rule)
-    information = criterion.information(rule.nodes, white, rule.weights)
-    return LoopErrorDesign(
-        problem=problem,
-        criterion=criterion,
-        frequencies=lines.frequencies,
-        spectrum=lines.spectrum,
-        weights=np.ones(lines.frequencies.size),
-        value=lines.value,
-        lower_bound=lines.lower_bound,
-        noise_part=0.0,
-        information=lines.information,
-        powers=np.einsum("pkab,kba->p", problem.metrics(lines.frequencies), lines.spectrum).real,
-        multipliers=None,
-        scale=1.0,
-        white=WhiteInput(level, criterion.value(information), information),
-        rule=rule,
-        steps=lines.rounds,
-        settled=0.0,
+    """Return the sinusoids of the least tr(W P), with a bound for every spectrum within the limits."""
+    experiment, root = Experiment(problem.structure, 1, problem.band), criterion.root
+    question = Question(
+        experiment=experiment,
+        basis=LinesBasis.anywhere(*experiment.band, experiment.inputs),
+        goal="factor",
+        requirements=[lambda coordinates: WeightedCovariance(coordinates.whiten_rows(root).T)],
+        limits=problem.limits,
     )
-
-
-def _white(problem: LoopErrorProblem, power: float, rule: Quadrature) -> tuple[float, ComplexArray]:
-    """Return the level, and the density (K, n, n) at the nodes, of white noise of this total power."""
-    inputs = problem.plant.inputs
-    level = power / (inputs * float(rule.weights.sum()))
-    return level, flat(level, rule.nodes.size, inputs)
+    try:
+        found = solve_design(question, tolerance=_MARGIN * tolerance).result
+    except UnfinishedDesignError as ended:
+        found = ended.design.result
+    frequencies, Phi = found.basis.lines(found.x)
+    weights = np.ones(frequencies.size)
+    value = criterion.value(criterion.information(frequencies, Phi, weights))
+    bound, rule = min(found.certificate.bound, value), problem.rule(1)
+    return LoopErrorDesign(problem, criterion, frequencies, Phi, weights, value, bound, rule, found.rounds)

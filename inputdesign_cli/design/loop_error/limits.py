@@ -18,7 +18,7 @@ _MAX_STEPS = 200
 _SETTLED = 1e-13
 # A multiplier may fall by this factor in one step: limits that do not bind fade out geometrically.
 _LEAST_SHARE = 0.02
-_SUFFICIENT = 1e-4
+_SUFFICIENT, _SHORTEST = 1e-4, 1e-10
 
 
 @dataclass(frozen=True)
@@ -55,109 +55,89 @@ def design_within(A: ComplexArray, metrics: ComplexArray, limits: Array, weights
         weights: (K,) of the mean over frequency.
     """
     scale = float(np.trace(A, axis1=1, axis2=2).real @ weights)
-    A = A / scale
     # In units of the limits every multiplier is of order one and the limits are one.
-    relative = metrics / limits[:, None, None, None]
-    p = limits.size
-    share = np.ones(p)
-    share *= _best_length(A, relative, share, weights)
-    best: tuple[float, Array, float, Array] | None = None
-    for step in range(1, _MAX_STEPS + 1):
-        point = _Point.at(A, relative, share, weights)
-        if best is None or point.gap < best[2]:
-            best = (point.bound, share, point.gap, point.powers)
-        if best[2] <= _SETTLED or step == _MAX_STEPS:
-            break
-        direction = _ascent(point, share)
-        length = 1.0
-        while length > 1e-10:
-            trial = np.maximum(share + length * direction, _LEAST_SHARE * share)
-            gain = float(point.gradient @ (trial - share))
-            if _dual(A, relative, trial, weights) >= point.dual + _SUFFICIENT * gain:
-                break
-            length *= 0.5
-        else:
-            break
-        if np.array_equal(trial, share):
-            break
-        share = trial
-    assert best is not None
-    share = best[1]
-    Phi = _Point.at(A, relative, share, weights).spectrum
-    powers = np.einsum("pkab,kba,k->p", relative, Phi, weights).real
-    Phi = Phi / powers.max()
-    multipliers = share * _best_length(A, relative, share, weights)
+    dual = _Dual(A / scale, metrics / limits[:, None, None, None], weights)
+    even = np.ones(limits.size)
+    best = point = dual.at(even * dual.at(even).length)
+    step = 1
+    while best.gap > _SETTLED and step < _MAX_STEPS and (higher := dual.ascended(point)) is not None:
+        point, step = higher, step + 1
+        best = min(best, point, key=lambda one: one.gap)
+    Phi, multipliers = best.spectrum / best.powers.max(), best.share * best.length
     return LimitedDesign(
         spectrum=Phi,
-        value=scale * float(error_of(A, Phi) @ weights),
-        lower_bound=scale * _dual(A, relative, multipliers, weights),
+        value=scale * float(error_of(dual.A, Phi) @ weights),
+        lower_bound=scale * dual.at(multipliers).value,
         multipliers=scale * multipliers / limits,
-        powers=powers / powers.max() * limits,
+        powers=best.powers / best.powers.max() * limits,
         steps=step,
     )
 
 
 @dataclass(frozen=True)
 class _Point:
-    """Holds the dual function, its derivatives and the primal it suggests, at one set of multipliers."""
+    """Holds the dual function, its derivatives and the spectrum it suggests, at multipliers `share` (p,).
 
+    It is greatest along these at `length` times them, where it bounds the spectrum within a relative gap.
+    """
+
+    share: Array
     spectrum: ComplexArray
     powers: Array
-    dual: float
-    gradient: Array
+    value: float
     hessian: Array
     gap: float
-    bound: float
+    length: float
 
-    @classmethod
-    def at(cls, A: ComplexArray, metrics: ComplexArray, share: Array, weights: Array) -> _Point:
-        M = np.einsum("p,pkab->kab", share, metrics)
+
+@dataclass(frozen=True)
+class _Dual:
+    A: ComplexArray
+    metrics: ComplexArray
+    weights: Array
+
+    def at(self, share: Array) -> _Point:
+        weights, p, total = self.weights, share.size, float(share.sum())
+        M = np.einsum("p,pkab->kab", share, self.metrics)
         outer, inner = power_of(M, 0.5), power_of(M, -0.5)
-        squared, vectors = eigen(outer @ A @ outer)
+        squared, vectors = eigen(outer @ self.A @ outer)
         root = np.sqrt(squared)
         frame = inner @ vectors
-        spectrum = (frame * root[:, None, :]) @ adjoint(frame)
         # In the eigenbasis of the root: U_ab = -y_a y_b / (y_a + y_b) D_ab for a change D of M.
-        turned = adjoint(frame) @ metrics @ frame
+        turned = adjoint(frame) @ self.metrics @ frame
         powers = np.einsum("pkaa,ka,k->p", turned, root, weights).real
-        total = root[:, :, None] + root[:, None, :]
-        coupling = np.where(total > 0, root[:, :, None] * root[:, None, :] / np.where(total > 0, total, 1), 0)
+        sums, products = root[:, :, None] + root[:, None, :], root[:, :, None] * root[:, None, :]
+        coupling = np.divide(products, sums, out=np.zeros_like(sums), where=sums > 0)
         scaled = turned * (coupling * weights[:, None, None])
-        p = share.size
-        hessian = -(scaled.reshape(p, -1) @ np.conj(turned.reshape(p, -1)).T).real
         half = float(root.sum(axis=1) @ weights)
-        dual = 2 * half - float(share.sum())
-        bound = half**2 / float(share.sum())
         # tr(A Phi^-1) = tr(M Phi) here, and shrinking Phi into its limits raises it by as much.
-        primal = half * float(powers.max())
-        return cls(
-            spectrum, powers, dual, powers - 1.0, hessian, (primal - bound) / max(primal, 1e-300), bound
+        primal, bound = half * float(powers.max()), half**2 / total
+        return _Point(
+            share,
+            (frame * root[:, None, :]) @ adjoint(frame),
+            powers,
+            2 * half - total,
+            -(scaled.reshape(p, -1) @ np.conj(turned.reshape(p, -1)).T).real,
+            (primal - bound) / max(primal, 1e-300),
+            (half / total) ** 2,
         )
 
-
-def _ascent(point: _Point, share: Array) -> Array:
-    """Return Newton's direction in the free variables, damped where the dual is nearly flat."""
-    fading = (share < 1e-8 * share.max()) & (point.gradient < 0)
-    free = ~fading
-    curvature = -point.hessian[np.ix_(free, free)]
-    size = share[free]
-    scaled = curvature * np.outer(size, size)
-    damping = 1e-13 * np.trace(scaled)
-    step = np.linalg.solve(scaled + damping * np.eye(size.size), point.gradient[free] * size)
-    direction = -share.copy()
-    direction[free] = size * step
-    return direction
-
-
-def _dual(A: ComplexArray, metrics: ComplexArray, share: Array, weights: Array) -> float:
-    M = np.einsum("p,pkab->kab", share, metrics)
-    outer = power_of(M, 0.5)
-    roots = np.sqrt(eigen(outer @ A @ outer)[0])
-    return float(2 * (roots.sum(axis=1) @ weights) - share.sum())
-
-
-def _best_length(A: ComplexArray, metrics: ComplexArray, share: Array, weights: Array) -> float:
-    """Return t that maximises the dual along t * share: 2 sqrt(t) a - t b is greatest at (a/b)^2."""
-    total = float(share.sum())
-    half = 0.5 * (_dual(A, metrics, share, weights) + total)
-    return (half / total) ** 2
+    def ascended(self, point: _Point) -> _Point | None:
+        """Return the point after a damped step of Newton's method; None where the dual rises no more."""
+        share, gradient = point.share, point.powers - 1.0
+        free = ~((share < 1e-8 * share.max()) & (gradient < 0))
+        size = share[free]
+        scaled = -point.hessian[np.ix_(free, free)] * np.outer(size, size)
+        damping = 1e-13 * np.trace(scaled)
+        direction = -share
+        direction[free] = size * np.linalg.solve(scaled + damping * np.eye(size.size), gradient[free] * size)
+        length = 1.0
+        while length > _SHORTEST:
+            trial = np.maximum(share + length * direction, _LEAST_SHARE * share)
+            if np.array_equal(trial, share):
+                return None
+            there = self.at(trial)
+            if there.value >= point.value + _SUFFICIENT * float(gradient @ (trial - share)):
+                return there
+            length *= 0.5
+        return None

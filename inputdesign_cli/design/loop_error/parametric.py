@@ -1,4 +1,4 @@
-"""The exact finite-order covariance in place of the asymptotic one: least tr(W P) over every spectrum.
+"""The exact finite-order covariance in place of the asymptotic one: the criterion tr(W P).
 
 [rojas-asymptotic] takes the covariance that holds as the model order grows; here it is that of the model
 structure, [ljung-1999] Section 9.4.
@@ -11,7 +11,7 @@ an information matrix that is affine in the input spectrum: a convex design like
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,15 +20,10 @@ from inputdesign_cli.accuracy import Cut, inverse_factor
 from inputdesign_cli.accuracy.cuts import VarianceCut
 from inputdesign_cli.accuracy.requirement import OneCondition
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.convex.demands import Question
-from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
-from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.spectrum import LinesBasis
 
 _HELD = 1e-14  # shares of W below this are rounding
-# Beyond what is asked: the bound is compared with a value that is computed anew.
-_MARGIN = 0.1
+_REACH = 90.0
+_STEP = 0.02
 
 
 @dataclass(frozen=True)
@@ -53,22 +48,17 @@ class ParametricCriterion:
         """Return the criterion tr(W M^-1)."""
         return float(np.trace(np.linalg.solve(information, self.W)))
 
-
-@dataclass(frozen=True)
-class LineDesign:
-    """Holds sinusoids: `spectrum` (J, n, n) are power matrices; Re of their sum is the covariance of u."""
-
-    frequencies: Array
-    spectrum: ComplexArray
-    value: float
-    lower_bound: float
-    information: Array
-    rounds: int
-
     @property
-    def gap(self) -> float:
-        """Return the relative gap (value - lower_bound) / value."""
-        return (self.value - self.lower_bound) / self.value
+    def root(self) -> Array:
+        """Return rows V^T (q, k) with W = V V^T."""
+        values, vectors = np.linalg.eigh(0.5 * (self.W + self.W.T))
+        held = values > _HELD * values[-1]
+        return (vectors[:, held] * np.sqrt(values[held])).T
+
+    def error_eigenvalues(self, information: Array) -> Array:
+        """Return eigenvalues (k,) of P^1/2 W P^1/2: the weights of the squared normal variables."""
+        root = np.linalg.cholesky(np.linalg.inv(information))
+        return np.asarray(np.maximum(np.linalg.eigvalsh(root.T @ self.W @ root), 0.0))
 
 
 @dataclass(frozen=True)
@@ -79,73 +69,16 @@ class WeightedCovariance(OneCondition):
 
     @property
     def name(self) -> str:
-        """Return the name `closed_loop_error`."""
+        """See `Requirement`."""
         return "closed_loop_error"
 
     def ratio(self, information: Array) -> float:
-        """Return the root of the trace."""
+        """Return the root of tr(V^T P V)."""
         return float(np.linalg.norm(inverse_factor(information) @ self.directions))
 
     def cut(self, frequency: float | None) -> Cut:
         """Return the requirement itself as a cut."""
         return VarianceCut(self.directions)
-
-
-def least_error(
-    criterion: ParametricCriterion, experiment: Experiment, limits: Sequence[PowerLimit], *, tolerance: float
-) -> LineDesign:
-    """Find the sinusoids of the least tr(W P), with a bound for every spectrum within the limits.
-
-    Args:
-        experiment: one sample of the model structure in open loop, within the band.
-        tolerance: relative gap at which to stop.
-
-    Raises:
-        OutOfTimeError: not even a first design was found in time.
-    """
-    values, vectors = np.linalg.eigh(0.5 * (criterion.W + criterion.W.T))
-    held = values > _HELD * values[-1]
-    root = (vectors[:, held] * np.sqrt(values[held])).T
-    question = Question(
-        experiment=experiment,
-        basis=LinesBasis.anywhere(*experiment.band, experiment.inputs),
-        goal="factor",
-        requirements=[lambda coordinates: WeightedCovariance(coordinates.whiten_rows(root).T)],
-        limits=limits,
-    )
-    try:
-        found = solve_design(question, tolerance=_MARGIN * tolerance).result
-    except UnfinishedDesignError as ended:
-        found = ended.design.result
-    frequencies, Phi = found.basis.lines(found.x)
-    M = criterion.information(frequencies, Phi, np.ones(frequencies.size))
-    value = criterion.value(M)
-    return LineDesign(frequencies, Phi, value, min(found.certificate.bound, value), M, found.rounds)
-
-
-_REACH = 90.0
-_STEP = 0.02
-
-
-@dataclass(frozen=True)
-class LossTheory:
-    """Holds N E||y - y0||^2 = `value`, and mean and standard deviation of its root over experiments."""
-
-    value: float
-    mean: float
-    sd: float
-
-
-def loss_theory(criterion: ParametricCriterion, information: Array) -> LossTheory:
-    """Return the theory for the model structure; `information` (k, k) is of one sample."""
-    covariance = np.asarray(np.linalg.inv(information))
-    return LossTheory(criterion.value(information), *root_moments(error_eigenvalues(criterion.W, covariance)))
-
-
-def error_eigenvalues(W: Array, covariance: Array) -> Array:
-    """Return eigenvalues of P^1/2 W P^1/2, nonnegative: the weights of the squared normal variables."""
-    root = np.linalg.cholesky(covariance)
-    return np.asarray(np.maximum(np.linalg.eigvalsh(root.T @ W @ root), 0.0))
 
 
 def root_moments(eigenvalues: Array) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,17 +10,11 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.loop_error.closed_form import (
-    adjoint,
-    best_spectrum,
-    power_of,
-    weight as weight_from,
-)
-from inputdesign_cli.design.loop_error.laws import ControlLaw, kronecker, propagation, sensitivity
+from inputdesign_cli.design.loop_error.closed_form import adjoint, best_spectrum, power_of, weight
+from inputdesign_cli.design.loop_error.laws import ControlLaw, sensitivity
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
-from inputdesign_cli.design.loop_error.parametric import LineDesign, ParametricCriterion, least_error
+from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
-from inputdesign_cli.information import Experiment
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Model
@@ -74,14 +67,11 @@ class LoopErrorProblem:
         reference = np.abs(self.reference_filter.at(w))[:, None, None] ** 2 * np.diag(self.reference_variance)
         return np.asarray(noise + reference)
 
-    def weight(self, w: ArrayLike) -> ComplexArray:
-        """Return the weight Z (K, n, n), [rojas-asymptotic] (17)."""
-        sent = propagation(self.law, self.plant.plant_at(w), w)
-        return weight_from(sent, self.entering(w), self.plant.disturbance_at(w))
-
     def target(self, w: ArrayLike) -> ComplexArray:
-        """Return Z^T, the weight of Phi^-1."""
-        return np.swapaxes(self.weight(w), 1, 2)
+        """Return Z^T (K, n, n), the weight of Phi^-1, [rojas-asymptotic] (19)."""
+        plant = self.plant
+        Z = weight(self.law.complementary(w), plant.plant_at(w), self.entering(w), plant.disturbance_at(w))
+        return np.swapaxes(Z, 1, 2)
 
     def metrics(self, w: ArrayLike) -> ComplexArray:
         """Return the weights M_i (p, K, n, n) of the limits."""
@@ -104,30 +94,26 @@ class LoopErrorProblem:
         lo, hi = self.band if band else (0.0, np.pi)
         return graded_quadrature(self.singularities, lo=lo, hi=hi, refine=refine)
 
-    def settled(self, compute: Callable[[Quadrature], float]) -> tuple[Quadrature, float]:
-        """Return the coarsest rule whose mean agrees with halved panels, and the relative change."""
-        rule = self.rule(0)
-        value, change = compute(rule), np.inf
-        for refine in range(1, _HALVINGS + 1):
-            finer = self.rule(refine)
-            again = compute(finer)
-            change = abs(again - value) / max(abs(again), 1e-300)
-            rule, value = finer, again
-            if change <= _SETTLED:
-                break
-        return rule, change
-
     def asymptotic(self) -> tuple[LimitedDesign, Quadrature, float]:
-        """Return the best spectrum at the nodes of a rule, the rule, and the relative change of its means."""
+        """Return the best spectrum at the nodes of a rule, the rule, and the relative change of its means.
+
+        The rule is the coarsest whose mean of an optimum agrees with halved panels.
+        """
 
         def total(rule: Quadrature) -> float:
             A = self.target(rule.nodes)
-            M = self._price(np.ones(len(self.limits)) / self.most, rule.nodes)
-            outer = power_of(M, 0.5)
+            outer = power_of(self._price(1.0 / (len(self.limits) * self.most), rule.nodes), 0.5)
             root = power_of(outer @ A @ outer, 0.5)
             return float(np.trace(root, axis1=1, axis2=2).real @ rule.weights)
 
-        rule, change = self.settled(total)
+        rule = self.rule(0)
+        value, change = total(rule), np.inf
+        for refine in range(1, _HALVINGS + 1):
+            rule = self.rule(refine)
+            before, value = value, total(rule)
+            change = abs(value - before) / max(abs(value), 1e-300)
+            if change <= _SETTLED:
+                break
         design = design_within(self.target(rule.nodes), self.metrics(rule.nodes), self.most, rule.weights)
         return design, rule, change
 
@@ -142,20 +128,18 @@ class LoopErrorProblem:
         return np.asarray(np.einsum("p,pkab->kab", multipliers, self.metrics(w)))
 
     def model_of_noise_part(self) -> float:
-        """Return J_o, the error due to the noise model, whatever the input (zero if C ignores H)."""
+        """Return J_o, the error due to the noise model, whatever the input (zero if C ignores H).
+
+        The variance of vec Delta H is Lambda^-T (x) Phi_v.
+        """
         rule = self.rule(1, band=False)
-        w, n = rule.nodes, self.plant.outputs
-        G = self.plant.plant_at(w)
-        J = self.law.noise_jacobian(G, w)
-        if J is None:
+        w, Y = rule.nodes, self.law.by_noise(rule.nodes)
+        if Y is None:
             return 0.0
-        S = sensitivity(self.law.complementary(w))
-        J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ J
-        identity = np.broadcast_to(np.eye(n, dtype=complex), (w.size, n, n))
-        entering = kronecker(np.conj(self.entering(w)), identity)
-        inverse = np.linalg.inv(self.plant.covariance).T @ identity
-        variance = kronecker(inverse, self.plant.disturbance_at(w))
-        return float(np.einsum("kab,kba,k->", adjoint(J) @ entering @ J, variance, rule.weights).real)
+        S, inverse = sensitivity(self.law.complementary(w)), np.linalg.inv(self.plant.covariance)
+        passed = np.einsum("kab,kbc,kac->k", S, self.plant.disturbance_at(w), np.conj(S)).real
+        entering = np.einsum("kab,kbc,kdc,da->k", Y, self.entering(w), np.conj(Y), inverse).real
+        return float(passed * entering @ rule.weights)
 
     def parametric(self) -> ParametricCriterion:
         """Return the criterion tr(W P) of the model structure."""
@@ -178,8 +162,3 @@ class LoopErrorProblem:
         X = -sensitivity(T)[:, None] @ dG @ (inverse @ T)[:, None]
         moved = self.law.loop_gradient(np.einsum("kab,klba->kl", inverse, dG), relative, rule)
         return (X if moved is None else X + moved), relative
-
-    def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
-        """Find the best input of the model structure among all spectra within the limits."""
-        experiment = Experiment(self.structure, 1, self.band)
-        return least_error(criterion, experiment, self.limits, tolerance=tolerance)

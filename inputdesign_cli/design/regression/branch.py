@@ -15,52 +15,34 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError
-from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound
-from inputdesign_cli.design.regression.limits import box_limits
+from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound, box_limits
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
 
 @dataclass(order=True)
 class Node:
-    """Holds a box and its bound; `assumed`: the bound rests on `limits.SMALLEST_EIGENVALUE`."""
+    """Holds a box and its bound."""
 
     bound: float
     number: int
     box: Box = field(compare=False)
     found: NodeBound | None = field(compare=False, default=None)
-    assumed: bool = field(compare=False, default=False)
 
 
-@dataclass
 class BranchAndBound:
     """Holds the state of a proof: boxes that are open, and the least bound of the closed ones.
 
     Attributes:
         nodes: relaxations solved so far.
-        closed_assumed: whether a box that is done rests on the assumption of
-            `limits.SMALLEST_EIGENVALUE`.
+        assumed: whether the bound of some box rests on `lift.SMALLEST_EIGENVALUE`.
     """
 
-    problem: ToeplitzProblem
-    lift: Lift
-    open: list[Node] = field(default_factory=list)
-    closed: float = np.inf
-    nodes: int = 0
-    closed_assumed: bool = False
-    _order: count = field(default_factory=count)
-
-    @staticmethod
-    def start(problem: ToeplitzProblem) -> BranchAndBound:
-        """Return the start of the proof: all shapes in one box, nothing known."""
+    def __init__(self, problem: ToeplitzProblem) -> None:
+        """Begin with all shapes in one box, and nothing known."""
+        self.problem, self.lift, self._order = problem, Lift(problem), count()
         edge = np.ones(problem.m - 1)
-        tree = BranchAndBound(problem, Lift(problem))
-        tree.open.append(Node(-np.inf, next(tree._order), Box(-edge, edge)))
-        return tree
-
-    @property
-    def assumed(self) -> bool:
-        """Return whether `bound` rests on the assumption of `limits.SMALLEST_EIGENVALUE`."""
-        return self.closed_assumed or any(node.assumed for node in self.open)
+        self.open = [Node(-np.inf, next(self._order), np.array([-edge, edge]))]
+        self.closed, self.nodes, self.assumed = np.inf, 0, False
 
     @property
     def bound(self) -> float:
@@ -85,13 +67,10 @@ class BranchAndBound:
             node = heapq.heappop(self.open)
             if node.bound >= level():
                 self.closed = min(self.closed, node.bound)
-                self.closed_assumed |= node.assumed
                 continue
-            boxes = (node.box,) if node.found is None else self._halves(node.box, node.found)
             try:
-                for box in boxes:
-                    if not _without_shapes(box):
-                        self._examine(node, box, kappa(), level, suggest)
+                for box in (node.box,) if node.found is None else self._halves(node.box, node.found):
+                    self._examine(node.bound, box, kappa(), level, suggest)
             except OutOfTimeError:
                 heapq.heappush(self.open, node)  # with its halves not all examined, its own bound counts
                 break
@@ -99,7 +78,7 @@ class BranchAndBound:
 
     def _examine(
         self,
-        parent: Node,
+        least: float,
         box: Box,
         kappa: float,
         level: Callable[[], float],
@@ -112,36 +91,23 @@ class BranchAndBound:
             return
         self.nodes += 1
         found = self.lift.bound(box, kappa, allowed)
-        if found is None:
-            found = NodeBound(-np.inf, np.zeros(0), box.upper - box.lower)
+        self.assumed |= allowed.assumed
         # Shapes beyond the limit on u have at least the level; more than that is not known of them.
-        bound, assumed = min(found.bound, level()), allowed.assumed
-        if bound < parent.bound:
-            bound, assumed = parent.bound, parent.assumed
+        bound = max(min(found.bound, level()), least)
         if bound < level() and found.rho.size:
             suggest(found.rho)
-        heapq.heappush(self.open, Node(bound, next(self._order), box, found, assumed))
+        heapq.heappush(self.open, Node(bound, next(self._order), box, found))
 
     def _halves(self, box: Box, found: NodeBound) -> tuple[Box, ...]:
-        width = box.upper - box.lower
+        """Return the two halves of a box across the coordinate that its relaxation knows least of."""
+        width = box[1] - box[0]
         if width.size == 0 or width.max() < 1e-9:
             self.closed = min(self.closed, found.bound)
             return ()
-        coordinate = int(np.argmax(found.spread * width + 1e-12 * width))
-        at = box.centre[coordinate]
+        k = int(np.argmax(found.spread * width + 1e-12 * width))
+        at = float(box.mean(axis=0)[k])
         if found.rho.size:
-            quarter = 0.25 * width[coordinate]
-            at = float(np.clip(found.rho[coordinate + 1], at - quarter, at + quarter))
-        return box.halves(coordinate, at)
-
-
-def _without_shapes(box: Box) -> bool:
-    """Return whether some vector shows that P11 is nowhere positive semidefinite in the box."""
-    m = box.lower.size + 1
-    i = np.arange(m)
-    lag = np.abs(i[:, None] - i[None, :])
-    centre = np.concatenate([[1.0], box.centre])[lag]
-    radius = np.concatenate([[0.0], 0.5 * (box.upper - box.lower)])
-    vector = np.linalg.eigh(centre)[1][:, 0]
-    correlation = np.array([np.sum(np.outer(vector, vector)[lag == k]) for k in range(m)])
-    return bool(vector @ centre @ vector + radius @ np.abs(correlation) < 0.0)
+            at = float(np.clip(found.rho[k + 1], at - 0.25 * width[k], at + 0.25 * width[k]))
+        left, right = box.copy(), box.copy()
+        left[1, k] = right[0, k] = at
+        return left, right

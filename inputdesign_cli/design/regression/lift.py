@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import positive_part
@@ -28,43 +29,80 @@ from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from inputdesign_cli.spectrum import smat, svec, svec_layout
 
+SMALLEST_EIGENVALUE = 1e-6
+"""Assumed of R11 / r_0 where nothing better is known: for m >= 3 in boxes with singular R11."""
+
 _TOLERANCE = 1e-9
+_NOTHING = 1e-28  # the square of rounding in a part of L1 that vanishes
+_ROUNDING = 1e-12
 
-
-@dataclass(frozen=True)
-class Box:
-    """The box lower <= rho_1 .. rho_{m-1} <= upper, both (m - 1,)."""
-
-    lower: Array
-    upper: Array
-
-    @property
-    def centre(self) -> Array:
-        """Return the centre (m - 1,) of the box."""
-        return 0.5 * (self.lower + self.upper)
-
-    def halves(self, coordinate: int, at: float) -> tuple[Box, Box]:
-        """Return the two halves of the box, cut across a coordinate."""
-        upper, lower = self.upper.copy(), self.lower.copy()
-        upper[coordinate] = lower[coordinate] = at
-        return Box(self.lower, upper), Box(lower, self.upper)
+Box = NDArray[np.float64]
+"""The box lower <= rho_1 .. rho_{m-1} <= upper, (2, m - 1)."""
 
 
 @dataclass(frozen=True)
 class BoxLimits:
-    """The bound |w|^2 <= limit, with u = D w, for all shapes of a box that matter (see `limits.box_limits`).
+    """The bound |w|^2 <= limit, with u = D w, for all shapes of a box that matter (see `box_limits`).
 
     The limit keeps the relaxation bounded and pays for the last digits of its dual point.
 
     Attributes:
-        least_v: no shape of the box has a smaller v.
-        assumed: the limit takes the eigenvalues of R11 / r_0 to be above `limits.SMALLEST_EIGENVALUE`.
+        least_v: no shape of the box has a smaller v; infinite if the box has none.
+        assumed: the limit takes the eigenvalues of R11 / r_0 to be above `SMALLEST_EIGENVALUE`.
     """
 
     D: Array
     limit: float
     least_v: float
     assumed: bool
+
+
+def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimits:
+    """Return the limits in a box on shapes with v <= `largest_v`.
+
+    P11 maps symmetric and skew vectors into themselves, so u falls into two parts, each with its own matrix.
+    C is P11 at the centre of the box, r its change over the box, and D = sqrt(s) (C + r)^(-1/2) in each part.
+    Then |w|^2 = u^T (C + r) u / s <= (v + 2 r |u|^2) / s, and also <= (largest eigenvalue) |u|^2 / s. s is
+    chosen to make the limit of order one.
+    """
+    C = scipy.linalg.toeplitz(np.append(1.0, box.mean(axis=0)))
+    change = scipy.linalg.toeplitz(np.append(0.0, 0.5 * (box[1] - box[0])))
+    D, limit, least_v, assumed = np.zeros_like(C), 0.0, 0.0, False
+    for basis in ToeplitzProblem(problem.first, np.zeros(0)).halves:
+        weight = float(np.sum((basis.T @ problem.first) ** 2))
+        radius = float(np.linalg.eigvalsh(np.abs(basis).T @ change @ np.abs(basis))[-1])
+        values, vectors = np.linalg.eigh(basis.T @ C @ basis)
+        frame = basis @ vectors
+        lowest = float(values[0]) - radius
+        square, unproved = _largest_square(weight, lowest, largest_v, single=len(values) == 1)
+        assumed |= unproved
+        least_v += weight / max(float(values[-1]) + radius, 1e-300)
+        if values[0] + np.abs(frame[:, 0]) @ change @ np.abs(frame[:, 0]) < 0.0:
+            least_v = np.inf  # nowhere in the box P11 is positive semidefinite
+        kept = np.maximum(values, 0.0) + radius + _ROUNDING
+        v = min(largest_v, weight / lowest if lowest > 0.0 else np.inf)
+        most = float(kept[-1]) * square
+        s = max(min(v, most), 1e-8)
+        D += np.sqrt(s) * (frame / np.sqrt(kept)) @ frame.T
+        limit += min(v + 2.0 * (radius + max(0.0, -float(values[0])) + _ROUNDING) * square, most) / s
+    return BoxLimits(D, max(limit, 1.0), least_v, assumed)
+
+
+def _largest_square(weight: float, lowest: float, largest_v: float, *, single: bool) -> tuple[float, bool]:
+    """Return an upper bound on |u|^2 of a part, and whether it rests on `SMALLEST_EIGENVALUE`.
+
+    It is v / (smallest eigenvalue) at most, and (v / |L1|)^2 where the part is one-dimensional.
+
+    Args:
+        weight: |L1|^2 of the part; `lowest` bounds its eigenvalues from below, `single`: it has one.
+    """
+    if weight <= _NOTHING:
+        return 0.0, False
+    bounds = [largest_v**2 / weight] if single else []
+    if lowest > 0.0:
+        bounds += [weight / lowest**2, largest_v / lowest]
+    square, floor = min(bounds, default=np.inf), largest_v / SMALLEST_EIGENVALUE
+    return (square, False) if single or square <= floor else (floor, True)
 
 
 @dataclass(frozen=True)
@@ -111,7 +149,7 @@ class Lift:
         return Y, B
 
     @cached_property
-    def products(self) -> tuple[Block, ...]:
+    def _products(self) -> tuple[Block, ...]:
         """Return the constraint Y >= 0 on the symmetric and on the skew vectors."""
         parts = [basis.T @ self.problem.lags @ basis for basis in self.problem.halves]
         lifted = [np.einsum("tijk,kab->tiajb", self._unknowns[0], lags) for lags in parts]
@@ -119,58 +157,46 @@ class Lift:
             Block.of("psd", each.reshape(len(each), each.shape[1] * each.shape[2], -1)) for each in lifted
         )
 
-    @cached_property
-    def _multiplied(self) -> NDArray[np.float64]:
-        """Return E[(1, w)_i (1, w)_j P_ra] for the first m columns of P, (t, m + 1, m + 1, n, m)."""
-        return np.einsum("tijk,kra->tijra", self._unknowns[0], self.problem.lags[:, :, : self.problem.m])
-
-    def _errors(self, D: Array) -> NDArray[np.float64]:
-        """Return E[(1, w)_i (P u - L)] (t, m + 1, n), P u from m columns of P; the first rows vanish."""
-        wanted = np.concatenate([self.problem.first, self.problem.second])
-        excited = np.einsum("tijra,aj->tir", self._multiplied[:, :, 1:], D)
-        return excited - self._unknowns[0][:, :, 0, 0, None] * wanted
-
-    def bound(self, box: Box, kappa: float, allowed: BoxLimits) -> NodeBound | None:
-        """Return a lower bound on |b|^2 + kappa v over the box; None when the solver gave no multipliers."""
-        m = self.problem.m
-        blocks = self.blocks(box, allowed)
-        q, scale = self.cost(kappa, allowed.D)
+    def bound(self, box: Box, kappa: float, allowed: BoxLimits) -> NodeBound:
+        """Return a lower bound on |b|^2 + kappa v over the box; minus infinity without multipliers."""
+        (Y, B), scale = self._unknowns, max(1.0, kappa)
+        blocks, undecided = self._blocks(box, allowed), (np.zeros(0), box[1] - box[0])
+        # The cost is |b|^2 + kappa L1^T D w over a scale.
+        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ allowed.D))
+        q = (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale
         answer = solve_conic(q, blocks, tolerance=_TOLERANCE)
         if not all(np.all(np.isfinite(z)) for z in answer.multipliers):
-            return None
+            return NodeBound(-np.inf, *undecided)
         # Whatever the solver says of its answer: the dual point is repaired, and its value is ours.
         value = scale * self._repaired(q, blocks, answer.multipliers, allowed.limit, 1.0 / scale)
         if answer.status not in ("solved", "almost_solved"):
-            return NodeBound(value, np.zeros(0), box.upper - box.lower)
-        Y = np.tensordot(np.append(1.0, answer.x), self._unknowns[0], axes=1)
-        rho, w = Y[0, 0], Y[0, 1:, 0]
-        spread = np.abs(Y[0, 1:, 1:m] - w[:, None] * rho[1:m]).sum(axis=0)
-        return NodeBound(value, rho, spread)
+            return NodeBound(value, *undecided)
+        mean = np.tensordot(np.append(1.0, answer.x), Y, axes=1)
+        rho, w = mean[0, 0], mean[0, 1:, 0]
+        inner = slice(1, self.problem.m)
+        return NodeBound(value, rho, np.abs(mean[0, 1:, inner] - w[:, None] * rho[inner]).sum(axis=0))
 
-    def cost(self, kappa: float, D: Array) -> tuple[Array, float]:
-        """Return the coefficients of |b|^2 + kappa L1^T D w over a scale, and this scale."""
-        Y, B = self._unknowns
-        scale = max(1.0, kappa)
-        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ D))
-        return (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale, scale
-
-    def blocks(self, box: Box, allowed: BoxLimits) -> list[Block]:
+    def _blocks(self, box: Box, allowed: BoxLimits) -> list[Block]:
         """Return the constraint blocks of the semidefinite program, in the order that `_repaired` expects."""
         Y, B = self._unknowns
         size, m = len(Y), self.problem.m
-        errors = self._errors(allowed.D)
+        # E[(1, w)_i (P u - L)] (t, m + 1, n), P u from m columns of P; its first rows vanish.
+        excited = np.einsum(
+            "tijk,kra,aj->tir", Y[:, :, 1:], self.problem.lags[..., :m], allowed.D, optimize=True
+        )
+        errors = excited - Y[:, :, 0, 0, None] * np.append(self.problem.first, self.problem.second)
         gram = np.zeros((size, m + 1 + self.biases, m + 1 + self.biases))
         gram[:, : m + 1, : m + 1], gram[:, m + 1 :, m + 1 :] = Y[..., 0], B
         gram[:, : m + 1, m + 1 :] = errors[:, :, m : m + self.biases]
         gram[:, m + 1 :, : m + 1] = gram[:, : m + 1, m + 1 :].swapaxes(1, 2)
         room = (np.arange(size) == 0) - np.einsum("tii->t", Y[:, 1:, 1:, 0]) / allowed.limit
         blocks = [
-            *self.products,
+            *self._products,
             Block.of("psd", gram),
             Block.of("nonnegative", room[:, None]),
             Block.of("zero", errors[:, :, :m].reshape(size, -1)),
         ]
-        for k, (lower, upper) in enumerate(zip(box.lower, box.upper, strict=True), 1):
+        for k, (lower, upper) in enumerate(box.T, 1):
             for sign, edge in ((1.0, lower), (-1.0, upper)):
                 inside = Y[..., k] - edge * Y[..., 0]
                 blocks.append(Block.of("psd", 2.0 * sign / (upper - lower) * inside))
@@ -186,7 +212,7 @@ class Lift:
         of B, so that B has no residual. No E[(1, w)_i (1, w)_j rho_k] exceeds the limit on |w|^2, or its
         root, or one.
         """
-        z, many = list(multipliers), len(self.products)
+        z, many = list(multipliers), len(self._products)
         z[many] = self._with_weight(z[many], weight)
         for i, block in enumerate(blocks):
             if block.kind == "nonnegative":

@@ -1,4 +1,4 @@
-"""A linear regression with neglected regressors, and its mean-squared error for given moments.
+"""A linear regression with neglected regressors, its mean-squared error, and the moments with the least.
 
 y = phi_1^T theta_1 + phi_2^T theta_2 + v; only theta_1 is estimated, by least squares on phi_1. The
 quantity of interest is L1^T theta_1 + L2^T theta_2 ([eckhard-mse], Section 2).
@@ -6,7 +6,8 @@ quantity of interest is L1^T theta_1 + L2^T theta_2 ([eckhard-mse], Section 2).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -57,17 +58,13 @@ class Regression:
         """Return the number of all parameters."""
         return self.estimated.size + self.neglected.size
 
-    def bias(self, R: Array) -> Array:
-        """Return R12^T R11^+ L1 - L2 (n - m,); times theta_2 it is the bias of the estimate."""
-        return R[self.m :, : self.m] @ self._weights(R) - self.neglected
-
     def error(self, R: Array) -> ErrorSplit:
         """Return the worst mean-squared error with the moments R (n, n), [eckhard-mse] (6), (33), (34).
 
         Infinite when R11 does not excite all of L1.
         """
-        weights = self._weights(R)
         R11 = R[: self.m, : self.m]
+        weights = np.linalg.pinv(R11, rcond=_RANK, hermitian=True) @ self.estimated
         outside = np.linalg.norm(R11 @ weights - self.estimated)
         if outside > _OUTSIDE * np.linalg.norm(self.estimated):
             return ErrorSplit(np.inf, np.inf)
@@ -77,9 +74,68 @@ class Regression:
             variance=float(self.variance * (weights @ R11 @ weights)),
         )
 
-    def _weights(self, R: Array) -> Array:
-        R11 = R[: self.m, : self.m]
-        return np.linalg.pinv(R11, rcond=_RANK, hermitian=True) @ self.estimated
+
+@dataclass(frozen=True)
+class MomentsDesign:
+    """Holds moments R (n, n) with their error, and the proof of their energy or error: the `bound`.
+
+    No R of the structure does better than the bound. Toeplitz moments have autocorrelations `rho` (n,), with
+    rho_0 = 1, and `counts` of what search and proof took.
+    """
+
+    R: Array
+    split: ErrorSplit
+    bound: float
+    rho: Array | None = None
+    counts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def energy(self) -> float:
+        """Return the energy, trace R."""
+        return float(np.trace(self.R))
+
+
+def least_error(regression: Regression, energy: float) -> Array:
+    """Return the R (n, n) of trace `energy` with the least worst mean-squared error.
+
+    By [eckhard-mse], Lemma 1, it is rank one, along v = [L1; L2 + delta]: regressors that move together in
+    one direction. Its error alpha^2 |delta|^2 + sigma^2 |v|^2 / energy is least at
+    delta = -sigma^2 L2 / (alpha^2 energy + sigma^2).
+    """
+    gain = regression.neglected_norm**2 * energy
+    v = np.concatenate([regression.estimated, gain / (gain + regression.variance) * regression.neglected])
+    return energy * np.outer(v, v) / (v @ v)
+
+
+def error_bound(regression: Regression, energy: float) -> float:
+    """Return a lower bound on the error of any R >= 0 of trace `energy`, whatever its structure.
+
+    The error is at least alpha^2 |d|^2 + sigma^2 (|L1|^2 + |L2 + d|^2) / E for some d. Further, alpha^2 |d|^2
+    >= 2 p^T d - |p|^2 / alpha^2 for every p. The p of the optimum is taken.
+    """
+    a2, variance = regression.neglected_norm**2, regression.variance
+    fixed = variance * float(regression.estimated @ regression.estimated) / energy
+    if a2 == 0.0:
+        return fixed
+    p = -a2 * variance / (a2 * energy + variance) * regression.neglected
+    size = float(p @ p)
+    return fixed - size / a2 - 2.0 * float(p @ regression.neglected) - size * energy / variance
+
+
+def energy_bound(regression: Regression, target: float) -> float:
+    """Return the energy below which no R >= 0, whatever its structure, has the error `target`.
+
+    `error_bound` is sigma^2 |L1|^2 / E + alpha^2 sigma^2 |L2|^2 / (alpha^2 E + sigma^2), which falls in E. It
+    is gamma at the positive root of gamma alpha^2 E^2 + (gamma - alpha^2 |L1|^2 - alpha^2 |L2|^2) sigma^2 E =
+    sigma^4 |L1|^2, written so that nothing cancels ([eckhard-mse], Theorem 2).
+    """
+    a2, variance = regression.neglected_norm**2, regression.variance
+    first = float(regression.estimated @ regression.estimated)
+    second = float(regression.neglected @ regression.neglected)
+    linear = target - a2 * (first + second)
+    root = np.sqrt(linear**2 + 4.0 * target * a2 * first)
+    scaled = 2.0 * first / (linear + root) if linear >= 0.0 else (root - linear) / (2.0 * target * a2)
+    return float(variance * scaled)
 
 
 @dataclass(frozen=True)
@@ -95,25 +151,16 @@ class Sensitivity:
     noise_deviation: float
 
 
-def energy_sensitivity(
-    regression: Regression, energy: float, target: float, split: ErrorSplit
-) -> Sensitivity:
-    """Return the sensitivity of the least energy sigma^2 c / (gamma - alpha^2 |b|^2)."""
-    slack = target - split.bias_squared
-    alpha, sigma = regression.neglected_norm, np.sqrt(regression.variance)
-    bias = split.bias_squared / alpha**2 if alpha > 0 else 0.0
-    return Sensitivity(
-        neglected_norm=2.0 * alpha * bias * energy / slack,
-        goal=-energy / slack,
-        noise_deviation=2.0 * energy / sigma,
-    )
+def sensitivity(regression: Regression, energy: float, split: ErrorSplit, *, of_energy: bool) -> Sensitivity:
+    """Return the sensitivity of the least error alpha^2 |b|^2 + sigma^2 c / E, or of the least energy.
 
-
-def error_sensitivity(regression: Regression, energy: float, split: ErrorSplit) -> Sensitivity:
-    """Return the sensitivity of the least error alpha^2 |b|^2 + sigma^2 c / E."""
-    alpha, sigma = regression.neglected_norm, np.sqrt(regression.variance)
+    As the error falls with the energy by its variance over the energy, the least energy rises by a change
+    over this.
+    """
+    alpha, falls = regression.neglected_norm, split.variance / energy
+    unit = falls if of_energy else 1.0
     return Sensitivity(
-        neglected_norm=2.0 * split.bias_squared / alpha if alpha > 0 else 0.0,
-        goal=-split.variance / energy,
-        noise_deviation=2.0 * split.variance / sigma,
+        neglected_norm=2.0 * split.bias_squared / alpha / unit if alpha > 0 else 0.0,
+        goal=-1.0 / falls if of_energy else -falls,
+        noise_deviation=2.0 * split.variance / np.sqrt(regression.variance) / unit,
     )

@@ -13,11 +13,10 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.regression.local import Counter, Goal, descend
 from inputdesign_cli.design.regression.model import Regression
-from inputdesign_cli.design.regression.steps import line_shapes
-from inputdesign_cli.design.regression.structured import Normalisation
-from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
+from inputdesign_cli.design.regression.search import Search
+from inputdesign_cli.design.regression.steps import Region
+from inputdesign_cli.design.regression.toeplitz import Goal, ToeplitzProblem
 
 _EXACT = 1e-10
 _ALL_LINES = 400  # up to this many lines all of them take part
@@ -34,7 +33,6 @@ class PeriodicDesign:
     """
 
     shares: Array
-    rho: Array
     energy: float
     exact: bool
 
@@ -48,32 +46,21 @@ def design_periodic(
         target: the error to be met with the least energy; None: the energy stays, the error follows.
             If the lines cannot meet the target, the energy stays, too.
     """
-    problem = ToeplitzProblem.of(regression)
+    problem, goal = ToeplitzProblem.of(regression), Goal.of(regression, target=target, energy=energy)
     lines = 2.0 * np.pi * np.arange(period // 2 + 1) / period
     shares = _fit(rho, lines)
     fitted = np.cos(np.arange(rho.size)[:, None] * lines) @ shares
-    if np.abs(fitted - rho).max() < _EXACT:
-        return PeriodicDesign(shares, fitted, energy, True)
-    chosen = _candidates(shares)
-    region = line_shapes(problem, lines[chosen])
-    norm = Normalisation(regression)
-    goal = Goal(
-        kappa=norm.kappa(energy) if target is None else None,
-        target=None if target is None else target / norm.error,
-        biased=problem.biased,
-    )
     start = problem.evaluate(fitted)
-    shape = None
-    if start is not None:
-        shape = descend(problem, region, goal, start, Counter())
-    if shape is None:
-        return PeriodicDesign(shares, fitted, energy, False)
+    exact = bool(np.abs(fitted - rho).max() < _EXACT)
+    if exact or start is None:
+        return PeriodicDesign(shares, energy, exact)
+    chosen = _candidates(shares)
+    shape = Search(problem, goal, Region.of_lines(lines[chosen], problem.n)).descend(start)
     full = np.zeros(lines.size)
     full[chosen] = _fit(shape.rho, lines[chosen])
     value = goal.value(shape)
-    if target is not None and np.isfinite(value):
-        energy = norm.energy(1.0 / value)
-    return PeriodicDesign(full, shape.rho, energy, False)
+    met = target is not None and np.isfinite(value)
+    return PeriodicDesign(full, goal.stated(value) if met else energy, False)
 
 
 def _fit(rho: Array, lines: Array) -> Array:

@@ -26,7 +26,7 @@ _OUTSIDE = 1e-7
 
 
 @dataclass(frozen=True)
-class Autocorrelations:
+class Shape:
     """Holds autocorrelations `rho` (n,) with rho_0 = 1, the `bias` (n - m,), and the variance factor `v`."""
 
     rho: Array
@@ -38,6 +38,10 @@ class Autocorrelations:
         """Return the squared bias |b|^2."""
         return float(self.bias @ self.bias)
 
+    def error(self, kappa: float) -> float:
+        """Return |b|^2 + kappa v, the error for a given energy in the units of `ToeplitzProblem`."""
+        return self.bias_squared + kappa * self.v
+
 
 @dataclass(frozen=True)
 class ToeplitzProblem:
@@ -46,7 +50,7 @@ class ToeplitzProblem:
     Attributes:
         first: (m,) L1 / |L1|.
         second: (n - m,) L2 / |L1|.
-        biased: whether bias counts (alpha > 0).
+        biased: whether bias counts (alpha > 0); else it is zero.
     """
 
     first: Array
@@ -55,7 +59,7 @@ class ToeplitzProblem:
 
     @staticmethod
     def of(regression: Regression) -> ToeplitzProblem:
-        """Return the problem of a regression; `Weight` carries the units that are left out here."""
+        """Return the problem of a regression; `Goal` has the units that are left out here."""
         scale = float(np.linalg.norm(regression.estimated))
         return ToeplitzProblem(
             regression.estimated / scale, regression.neglected / scale, regression.neglected_norm > 0.0
@@ -85,26 +89,26 @@ class ToeplitzProblem:
         A symmetric Toeplitz matrix maps each into itself, so a cone of order n falls into two of half
         that order.
         """
-        n, half = self.n, self.n // 2
-        identity = np.eye(half)
-        mirror = identity[:, ::-1]
-        middle = np.zeros((half, n % 2))
-        symmetric = np.hstack([identity, middle, mirror]).T / np.sqrt(2.0)
-        skew = np.hstack([identity, middle, -mirror]).T / np.sqrt(2.0)
-        if n % 2:
-            centre = np.zeros((n, 1))
-            centre[half] = 1.0
-            symmetric = np.hstack([symmetric, centre])
-        return (symmetric, skew) if half else (symmetric,)
+        identity = np.eye(self.n)
+        both = [identity + identity[::-1], identity - identity[::-1]]
+        parts = [part[:, : (self.n + sign) // 2] for part, sign in zip(both, (1, 0), strict=True)]
+        return tuple(part / np.linalg.norm(part, axis=0) for part in parts if part.size)
 
-    def evaluate(self, rho: Array) -> Autocorrelations | None:
-        """Return the shape of autocorrelations, made positive semidefinite; None if L1 is not excited."""
-        rho = _inside(rho)
+    def evaluate(self, rho: Array) -> Shape | None:
+        """Return the shape of autocorrelations, made positive semidefinite; None if L1 is not excited.
+
+        Where their Toeplitz matrix has a negative eigenvalue they are scaled towards white noise.
+        """
+        rho = rho / rho[0]
+        lowest = float(np.linalg.eigvalsh(scipy.linalg.toeplitz(rho))[0])
+        rho = rho / (1.0 + max(0.0, -lowest))
+        rho[0] = 1.0
         P = scipy.linalg.toeplitz(rho)
         u = self.weights(P)
         if u is None:
             return None
-        return Autocorrelations(rho, P[self.m :, : self.m] @ u - self.second, float(self.first @ u))
+        bias = self.biased * (P[self.m :, : self.m] @ u - self.second)
+        return Shape(rho, bias, float(self.first @ u))
 
     def weights(self, P: Array) -> Array | None:
         """Return u with P11 u = L1, of least norm, (m,); None if there is none, to rounding."""
@@ -122,29 +126,48 @@ class ToeplitzProblem:
         inverse = np.linalg.pinv(P[:m, :m], rcond=_RANK, hermitian=True)
         u, predictor = inverse @ self.first, P[m:, :m] @ inverse
         moved = self.lags[1:, :, :m] @ u  # (n - 1, n)
-        return (moved[:, m:] - moved[:, :m] @ predictor.T).T
+        return self.biased * (moved[:, m:] - moved[:, :m] @ predictor.T).T
 
 
 @dataclass(frozen=True)
-class Weight:
-    """Weighs |b|^2 + kappa v: the error for a given energy in the units of `ToeplitzProblem`.
+class Goal:
+    """The goal: least error for an energy, or least energy for a target error, in units of `ToeplitzProblem`.
 
-    The error is unit (|b|^2 + kappa v) with unit = alpha^2 |L1|^2; without bias (alpha = 0) kappa v alone.
+    Attributes:
+        kappa: sigma^2 n / (energy unit): the error of v = 1 when the energy is given; else None.
+        target: the largest |b|^2 + kappa v that is allowed when the energy is sought; else None.
+        error: the error of the regression for |b|^2 + kappa v = 1, alpha^2 |L1|^2.
+        energy: the energy of the regression for kappa = 1; it is in inverse proportion to kappa.
     """
 
-    kappa: float
-    biased: bool = True
+    kappa: float | None = None
+    target: float | None = None
+    error: float = 1.0
+    energy: float = 1.0
 
-    def __call__(self, shape: Autocorrelations) -> float:
-        """Return the weighted sum for a shape."""
-        bias = shape.bias_squared if self.biased else 0.0
-        return bias + self.kappa * shape.v
+    @classmethod
+    def of(cls, regression: Regression, *, target: float | None, energy: float | None) -> Goal:
+        """Return the goal of a target, or else of an energy, in the units of the regression."""
+        size = float(regression.estimated @ regression.estimated)
+        error = size * (regression.neglected_norm**2 or 1.0)
+        unit = regression.n * regression.variance * size / error
+        if target is not None:
+            return cls(None, target / error, error, unit)
+        assert energy is not None
+        return cls(unit / energy, None, error, unit)
 
+    def value(self, shape: Shape) -> float:
+        """Return what is minimised: the error, or 1 / kappa (energy up to a factor); infinite if not met."""
+        if self.kappa is not None:
+            return shape.error(self.kappa)
+        assert self.target is not None
+        slack = self.target - shape.bias_squared
+        return shape.v / slack if slack > 0.0 else np.inf
 
-def _inside(rho: Array) -> Array:
-    """Return autocorrelations scaled towards white until their Toeplitz matrix has no negative eigenvalue."""
-    rho = rho / rho[0]
-    lowest = float(np.linalg.eigvalsh(scipy.linalg.toeplitz(rho))[0])
-    shrunk = rho / (1.0 + max(0.0, -lowest))
-    shrunk[0] = 1.0
-    return shrunk
+    def kappa_at(self, value: float) -> float:
+        """Return the kappa at a reached value: least error at that energy, [dinkelbach-1967]."""
+        return 1.0 / value if self.kappa is None else self.kappa
+
+    def stated(self, value: float) -> float:
+        """Return a value, or a bound on it, in the units of the regression."""
+        return value * (self.energy if self.kappa is None else self.error)

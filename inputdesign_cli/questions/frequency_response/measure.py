@@ -18,7 +18,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings import frequency_responses as responses
 from inputdesign_cli.findings.places import places
-from inputdesign_cli.identification import FrequencyResponse, frequency_response, response_delays
+from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.faults import period_spikes
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.nonlinearity import SilentLines, cubes, response_error, silent_lines
@@ -40,7 +40,6 @@ from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.common.delivery import adding, results_of
 from inputdesign_cli.questions.frequency_response.outcome import ResponseTerms, deviation_curves
 from inputdesign_cli.records import Preparation, Record, read_data
-from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
@@ -83,7 +82,8 @@ class Judged:
     over what is admitted, and `distorted` by a nonlinearity. Spikes and drifts are `scattered`.
     """
 
-    grid: HarmonicGrid
+    counted: Counted
+    response: PeriodicResponse
     lines: ResponseLines
     expected: NDArray[np.float64]
     found: NDArray[np.float64]
@@ -97,6 +97,11 @@ class Judged:
     distorted: responses.Distorted | None = None
     scattered: tuple[Finding, ...] = ()
     silent: Mapping[str, SilentLines] = field(default_factory=dict)
+
+    @property
+    def frequencies(self) -> Array:
+        """Return the frequencies (L,) of the lines, in rad/sample."""
+        return 2.0 * np.pi * self.response.harmonics / self.counted.periods.period
 
     @cached_property
     def ratios(self) -> Array:
@@ -120,20 +125,20 @@ class Judged:
         sure = self.least / (1.0 + (self.lines.share or 0.0) * (self.moved + bent))
         return not self.scattered and bool(np.any(sure > 1.0))
 
-    def remedy(self, counted: Counted) -> tuple[int | None, str]:
+    def remedy(self) -> tuple[int | None, str]:
         """Return the periods (of each block) that would have to count, and the remedy in words.
 
         There is no number where more do not help: the mean of inputs that do not repeat falls as noise does.
         """
-        samples, blocks = self.times * counted.samples, counted.periods.blocks
+        samples, periods = self.times * self.counted.samples, self.counted.periods
         unlike = self.differing > responses.UNLIKE
         if unlike or samples > most("signal.samples"):
             why = "do not repeat" if unlike else "are too weak at some lines"
             no = f"more periods of this signal are no remedy, as the inputs {why}: {responses.REMEDY}"
             return None, no
-        periods = int(np.ceil(samples / (blocks * self.grid.period)))
-        each = "" if blocks == 1 else f" in each of {blocks} blocks"
-        return periods, f"about {periods} periods that count{each} would do"
+        needed = int(np.ceil(samples / (periods.blocks * periods.period)))
+        each = "" if periods.blocks == 1 else f" in each of {periods.blocks} blocks"
+        return needed, f"about {needed} periods that count{each} would do"
 
 
 @dataclass(frozen=True)
@@ -153,12 +158,11 @@ def measure(
     question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
 ) -> Results:
     """Return the response with its confidence, compared with what a spec asks of its lines."""
-    started, header, terms = time.perf_counter(), question.header, question.terms
-    units, name, model = header.units, paths[0].name, question.model
+    started, terms, model, name = time.perf_counter(), question.terms, question.model, paths[0].name
+    units, judged, seen = question.header.units, None, list[Finding]()
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
-    counted = None if terms is None else whole_periods(terms.periods, data, name, units.sample_time)
-    if terms is None or counted is None:
+    if terms is None:
         delays = partial(response_delays, model, step=units.step)
         response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
         if response is None:
@@ -166,12 +170,17 @@ def measure(
             hint = "record longer, or excite more frequencies"
             raise DataError.because("too-few-samples", message, hint)
     else:
+        counted = whole_periods(terms.periods, data, name, units.sample_time)
         data = counted.data
-        response, judged, seen = _at_lines(question, terms, counted, name, assess=assess)
+        judged, seen = _at_lines(terms, counted, name, assess=assess)
+        response = of_periods(judged.response, terms.periods.period)
+        # Periods of outputs differ if the inputs do not repeat.
+        if judged.differing <= responses.UNLIKE:
+            judged = _doubted(terms, judged)
     by_reference = data.r is not None and terms is None
     table, curve, lines = response_of_data(units, model, response, by_reference=by_reference)
     outcome = Outcome(
-        title=header.title,
+        title=question.header.title,
         status="measured",
         samples=len(data.y),
         identification=Identification(method=lines.method),
@@ -180,18 +189,17 @@ def measure(
         notes=data.notes or None,
         timing_s={"measurement": time.perf_counter() - started},
     )
-    results = results_of(header, outcome, {"frequency_response": table}, {"frequency_response": curve})
-    if counted is None:
-        return results
-    return _compared(units, results, counted, judged, seen, assess=assess)
+    drawn = {"frequency_response": table}, {"frequency_response": curve}
+    results = results_of(question.header, outcome, *drawn)
+    return results if judged is None else _compared(units, results, judged, seen, assess=assess)
 
 
 def _compared(
-    units: Units, results: Results, counted: Counted, judged: Judged, found: list[Finding], *, assess: bool
+    units: Units, results: Results, judged: Judged, found: list[Finding], *, assess: bool
 ) -> Results:
     """Return the results with the comparison with r_adm and the figure of the deviations."""
-    outcome, w, periods = results.outcome, judged.grid.frequencies / units.frequency, counted.periods
-    silent, bent = silent_entry(judged.silent), judged.distorted
+    outcome, w, counted = results.outcome, judged.frequencies / units.frequency, judged.counted
+    silent, bent, periods = silent_entry(judged.silent), judged.distorted, counted.periods
     if bent is not None:
         at, cubed = float(w[bent.line]), bent.cubed or None
         silent["odd"] = replace(silent["odd"], worst_ratio=bent.share, frequency=at, cubed=cubed)
@@ -214,12 +222,10 @@ def _compared(
     outcome = replace(outcome, frequency_response=lines)
     doubts = [*judged.scattered, *responses.nonlinear_response(units, bent, w, decided=judged.missed)]
     if assess:
-        assessment, doubts = _assessment(units, counted, judged, w, doubts)
+        assessment, doubts = _assessment(units, judged, w, doubts)
         outcome = replace(outcome, assessment=assessment, status=assessment.verdict)
-    listed, drawn = (
-        {"deviation": judged.expected, "deviation_data": judged.found},
-        ("deviation_data", "these data"),
-    )
+    listed = {"deviation": judged.expected, "deviation_data": judged.found}
+    drawn = ("deviation_data", "these data")
     columns, deviations = deviation_curves(units, w, judged.lines, listed, drawn)
     found = [*found, *responses.silent_lines_answer(judged.silent), *doubts]
     return adding(results, outcome, found, {"deviations": Table(columns)}, {"deviations": deviations})
@@ -227,16 +233,14 @@ def _compared(
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
     """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
-
-    def entry(one: SilentLines) -> SilentLine:
-        over, chance, rms = (tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms))
-        return SilentLine(one.lines, over, chance, rms)
-
-    return {kind: entry(one) for kind, one in silent.items()}
+    return {
+        kind: SilentLine(one.lines, *(tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms)))
+        for kind, one in silent.items()
+    }
 
 
 def _assessment(
-    units: Units, counted: Counted, judged: Judged, w: Array, doubts: list[Finding]
+    units: Units, judged: Judged, w: Array, doubts: list[Finding]
 ) -> tuple[Assessment, list[Finding]]:
     """Return the verdict with the periods that would settle it, and the findings that it rests on."""
     ratio, at = float(judged.ratios[judged.worst]), float(w[judged.worst])
@@ -245,7 +249,7 @@ def _assessment(
     if judged.missed and doubted:
         no_top_up = "more periods alone are no remedy: the notes say why"
     elif not met and not doubted:
-        periods, remedy = judged.remedy(counted)
+        periods, remedy = judged.remedy()
         if judged.missed:
             no_top_up = remedy if periods is None else f"repeat the record: {remedy}"
         else:
@@ -304,38 +308,34 @@ def _longest_phase(stated: Periods, data: Record, step: float) -> NDArray[np.int
 
 
 def _at_lines(
-    question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
-) -> tuple[FrequencyResponse, Judged, list[Finding]]:
-    """Return the response at the lines of the spec that the data excite, its comparison, and findings."""
+    terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
+) -> tuple[Judged, list[Finding]]:
+    """Return the comparison at the lines of the spec that the data excite, and findings."""
     data, periods = counted.data, counted.periods
     excited = excited_lines(data.u, periods, terms.grid.excited, repeats=counted.repeats)
-    missing = responses.unexcited_lines(question.header.units, terms.grid.frequencies, excited)
+    missing = responses.unexcited_lines(terms.header.units, terms.grid.frequencies, excited)
     found = counted.response(terms.grid.excited[excited])
     if found is None or (assess and missing):
         why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
         raise DataError.because("not-exciting", f"{name}: {why}", hint=responses.REMEDY)
     judged = judge_lines(terms, found, counted, excited)
-    seen = [*missing, *counted.findings, *responses.inputs_do_not_repeat(judged.differing, periods.period)]
-    # Periods of outputs differ if the inputs do not repeat.
-    if judged.differing <= responses.UNLIKE:
-        judged = _doubted(question, terms, found, counted, judged)
-    return of_periods(found, periods.period), judged, seen
+    unlike = responses.inputs_do_not_repeat(judged.differing, periods.period)
+    return judged, [*missing, *counted.findings, *unlike]
 
 
-def _doubted(
-    question: Measurement, terms: ResponseTerms, found: PeriodicResponse, counted: Counted, judged: Judged
-) -> Judged:
+def _doubted(terms: ResponseTerms, judged: Judged) -> Judged:
     """Return the comparison with spikes, drifts, and, without spikes, a nonlinearity by the silent lines."""
-    units, data, periods, repeats = question.header.units, counted.data, counted.periods, counted.repeats
+    units, counted, found = terms.header.units, judged.counted, judged.response
+    data, periods, repeats, model = counted.data, counted.periods, counted.repeats, terms.experiment.model
     if spikes := period_spikes(data.y, periods, repeats=repeats):
         where = [places(units, data, one.samples) for one in spikes]
         spiked = responses.spiked_periods(units, spikes, where, len(data.y), counted.kept)
         return replace(judged, scattered=tuple(spiked))
     # The noise of the data near frequency zero; noise of the spec may go on rising below the lowest line.
-    lowest = int(np.argmin(judged.grid.frequencies))
+    lowest = int(np.argmin(judged.frequencies))
     noise = judged.noise[lowest]
     if not terms.tabulated:
-        known = NoiseSpectrum.of(question.model).at(periods.period, np.array([0]))[0]
+        known = NoiseSpectrum.of(model).at(periods.period, np.array([0]))[0]
         noise = np.maximum(noise, noise / judged.lines.noise[lowest] * known)
     drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)
     if drift is not None:
@@ -345,7 +345,7 @@ def _doubted(
         if without is not None:
             scatter = np.abs(found.deviation**2 - without.deviation**2)
             moved = judged.lines.ratios(np.sqrt(np.abs(found.G - without.G) ** 2 + scatter))
-            w = judged.grid.frequencies / units.frequency
+            w = judged.frequencies / units.frequency
             drifting = responses.drifting_periods(units, drift, moved, w, lined=data.lined)
             found, judged = without, replace(judged, scattered=tuple(drifting))
             judged = replace(judged, moved=moved) if drifting else judged
@@ -355,7 +355,7 @@ def _doubted(
     # The change of the response by a nonlinearity, by power at silent lines and by cubes.
     odd = terms.grid.odd
     error = response_error(found, periods.period, counted.kept, judged.silent["odd"], odd)
-    even, uneven = (question.model.plant_at(terms.grid.at(lines)) for lines in (found.harmonics, odd))
+    even, uneven = (model.plant_at(terms.grid.at(lines)) for lines in (found.harmonics, odd))
     cube = cubes(found, data.u, data.y, periods, odd, (even, uneven), _noise(terms, odd), repeats=repeats)
 
     def moved_by(outputs: Array) -> Array:
@@ -385,8 +385,7 @@ def judge_lines(
     smooth = expected * np.sqrt(excess)[:, :, None]
     freedom = 2 * found.freedom * window
     rare = 0.5 * (1.0 - _SURE) / (max(size // window, 1) * found.noise.shape[1])
-    chances = np.array([1.0 - rare, rare])
-    low, high = np.sqrt(freedom / (2.0 * scipy.special.gammaincinv(0.5 * freedom, chances))).tolist()
+    low, high = np.sqrt(freedom / scipy.special.chdtri(freedom, [rare, 1.0 - rare])).tolist()
     # If r_adm is a share of |G|, it is known as well as |G| is.
     far = -float(scipy.special.ndtri(0.25 * (1.0 - _SURE) / smooth.size)) * np.sqrt(0.5)
     away = far * smooth
@@ -396,7 +395,8 @@ def judge_lines(
     anew = 1.0 + scipy.special.ndtri(_SURE) / np.sqrt(freedom)
     needed = np.max(lines.ratios(smooth)) * (high + far * (lines.share or 0.0)) * anew
     return Judged(
-        grid=replace(terms.grid, excited=found.harmonics),
+        counted=counted,
+        response=found,
         lines=lines,
         expected=expected,
         found=smooth,

@@ -18,7 +18,7 @@ from inputdesign_cli.design.loop_error import (
     MinimumVariance,
     ModelReference,
 )
-from inputdesign_cli.design.loop_error.checks import check_invertible
+from inputdesign_cli.design.loop_error.laws import check_invertible
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries

@@ -16,7 +16,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of
-from inputdesign_cli.design.loop_error.parametric import LossTheory, ParametricCriterion, loss_theory
+from inputdesign_cli.design.loop_error.parametric import ParametricCriterion, root_moments
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.simulated_runs import unstable_runs
 from inputdesign_cli.identification.polynomial_rows import is_arx
@@ -113,20 +113,11 @@ class LoopErrorTask:
         samples, white = self.samples, design.white
         lo, hi = (edge / self.header.units.sample_time for edge in design.problem.band)
         informations = {"design": design.information, "white": white.information}
-        theories = {name: loss_theory(design.criterion, M) for name, M in informations.items()}
-        inputs, outputs = (
-            np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance)
-        )
-        powers: dict[PowerKind, list[float]] = {"input": inputs, "output": outputs, "excitation": inputs}
-        # White noise of the same total power; in open loop the excitation is the input.
+        powers = _powers(np.diag(design.input_covariance), np.diag(design.output_covariance))
+        # White noise of the same total power.
         G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
-        even = [white.level * float(weights.sum())] * design.problem.plant.inputs
-        caused = white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
-        of_white: dict[PowerKind, list[float]] = {
-            "input": even,
-            "output": caused.tolist(),
-            "excitation": even,
-        }
+        even = np.full(design.problem.plant.inputs, white.level * weights.sum())
+        of_white = _powers(even, white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real)
         details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
         objective = out.Objective(
             "closed_loop_error",
@@ -150,7 +141,7 @@ class LoopErrorTask:
                 expected=design.value / samples,
                 band=(lo, hi),
                 noise_model_part=design.noise_part,
-                parametric={name: theory_of(theory) for name, theory in theories.items()},
+                parametric={name: theory_of(design.criterion, M) for name, M in informations.items()},
                 limits=_limits(design),
             ),
             information=out.Information(
@@ -293,9 +284,18 @@ def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
     )
 
 
-def theory_of(theory: LossTheory) -> TheoreticalLoss:
-    """Return the error N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
-    return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
+def _powers(inputs: Array, outputs: Array) -> dict[PowerKind, list[float]]:
+    """Return powers by kind and channel; in open loop the excitation is the input."""
+    return {"input": inputs.tolist(), "output": outputs.tolist(), "excitation": inputs.tolist()}
+
+
+def theory_of(criterion: ParametricCriterion, information: Array) -> TheoreticalLoss:
+    """Return N E||y - y0||^2 of the model structure, and mean and deviation of its root.
+
+    The information (k, k) is that of one sample.
+    """
+    moments = root_moments(criterion.error_eigenvalues(information))
+    return TheoreticalLoss(criterion.value(information), LossMoments(*moments))
 
 
 def _tidy(matrix: ComplexArray) -> Array | ComplexArray:
@@ -313,10 +313,10 @@ def loss_results(
     theory, entries = {}, {}
     for name, lines in inputs.items():
         information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
-        theory[name], study = loss_theory(criterion, information), studies[name]
+        theory[name], study = theory_of(criterion, information), studies[name]
         several, counted = len(study.estimates) > 1, study.loss.size > 1
         entries[name] = TriedInput(
-            theory=theory_of(theory[name]),
+            theory=theory[name],
             unstable=study.unstable,
             mean_estimate=study.estimates.mean(axis=0),
             power=tuple(np.ravel(study.power).tolist()),
@@ -331,8 +331,8 @@ def loss_results(
     improvement = None
     if {"design", "white"} <= losses.keys():
         measured = 1 - float(losses["design"].mean() / losses["white"].mean())
-        improvement = Improvement(measured, 1 - theory["design"].mean / theory["white"].mean)
-    means = {name: theory[name].mean for name in losses}
+        improvement = Improvement(measured, 1 - theory["design"].loss.mean / theory["white"].loss.mean)
+    means = {name: theory[name].loss.mean for name in losses}
     return entries, improvement, {"loss": LossCurves(losses, means)} if losses else {}
 
 

@@ -23,6 +23,7 @@ from inputdesign_cli.specification import Noise, Simulation, SimulationNoise, Sp
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
 _STRUCTURED_TOLERANCE = 1e-6
+_ROUNDING = 1e-9
 _SIGNAL_KEYS = [
     f"signal.{name}"
     for name in (
@@ -61,15 +62,17 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         variance=float(spec.noise.covariance(1)[0, 0]),
     )
     variance = float(noise.covariance(1)[0, 0])
+    toeplitz = spectrum is not None and spectrum.type == "moments" and spectrum.structure == "toeplitz"
+    stated = "tolerance" in solver.model_fields_set
     return RegressionTask(
         header=build_header(spec),
         regression=regression,
-        toeplitz=spectrum is not None and spectrum.type == "moments" and spectrum.structure == "toeplitz",
+        toeplitz=toeplitz,
         samples=spec.experiment.samples,
         target=error.target,
         energy=spec.limits.energy if error.target is None else None,
         alternating=solver.method == "alternating",
-        tolerance=solver.tolerance if "tolerance" in solver.model_fields_set else _STRUCTURED_TOLERANCE,
+        tolerance=_ROUNDING if not toeplitz else solver.tolerance if stated else _STRUCTURED_TOLERANCE,
         record_samples=spec.signal_samples,
         periods=signal.periods,
         start=signal.start or "steady",

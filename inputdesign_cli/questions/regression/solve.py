@@ -13,8 +13,8 @@ from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design import regression as theory
-from inputdesign_cli.design.regression import ErrorSplit, OutOfReachError, Regression, design_toeplitz
-from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
+from inputdesign_cli.design.regression import MomentsDesign, OutOfReachError, Regression, design_toeplitz
+from inputdesign_cli.design.regression.lift import SMALLEST_EIGENVALUE
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
@@ -28,26 +28,6 @@ from inputdesign_cli.signal.moments import Start, delayed_regressors, free_regre
 
 _POINTS = 400
 KEY = "accuracy.mean_squared_error"
-
-
-@dataclass(frozen=True)
-class MomentsDesign:
-    """Holds R with its proof: no R of the structure is beyond `bound`; within `tolerance` it is optimal.
-
-    Of one input `rho` are the autocorrelations (n,).
-    """
-
-    R: Array
-    rho: Array | None
-    split: ErrorSplit
-    bound: float
-    tolerance: float
-    how: out.Solver
-
-    @property
-    def energy(self) -> float:
-        """Return the energy, trace R."""
-        return float(np.trace(self.R))
 
 
 @dataclass(frozen=True)
@@ -132,23 +112,20 @@ class RegressionTask:
             inputs[name] = tried(Phi, seed=noise)
         return delivery.with_study(results, out.Simulation(self.runs, self.trial_seed, inputs), begun)
 
-    def free(self) -> tuple[Array, float]:
+    def _free(self) -> MomentsDesign:
         """Return the best moments R (n, n) of any structure, and the bound that proves them."""
         if self.target is not None:
-            R = theory.least_energy(self.regression, self.target)
-            return R, theory.energy_bound(self.regression, self.target, R)
-        assert self.energy is not None
-        R = theory.least_error(self.regression, self.energy)
-        return R, theory.error_bound(self.regression, self.energy)
+            bound = theory.energy_bound(self.regression, self.target)
+            R = theory.least_error(self.regression, bound)
+        else:
+            assert self.energy is not None
+            bound = theory.error_bound(self.regression, self.energy)
+            R = theory.least_error(self.regression, self.energy)
+        return MomentsDesign(R, self.regression.error(R), bound)
 
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
         started = time.perf_counter()
-        if self.toeplitz:
-            design = self._toeplitz()
-        else:
-            R, bound = self.free()
-            split = self.regression.error(R)
-            design = MomentsDesign(R, None, split, bound, 1e-9, out.Solver("closed_form"))
+        design = self._toeplitz() if self.toeplitz else self._free()
         solved = time.perf_counter()
         record = self._realised(design)
         signal = None if record is None else record.signal
@@ -179,7 +156,7 @@ class RegressionTask:
 
     def _toeplitz(self) -> MomentsDesign:
         try:
-            found = design_toeplitz(
+            return design_toeplitz(
                 self.regression,
                 target=self.target,
                 energy=self.energy,
@@ -190,41 +167,38 @@ class RegressionTask:
         except OutOfReachError as error:
             assert self.target is not None
             raise _out_of_reach(self.regression, self.target, error) from error
-        how: dict[str, object] = {"starts": found.starts, "solves": found.solves, "nodes": found.nodes}
-        how |= {"assumed_smallest_eigenvalue": found.assumed} if found.assumed else {}
-        method = "alternating" if self.alternating else "sequential_convex"
-        solver = out.Solver(method, self.tolerance, details=how)
-        return MomentsDesign(found.R, found.rho, found.split, found.bound, self.tolerance, solver)
 
     def _outcome(
         self, design: MomentsDesign, signal: out.Signal | None, seconds: dict[str, float]
     ) -> out.Outcome:
         """Return the content of result.json; raise `internal-disagreement` of value and bound."""
         regression, split, target, n = self.regression, design.split, self.target, self.regression.n
-        unit, white = regression.error(np.eye(n)), None
+        unit, white, solver = regression.error(np.eye(n)), None, out.Solver("closed_form")
+        if self.toeplitz:
+            method = "alternating" if self.alternating else "sequential_convex"
+            solver = out.Solver(method, self.tolerance, details=dict(design.counts))
+        changes = theory.sensitivity(regression, design.energy, split, of_energy=target is not None)
         if target is not None:
-            kind, value, of = "least_cost", design.energy, "energy"
-            changes = theory.energy_sensitivity(regression, design.energy, target, split)
+            kind, value = "least_cost", design.energy
             slack = target - unit.bias_squared
             if slack > 0.0:  # white regressors can meet the target
                 energy = n * unit.variance / slack
                 white = out.White(cost=energy, ratio=energy / value)
         else:
             assert self.energy is not None
-            kind, value, of = "mean_squared_error", split.total, "mean_squared_error"
-            changes = theory.error_sensitivity(regression, design.energy, split)
+            kind, value = "mean_squared_error", split.total
             error = regression.error(np.eye(n) * (self.energy / n)).total
             white = out.White(mean_squared_error=error, ratio=error / value)
         gap = abs(value - design.bound) / value
-        any_bound = self.free()[1] if self.toeplitz else design.bound
+        any_bound = self._free().bound if self.toeplitz else design.bound
         objective = out.Objective(
             kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
         )
         remedy = "rescale the regressors, or state the weights anew"
-        delivery.check_claims(delivery.of_bounds(objective, design.tolerance), remedy)
+        delivery.check_claims(delivery.of_bounds(objective, self.tolerance), remedy)
         return out.Outcome(
             title=self.header.title,
-            status=delivery.proof_status(gap, design.tolerance),
+            status=delivery.proof_status(gap, self.tolerance),
             objective=objective,
             cost=design.energy,
             samples=self.samples,
@@ -240,7 +214,7 @@ class RegressionTask:
                 autocorrelations=design.rho,
             ),
             sensitivity=out.Sensitivity(
-                of,
+                "mean_squared_error" if target is None else "energy",
                 changes.neglected_norm,
                 changes.noise_deviation,
                 target=None if target is None else changes.goal,
@@ -248,7 +222,7 @@ class RegressionTask:
             ),
             baseline=out.Baseline(white),
             signal=signal,
-            solver=design.how,
+            solver=solver,
             timing_s=seconds,
         )
 

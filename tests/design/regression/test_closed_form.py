@@ -1,4 +1,4 @@
-"""Theorem 2 in its stable form: the paper's examples, brute force, bounds, limits, sensitivities."""
+"""Theorem 2: the paper's examples, brute force, bounds, limits, sensitivities."""
 
 from dataclasses import replace
 
@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from inputdesign_cli.design.regression import (
-    Regression,
-    energy_bound,
-    energy_sensitivity,
-    error_bound,
-    error_sensitivity,
-    least_energy,
-    least_error,
-)
+from inputdesign_cli.design.regression import Regression, energy_bound, error_bound, least_error, sensitivity
 from tests.support.regression import mse
 
 ONE = Regression(np.array([1.0]), np.array([1.0]), 1.0, 1.0)
@@ -27,41 +19,31 @@ def random_regression(rng, m, n):
     )
 
 
-def test_example_1_exactly():
-    R = least_energy(ONE, 1.0)
-    root = np.sqrt(5.0)
-    np.testing.assert_allclose(
-        R, [[(5 + 3 * root) / 10, (5 + root) / 10], [(5 + root) / 10, 1 / root]], rtol=1e-14
-    )
+def least_energy(regression, target):
+    return least_error(regression, energy_bound(regression, target))
 
 
-# Figure 1: Theorem 2 in 50 digits (Python's decimal), alpha -> R11, R12, R22, trace.
+# alpha -> R11, R12, R22: Figure 1 by Theorem 2 in 50 digits (Python's decimal), and the limits of Remark 4.
 FIGURE_1 = {
-    0.1: (1.0098980305898036, 0.010097970609796571, 0.00010096961014644528, 1.00999900019995),
-    1.0: (1.1708203932499369, 0.72360679774997897, 0.44721359549995794, 1.6180339887498948),
-    10.0: (1.0024937188677710, 0.99749378136659913, 0.99251878105410499, 1.9950124999218760),
+    0.1: (1.0098980305898036, 0.010097970609796571, 0.00010096961014644528),
+    1.0: (1.1708203932499369, 0.72360679774997897, 0.44721359549995794),
+    10.0: (1.0024937188677710, 0.99749378136659913, 0.99251878105410499),
+    0.0: (1, 0, 0),
+    1e-9: (1, 0, 0),
+    1e9: (1, 1, 1),
 }
 
 
 @pytest.mark.parametrize("alpha", FIGURE_1)
-def test_figure_1(alpha):
+def test_figure_1_and_its_limits(alpha):
     R = least_energy(replace(ONE, neglected_norm=alpha), 1.0)
-    np.testing.assert_allclose([R[0, 0], R[0, 1], R[1, 1], np.trace(R)], FIGURE_1[alpha], rtol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("alpha", "limit"), [(0.0, [[1, 0], [0, 0]]), (1e-9, [[1, 0], [0, 0]]), (1e9, [[1, 1], [1, 1]])]
-)
-def test_the_limits_of_remark_4(alpha, limit):
-    np.testing.assert_allclose(least_energy(replace(ONE, neglected_norm=alpha), 1.0), limit, atol=1e-15)
+    np.testing.assert_allclose([R[0, 0], R[0, 1], R[1, 1]], FIGURE_1[alpha], rtol=1e-14, atol=1e-15)
 
 
 @pytest.mark.parametrize("second", [np.zeros(2), np.zeros(0)])
 def test_nothing_neglected_counts(second):
-    regression = Regression(np.array([3.0, 4.0]), second, 2.0, 0.5)
-    R = least_energy(regression, 2.0)
+    R = least_energy(Regression(np.array([3.0, 4.0]), second, 2.0, 0.5), 2.0)
     assert np.trace(R) == pytest.approx(0.5 * 25 / 2.0, rel=1e-14)
-    assert energy_bound(regression, 2.0, R) == pytest.approx(np.trace(R), rel=1e-13)
 
 
 @pytest.mark.first(2)
@@ -107,41 +89,30 @@ def test_the_schur_program_agrees(m, n):
     limit = a2 * cp.sum_squares(z - regression.neglected) + regression.variance * q[0, 0] <= target
     problem = cp.Problem(cp.Minimize(cp.trace(R)), [cp.bmat([[R, y], [y.T, q]]) >> 0, limit])
     problem.solve(solver=cp.CLARABEL)
-    assert np.trace(least_energy(regression, target)) == pytest.approx(problem.value, rel=1e-6)
+    assert energy_bound(regression, target) == pytest.approx(problem.value, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_target_is_met_and_both_problems_agree(seed):
+def test_the_target_is_met_and_the_bounds_hold_for_any_moments(seed):
     rng = np.random.default_rng(seed)
     m = int(rng.integers(1, 4))
-    regression = random_regression(rng, m, m + int(rng.integers(0, 4)))
-    target = rng.uniform(0.1, 3.0)
+    n = m + int(rng.integers(0, 4))
+    regression, target = random_regression(rng, m, n), rng.uniform(0.1, 3.0)
     R = least_energy(regression, target)
     energy = np.trace(R)
     assert regression.error(R).total == pytest.approx(target, rel=1e-12)
     assert np.linalg.eigvalsh(R)[0] >= -1e-12 * energy
-    np.testing.assert_allclose(least_error(regression, energy), R, rtol=1e-9, atol=1e-9 * energy)
-    assert energy_bound(regression, target, R) == pytest.approx(energy, rel=1e-11)
     assert error_bound(regression, energy) == pytest.approx(target, rel=1e-11)
+    F = rng.standard_normal((n, n))
+    reached, spent = regression.error(F @ F.T).total, float(np.sum(F**2))
+    assert energy_bound(regression, reached) <= spent * (1 + 1e-12)
+    assert error_bound(regression, spent) <= reached * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_bounds_hold_for_any_moments(seed):
-    """Read off the wrong R the bound is weaker, but it is a bound."""
-    rng = np.random.default_rng(seed)
-    regression = random_regression(rng, 2, 4)
-    F = rng.standard_normal((4, 4))
-    R = F @ F.T
-    target = regression.error(R).total
-    assert energy_bound(regression, target, R) <= np.trace(least_energy(regression, target)) * (1 + 1e-12)
-    assert np.trace(least_energy(regression, target)) <= np.trace(R)
-    assert error_bound(regression, float(np.trace(R))) <= target
-
-
-@pytest.mark.parametrize("goal", ["target", "energy"])
-def test_sensitivities_are_derivatives(goal):
+@pytest.mark.parametrize("of_energy", [True, False])
+def test_sensitivities_are_derivatives(of_energy):
     rng = np.random.default_rng(3)
-    regression, value, step = random_regression(rng, 2, 4), 0.7 if goal == "target" else 5.0, 1e-5
+    regression, value, step = random_regression(rng, 2, 4), 0.7 if of_energy else 5.0, 1e-5
 
     def least(alpha=0.0, goes=0.0, sigma=0.0):
         moved = replace(
@@ -149,22 +120,16 @@ def test_sensitivities_are_derivatives(goal):
             neglected_norm=regression.neglected_norm + alpha,
             variance=(np.sqrt(regression.variance) + sigma) ** 2,
         )
-        if goal == "target":
-            return np.trace(least_energy(moved, value + goes))
-        return moved.error(least_error(moved, value + goes)).total
+        return (energy_bound if of_energy else error_bound)(moved, value + goes)
 
-    def slope(name):
-        return pytest.approx((least(**{name: step}) - least(**{name: -step})) / (2 * step), rel=1e-7)
-
-    if goal == "target":
-        found = energy_sensitivity(
-            regression, least(), value, regression.error(least_energy(regression, value))
-        )
-    else:
-        found = error_sensitivity(regression, value, regression.error(least_error(regression, value)))
-    assert found.neglected_norm == slope("alpha")
-    assert found.goal == slope("goes")
-    assert found.noise_deviation == slope("sigma")
+    energy = least() if of_energy else value
+    split = regression.error(least_error(regression, energy))
+    found = sensitivity(regression, energy, split, of_energy=of_energy)
+    for name, slope in zip(
+        ("alpha", "goes", "sigma"), (found.neglected_norm, found.goal, found.noise_deviation), strict=True
+    ):
+        differences = (least(**{name: step}) - least(**{name: -step})) / (2 * step)
+        assert slope == pytest.approx(differences, rel=1e-7)
 
 
 def test_a_quantity_that_is_not_excited_has_no_finite_error():
