@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.adequacy import Fault, Score, ScoreTest, score
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import Extension
+from inputdesign_cli.identification.kind import Extension, Kind
 from inputdesign_cli.identification.records import RecordProblem, Records, evaluate, split
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
@@ -167,20 +167,22 @@ def _score(white: White, tried: _Tried) -> tuple[Score, float]:
     return score(white, column[:, None], mean), expected / float(along @ column)
 
 
-def alternative(extension: Extension, records: Records) -> Alternative:
-    """Return the parameter as a regressor of the prediction errors of records."""
+def alternative(extension: Extension, kind: Kind, records: Records) -> Alternative:
+    """Return the parameter of a larger model of this kind as a regressor of the errors of records."""
     model, index = extension.model, extension.model.names.index(extension.name)
-    larger, in_plant = replace(records, kind=extension.kind, earlier=None), bool(model.in_plant[index])
+    larger, in_plant = replace(records, kind=kind, earlier=None), bool(model.in_plant[index])
+    # Of other parameters than coefficients the larger structure has further freedom.
+    nested = set(model.names) - set(records.kind.model.names) == {extension.name}
     again = partial(_estimated, larger, model, index)
     return Alternative(
         extension.name,
         f"one more {extension.what} ({extension.name})",
         "plant" if in_plant else "noise",
         larger.gradient(model.theta, index),
-        lambda model, w: extension.model.plant_gradient(w)[None, :, index],
+        lambda _, w: model.plant_gradient(w)[None, :, index],
         lag=model.parameters[index].letter in _LAGS,
-        echo=extension.kind.echoes(model.theta, records.longest)[index],
-        estimated=again if extension.nested and records.earlier is None else None,
+        echo=kind.echoes(model.theta, records.longest)[index],
+        estimated=again if nested and records.earlier is None else None,
     )
 
 

@@ -14,7 +14,7 @@ import scipy.linalg.blas
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.records import shares, weighing
+from inputdesign_cli.identification.records import inverses, shares, weighing
 from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
 from inputdesign_cli.plant import PolynomialModel
 
@@ -196,6 +196,13 @@ class FromRest:
             cost = np.where(finite, cost, np.inf)
             hessian[~finite], slope[~finite] = np.eye(theta.shape[1]), 0.0
         return cost, hessian, slope
+
+    def concluded(self, theta: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the covariance (runs, p, p) of e, unbiased, and the information (runs, k, k) at theta."""
+        sums = self.sums(theta)
+        left = np.sqrt(np.maximum(self.y.shape[2] - sums.own, 1.0))
+        noise = sums.errors / np.outer(left, left)
+        return noise, sums.weighed(inverses(noise)[0])[0]
 
     def sums(self, theta: Array) -> Sums:
         """Return the sums from which the cost and its derivatives at theta (runs, k) are computed."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
-from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts
+from inputdesign_cli.identification.kind import Batch, Extension, Kind, Part, Starts
 from inputdesign_cli.identification.polynomial_rows import (
     FromRest,
     Row,
@@ -50,7 +50,7 @@ class PolynomialKind(Kind):
     @property
     def explaining(self) -> NDArray[np.bool_]:
         """Return the mask (k,) of the coefficients of B and F."""
-        return np.array([parameter.letter in "bf" for parameter in self.model.parameters], dtype=bool)
+        return self._among("bf")
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
@@ -59,6 +59,10 @@ class PolynomialKind(Kind):
         for output, column, own in zip(*owners(self.rows), each[0], strict=True):
             psi[column, :, output] = own
         return errors[0].T, psi
+
+    def batch(self, u: Array, y: Array) -> Batch:
+        """Return the problem of records (runs, N, r), (runs, N, p) that begin at rest, noise as well."""
+        return FromRest.of(self.model, u, y)
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past on the prediction errors, output by output.
@@ -76,10 +80,12 @@ class PolynomialKind(Kind):
         entries = (entry for row in self.rows for entry in zip(row.b, row.f, strict=True))
         return max([0, *(b.lags.stop - f.lags.stop for b, f in entries)])
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
-        """Return the indices of the coefficients of C and D; of F as well if the states are free."""
-        letters = "cdf" if free else "cd"
-        return np.flatnonzero([parameter.letter in letters for parameter in self.model.parameters])
+    def in_starts(self, late: int, *, free: bool) -> NDArray[np.bool_]:
+        """Return the mask of the coefficients of C and D; of F as well if the states are free."""
+        return self._among("cdf" if free else "cd")
+
+    def _among(self, letters: str) -> NDArray[np.bool_]:
+        return np.array([parameter.letter in letters for parameter in self.model.parameters], dtype=bool)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """Return signals (N, m) filtered by D/C of each output, as (p, N, m)."""
@@ -89,7 +95,9 @@ class PolynomialKind(Kind):
         """Return theta with the roots of C, D and F inside the unit circle."""
         return stabilised(self.rows, theta[None])[0]
 
-    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    def starting_points(
+        self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
+    ) -> Starts:
         """Return each output's own estimate; shared parameters are weighted by the information of each."""
         listed = np.zeros((0, len(self.model.names))) if given is None else given[None]
         points, tried = list[Array](), 0
@@ -119,7 +127,7 @@ class PolynomialKind(Kind):
         scaled = np.linalg.lstsq(total / np.outer(scale, scale), moment / scale, rcond=None)[0]
         return np.asarray(scaled / scale)
 
-    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+    def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions by a further coefficient in any of the polynomials, or by a shorter delay."""
         model, larger = self.model.at(theta), []
         for i, j in model.active:
@@ -140,11 +148,7 @@ class PolynomialKind(Kind):
             larger.append((replace(model, C=_longer(model.C, i)), "coefficient in C"))
         for i in range(len(model.D)):
             larger.append((replace(model, D=_longer(model.D, i)), "coefficient in D"))
-        found = []
-        for one, what in larger:
-            (name,) = set(one.names) - set(self.model.names)
-            found.append(Extension(one, PolynomialKind(one), name, what))
-        return tuple(found)
+        return [Extension.of(model, one, what) for one, what in larger]
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which rows of G are stable."""

@@ -193,7 +193,7 @@ class Records:
     @property
     def _moving(self) -> list[int]:
         """Return the indices of the parameters on which the starts depend."""
-        return self.kind.in_starts(self.late, free=self.free).tolist()
+        return np.flatnonzero(self.kind.in_starts(self.late, free=self.free)).tolist()
 
     def _starts(self, theta: Array) -> tuple[Start, ...]:
         starts = self.kind.starts(theta, self.longest, self.late, free=self.free)
@@ -210,7 +210,7 @@ class Records:
 
     def _start_slope(self, theta: Array, index: int) -> tuple[Start, ...]:
         """Return the derivative of the starts by a parameter, by central differences."""
-        size = self.kind.start_step(theta, index, self.longest)
+        size = float(self.kind.start_steps(theta, self.longest)[index])
         step = size * np.eye(theta.size)[index]
         ends = zip(self._starts(theta + step), self._starts(theta - step), strict=True)
         return tuple(
@@ -304,9 +304,35 @@ class RecordProblem:
         """Return theta (runs, k) with stable poles."""
         return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
 
+    def concluded(self, theta: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the covariance (runs, p, p) of e and the information (runs, k, k) at theta (runs, k)."""
+        points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
+        noise = [noise_of(*each) for each in zip(self.records, points, strict=True)]
+        information = [information_of(*each) for each in zip(self.records, points, noise, strict=True)]
+        return np.array(noise), np.array(information)
+
     def kept(self, runs: NDArray[np.bool_]) -> RecordProblem:
         """Return the same problem with some of its runs only."""
         return RecordProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))
+
+
+def noise_of(records: Records, point: Point) -> Array:
+    """Return the covariance (p, p) of e, corrected for the parameters of every output and unknown starts."""
+    samples, outputs = point.errors.shape
+    own = shares(np.any(records.from_rest(point.theta)[1], axis=1))
+    left = np.sqrt(np.maximum(samples - own - point.unknowns / outputs, 1.0))
+    every = point.all_errors
+    return np.asarray(every.T @ every / np.outer(left, left))
+
+
+def information_of(records: Records, point: Point, noise: Array) -> Array:
+    """Return the information matrix (k, k): the sum over the samples of psi noise^-1 psi^T."""
+    return replace(point.of_errors, weights=weights_of(records, noise)).hessian
+
+
+def weights_of(records: Records, noise: Array) -> Array:
+    """Return the weights W (p, p): the inverse of the noise, which may be no more than rounding."""
+    return inverses((noise + records.rounding)[None])[0][0]
 
 
 def shares(acting: NDArray[np.bool_]) -> Array:

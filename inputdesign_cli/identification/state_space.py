@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import Kind, Part, Starts, late_samples
+from inputdesign_cli.identification.kind import STEP, Kind, Part, Starts, late_samples
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import StateSpaceModel
@@ -18,7 +18,6 @@ from inputdesign_cli.plant.model import DELAY
 
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
 _MARGIN = 1e-9
-_STEP = 1e-6
 # A pole this near to one integrates, or nearly does: a level of the input is not made up for by states.
 _INTEGRATES = 1e-2
 
@@ -96,17 +95,16 @@ class StateSpaceKind(Kind):
         before = responses(np.zeros_like(m.K)) if coloured and stable else through
         return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
-        """Return the indices of entries in A, C and K; of B and delays too if few inputs push many states."""
-        if not (free or self._coloured):
-            return np.zeros(0, dtype=np.int64)
+    def in_starts(self, late: int, *, free: bool) -> NDArray[np.bool_]:
+        """Return the mask of entries in A, C and K; of B and delays too if few inputs push many states."""
         pushed = free and late > 0 and self.model.order > 2 * self.model.inputs
         letters = ("A", "C", "K", *(("B", DELAY) if pushed else ()))
-        return np.flatnonzero([letter in letters for letter, _, _ in self.model.entries])
+        wanted = np.array([letter in letters for letter, _, _ in self.model.entries], dtype=bool)
+        return wanted & (free or self._coloured)
 
-    def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return a small share of the entry as the differentiation step."""
-        return _STEP * max(abs(float(theta[index])), _STEP)
+    def start_steps(self, theta: Array, samples: int) -> Array:
+        """Return small shares of the entries as the differentiation steps."""
+        return STEP * np.maximum(np.abs(theta), STEP)
 
     def lateness(self, theta: Array) -> int:
         """Return the dead time in samples, rounded up."""
@@ -139,7 +137,9 @@ class StateSpaceKind(Kind):
             return np.full_like(theta, np.inf)
         return out
 
-    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    def starting_points(
+        self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
+    ) -> Starts:
         """Return the nominal parameters, and the `given` ones."""
         return Starts(self.model.theta[None], 1).and_given(given)
 

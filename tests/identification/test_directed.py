@@ -78,7 +78,7 @@ def test_gradients_are_those_of_the_larger_model(name):
     letters = "".join(sorted(extension.name[0] for extension in found))
     assert letters == {"oe": "bbcdf", "bj": "bbcdf", "ararmax": "abbcd", "full": "abcdf"}[name]
     for extension in found:
-        kind, theta = extension.kind, extension.model.theta
+        kind, theta = estimator(extension.model, 1.0), extension.model.theta
         index = extension.model.names.index(extension.name)
         assert abs(theta[index]) < 1e-12
         step = 1e-6 * (np.arange(theta.size) == index)

@@ -4,10 +4,10 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify
-from inputdesign_cli.identification.estimators import estimator, information_of
+from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.polynomial_rows import FromRest
-from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
+from inputdesign_cli.identification.records import RecordProblem, Records, evaluate, information_of
 from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
