@@ -41,8 +41,8 @@ class Derived(Kind):
 
     model: Model
     plant: Kind
-    coloured: Coloured | None  # the model of the coefficients, where it has C and D besides the plant's
-    by: Parametrisation | None  # None: the parameters are the coefficients
+    coloured: Coloured | None = None  # the model, where it has C and D besides
+    by: Parametrisation | None = None  # None: the parameters are the coefficients
 
     @property
     def _first(self) -> int:
@@ -172,26 +172,35 @@ class Derived(Kind):
         self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
     ) -> Starts:
         """Return the starting points of all coefficients, mapped to the parameters, and the `given` one."""
-        if self.by is None:
-            return self._points(parts, given, known).and_given(given)
-        found = self._points(parts, None, ~np.any(self.by.moves, axis=1))
-        about = Records(replace(self, by=None), tuple(parts))
-        points = [brought_back(self.by, evaluate(about, theta)) for theta in found.points]
+        if self.by is not None:
+            found = self.plant.starting_points(parts, None, ~np.any(self.by.moves, axis=1))
+            about = Records(self.plant, tuple(parts))
+            points = [brought_back(self.by, evaluate(about, theta)) for theta in found.points]
+        else:
+            of_plant = (None if x is None else x[: self._first] for x in (given, known))
+            fixed = [] if self.coloured is None else self.coloured.fixed
+            common = reduce(np.convolve, {tuple(p): p for p in fixed}.values())
+            clear = [(_clear(common, u), _clear(common, y)) for u, y in parts]
+            found, points = self.plant.starting_points(clear, *of_plant), []
+            for theta in found.points:
+                errors, _ = self.plant.errors_and_gradient(theta, *parts[0])
+                points.append(np.concatenate([theta, self._noise_of(errors)]))
         return Starts(np.array(points), found.tried).and_given(given)
 
-    def _points(self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None) -> Starts:
-        """Return the starting points of the plant, with C and D from its residuals."""
-        of_plant = (None if mask is None else mask[: self._first] for mask in (given, known))
-        if self.coloured is None:
-            return self.plant.starting_points(parts, *of_plant)
-        fixed = reduce(np.convolve, {tuple(p): p for p in self.coloured.fixed}.values())
-        clear = [(_clear(fixed, u), _clear(fixed, y)) for u, y in parts]
-        found = self.plant.starting_points(clear, *of_plant)
-        points = []
-        for theta in found.points:
-            errors, _ = self.plant.errors_and_gradient(theta, *parts[0])
-            points.append(np.concatenate([theta, _noise_of_residuals(self.coloured, errors)]))
-        return Starts(np.array(points), found.tried)
+    def _noise_of(self, errors: Array) -> Array:
+        """Return C and D from residuals (N, p) of the plant; shared ones are means over outputs."""
+        noise = self.coloured
+        if noise is None or not np.all(np.isfinite(errors)):
+            return np.zeros(0 if noise is None else len(noise.own_parameters))
+        own, values = noise.own_parameters, dict[tuple[str, int, int], float]()
+        for i, fixed in enumerate(noise.fixed):
+            c, d = (
+                max((p.power for p in own if p.letter == letter and (i, i) in p.places), default=0)
+                for letter in "cd"
+            )
+            for letter, row in zip("cd", noise_polynomials(_clear(fixed, errors[:, i]), c, d), strict=True):
+                values |= {(letter, lag, i): float(value) for lag, value in enumerate(row, start=1)}
+        return np.array([np.mean([values[one.letter, one.power, i] for i, _ in one.places]) for one in own])
 
     def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions of the plant; the tests with many regressors cover C and D."""
@@ -246,22 +255,6 @@ def _coloured(
                 late = filtered([sign], polynomial, errors[:, i])
                 psi[index, parameter.power :, i] = late[: len(errors) - parameter.power]
     return errors, psi
-
-
-def _noise_of_residuals(noise: Coloured, errors: Array) -> Array:
-    """Return C and D from the plant's residuals (N, p) in one record; shared ones are means over outputs."""
-    own = noise.own_parameters
-    if not np.all(np.isfinite(errors)):
-        return np.zeros(len(own))
-    values: dict[tuple[str, int, int], float] = {}
-    for i, fixed in enumerate(noise.fixed):
-        c, d = (
-            max((p.power for p in own if p.letter == letter and (i, i) in p.places), default=0)
-            for letter in "cd"
-        )
-        for letter, row in zip("cd", noise_polynomials(_clear(fixed, errors[:, i]), c, d), strict=True):
-            values |= {(letter, lag, i): float(value) for lag, value in enumerate(row, start=1)}
-    return np.array([np.mean([values[one.letter, one.power, i] for i, _ in one.places]) for one in own])
 
 
 def _clear(known: Array, signals: Array) -> Array:

@@ -142,31 +142,20 @@ def estimator(model: Model, step: float) -> Kind:
 
 estimator.register(PolynomialModel, lambda model, step: PolynomialKind(model))
 estimator.register(StateSpaceModel, lambda model, step: StateSpaceKind(model))
-
-
-@estimator.register
-def _(model: ContinuousModel, step: float) -> Kind:
-    return TransferKind(model, model, Intersample(step, hold=False))
-
-
-@estimator.register
-def _(model: SampledModel, step: float) -> Kind:
-    return TransferKind(model, model.continuous_plant, Intersample(model.sample_time, hold=True))
-
-
-@estimator.register
-def _(model: Coloured, step: float) -> Kind:
-    return Derived(model, estimator(model.plant, step), model, None)
-
-
-@estimator.register
-def _(model: Reparametrised, step: float) -> Kind:
-    found = estimator(model.coefficients, step)
-    return (
-        replace(found, model=model, by=model.parametrisation)
-        if isinstance(found, Derived)
-        else Derived(model, found, None, model.parametrisation)
-    )
+estimator.register(
+    ContinuousModel, lambda model, step: TransferKind(model, model, Intersample(step, hold=False))
+)
+estimator.register(
+    SampledModel,
+    lambda model, step: TransferKind(
+        model, model.continuous_plant, Intersample(model.sample_time, hold=True)
+    ),
+)
+estimator.register(Coloured, lambda model, step: Derived(model, estimator(model.plant, step), model))
+estimator.register(
+    Reparametrised,
+    lambda model, step: Derived(model, estimator(model.coefficients, step), by=model.parametrisation),
+)
 
 
 def identify(
@@ -336,15 +325,11 @@ def _simulation(records: Records, point: Point, y: Array) -> Simulation:
     """Return the simulated outputs: the outputs less the part that prediction errors cause."""
     kind, ends = records.kind, np.cumsum(records.lengths)[:-1]
     model = kind.model.at(point.theta)
-    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-        noise = [
-            model.simulate(0.0 * u, e, 1.0)[1]
-            for (u, _), e in zip(records.parts, np.split(point.errors, ends), strict=True)
-        ]
-    outputs = y - np.concatenate(noise)
     varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, ends)])
-    with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
-        left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        each = zip(records.parts, np.split(point.errors, ends), strict=True)
+        noise = np.concatenate([model.simulate(0.0 * u, e, 1.0)[1] for (u, _), e in each])
+        left = np.linalg.norm(y - (outputs := y - noise), axis=0) / np.linalg.norm(varying, axis=0)
     able = kind.simulates(point.theta)
     fit = (float(100.0 * (1.0 - x)) if runs else None for x, runs in zip(left, able, strict=True))
     return Simulation(outputs, tuple(fit))

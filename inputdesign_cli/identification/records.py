@@ -174,9 +174,9 @@ class Records:
             directions=directions,
             towards=-slopes.sum(axis=1),
             known=slopes @ slopes.T,
-            unknowns=free.unknowns,
+            unknowns=sum(basis.free for *_, basis in free.bases),
             determinant=free.determinant,
-            of_noise=free.of_noise,
+            of_noise=sum(basis.of_noise for *_, basis in free.bases),
         )
 
     def gradient(self, theta: Array, index: int) -> Array:

@@ -16,19 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.plant.held import HeldEntry, Intersample, polynomial_roots
-from inputdesign_cli.plant.model import (
-    DELAY,
-    Fraction,
-    Parameter,
-    Parametrised,
-    WhiteNoise,
-    entry_label,
-    tables_at,
-)
+from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, WhiteNoise, entry_label, tables_at
 
 
 @dataclass(frozen=True)
-class ContinuousModel(Parametrised, WhiteNoise):
+class ContinuousModel(WhiteNoise):
     """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
 
     `numerator` and `denominator` hold ascending coefficients, s^0 first; denominators are

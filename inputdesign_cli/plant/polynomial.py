@@ -34,11 +34,6 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
     return q
 
 
-def frequencies_last(*shape: int) -> ComplexArray:
-    """Return zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
-    return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))
-
-
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     """Return the value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
 

@@ -20,11 +20,8 @@ from inputdesign_cli.plant.model import (
     Fraction,
     Parameter,
     Parametrised,
+    Signals,
     entry_label,
-    forcings_at,
-    input_gradients,
-    lefts_at,
-    noise_gradients,
     prediction_gradients,
     row_parameters,
     tables_at,
@@ -34,7 +31,6 @@ from inputdesign_cli.plant.polynomial import (
     at,
     evaluate,
     evaluate_all,
-    frequencies_last,
     powers,
     roots_in_z,
     stack,
@@ -65,6 +61,8 @@ class PolynomialModel(Parametrised):
     delays: tuple[tuple[int, ...], ...] | None = None
 
     continuous = False
+    integrates = False
+    repeated_integrators = 0
 
     @classmethod
     def single(
@@ -142,11 +140,6 @@ class PolynomialModel(Parametrised):
     def letters(self) -> frozenset[str]:
         """Return the polynomials that have free coefficients."""
         return frozenset(parameter.letter for parameter in self.parameters)
-
-    @property
-    def outputs_count(self) -> bool:
-        """Return whether the prediction gradient depends on past outputs: through coefficients of A alone."""
-        return "a" in self.letters
 
     def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
         """Return A, C or D as one polynomial an output, a common one repeated."""
@@ -254,7 +247,9 @@ class PolynomialModel(Parametrised):
         """Return the gradient dG/dtheta as (n, k, p, r)."""
         highest, entries = self._highest, self._entries
         q = unit_circle(w)
-        gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
+        # Frequencies lie side by side in memory.
+        shape = (len(self.parameters), self.outputs, self.inputs, q.size)
+        gradient = np.zeros(shape, dtype=complex).transpose(3, 0, 1, 2)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
         shifts = powers(q, highest)
         for i, j in self.active:
@@ -272,17 +267,9 @@ class PolynomialModel(Parametrised):
                         gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
         return gradient
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
-        return _input_gradients(self, [self], w)[0]
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
-        return _noise_gradients(self, [self], w)[0]
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return psi (n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
-        return _gradients([self], w, y.shape[2], y[None], u[None], e[None])[0]
+        return _gradients(self, [self], w, *(x if x is None else x[None] for x in (y, u, e)))[0]
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""
@@ -316,12 +303,17 @@ class PolynomialModel(Parametrised):
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """See `SampledPlant`."""
-        R, N = _lefts_at(self, [self], w)
-        return R[0], N[0]
+        values = at(self._fractions, unit_circle(w))
+        return values[..., 0, None] * np.eye(self.outputs), values[..., 1:]
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:
         """See `SampledPlant`: prod_j F_ij C_i / D_i."""
-        return _forcings_at(self, [self], w)[0]
+        q = unit_circle(w)
+        found = np.zeros((q.size, self.outputs, self.outputs), dtype=complex)
+        rows = zip(self.F, self.per_output(self.C), self.per_output(self.D), strict=True)
+        for i, (f, c, d) in enumerate(rows):
+            found[:, i, i] = evaluate(product_of([*f, c]), q) / evaluate(d, q)
+        return found
 
     def forcing(self, e: Array) -> Array:
         """See `SampledPlant`."""
@@ -331,67 +323,19 @@ class PolynomialModel(Parametrised):
         )
 
 
-@lefts_at.register
-def _lefts_at(
-    first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike
-) -> tuple[ComplexArray, ComplexArray]:
-    values = at(np.stack([model._fractions for model in models]), unit_circle(w))
-    return values[..., 0, None] * np.eye(first.outputs), values[..., 1:]
-
-
-@forcings_at.register
-def _forcings_at(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    q, p = unit_circle(w), first.outputs
-    found = np.zeros((len(models), q.size, p, p), dtype=complex)
-    for i in range(p):
-        above = evaluate(np.array([product_of([*m.F[i], m.row(m.C, i)]) for m in models]), q)
-        found[:, :, i, i] = above / evaluate(np.array([m.row(m.D, i) for m in models]), q)
-    return found
-
-
-@input_gradients.register
-def _input_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    """Return the input gradients (S, n, k, p, r) of models of one structure."""
-    G = np.stack([model.plant_at(w) for model in models]) if first.outputs_count else None
-    u = np.eye(first.inputs, dtype=complex)[None, None]
-    return _gradients(models, w, first.inputs, G, u, None)
-
-
-@noise_gradients.register
-def _noise_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    """Return the noise gradients (S, n, k, p, p) of models of one structure."""
-    H = np.stack([model.noise_at(w) for model in models]) if first.outputs_count else None
-    e = np.eye(first.outputs, dtype=complex)[None, None]
-    return _gradients(models, w, first.outputs, H, None, e)
-
-
 @prediction_gradients.register
-def _prediction_gradients(
+def _gradients(
     first: PolynomialModel,
     models: Sequence[PolynomialModel],
     w: ArrayLike,
-    y: NDArray,
-    u: NDArray,
-    e: NDArray,
+    y: Signals,
+    u: Signals,
+    e: Signals,
 ) -> ComplexArray:
-    """Return the prediction gradients (S, n, k, p, m) of models of one structure."""
-    return _gradients(models, w, y.shape[-1], y, u, e)
-
-
-def _gradients(
-    models: Sequence[PolynomialModel],
-    w: ArrayLike,
-    sources: int,
-    y: NDArray | None,
-    u: NDArray | None,
-    e: NDArray | None,
-) -> ComplexArray:
-    """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, by polynomials.
-
-    Args:
-        y, u, e: (S, n, p or r, m); None is a zero signal; axes of length one are broadcast.
-    """
-    first = models[0]
+    """Return the prediction gradients (S, n, k, p, m) of models of one structure, by polynomials."""
+    (sources,) = {x.shape[-1] for x in (u, e) if x is not None}
+    if y is None and "a" in first.letters:
+        y = np.stack([m.plant_at(w) @ u[0] if e is None else m.noise_at(w) @ e[0] for m in models])
     highest, letters = first._highest, first.letters
     active = first.active if u is not None else ()
     wanted = {("c", i, 0): [m.row(m.C, i) for m in models] for i in range(first.outputs)}

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
-from inputdesign_cli.plant.model import Around, Fraction, Model, SampledPlant
+from inputdesign_cli.plant.model import Derived, Fraction, Model, Predicting, SampledPlant, Signals
 
 # Number of recent parameter values that are kept with their coefficients.
 _RECENT = 4
@@ -124,7 +124,7 @@ class Words:
 
 
 @dataclass(frozen=True)
-class Reparametrised(Around):
+class Reparametrised(Predicting, Derived):
     """A model whose `coefficients` follow from `parametrisation`, with k free parameters."""
 
     coefficients: Model
@@ -181,15 +181,7 @@ class Reparametrised(Around):
         """Return the gradient dG/dphi as (n, k, p, r)."""
         return self._chained(self.coefficients.plant_gradient(w))
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dphi as (n, k, p, r), the prediction gradient due to u."""
-        return self._chained(self.coefficients.input_gradient(w))
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dphi as (n, k, p, p), the prediction gradient due to e."""
-        return self._chained(self.coefficients.noise_gradient(w))
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         return self._chained(self.coefficients.prediction_gradient(w, y, u, e))
 

@@ -12,12 +12,12 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry, Intersample, integrators
-from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, WhiteNoise
+from inputdesign_cli.plant.model import Parameter, WhiteNoise
 from inputdesign_cli.plant.transfer import StateSpace
 
 
 @dataclass(frozen=True)
-class SampledModel(Parametrised, WhiteNoise):
+class SampledModel(WhiteNoise):
     """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay in s.
 
     Sampling is linear in G: the gradient of the sampled plant is the sampled dG/da_k = -s^k b / a^2. Each
@@ -28,6 +28,7 @@ class SampledModel(Parametrised, WhiteNoise):
     sample_time: float
 
     continuous = False
+    integrates = False
 
     @property
     def outputs(self) -> int:
@@ -145,14 +146,6 @@ class SampledModel(Parametrised, WhiteNoise):
         """Return I and G, which has no poles outside the unit circle."""
         return self.forcing_at(w), self.plant_at(w)
 
-    def forcing_at(self, w: ArrayLike) -> ComplexArray:
-        """See `SampledPlant`: I."""
-        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
-
-    def forcing(self, e: Array) -> Array:
-        """See `SampledPlant`."""
-        return e
-
     @cached_property
     def singularities(self) -> ComplexArray:
         """Return the poles of G and of all gradients, as points of the frequency plane."""
@@ -167,14 +160,6 @@ class SampledModel(Parametrised, WhiteNoise):
     def memory(self) -> float:
         """Return the longest dead time in samples, its fraction of a sample counted as a whole one."""
         return max((entry.lag + 1.0 for entry in self._entries.values() if entry.delay), default=0.0)
-
-    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return (k,), all True: sampled coefficients depend on parameters in s through an exponential."""
-        return np.ones(self.theta.size, dtype=bool)
-
-    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """Raise an error: no entry is a fraction that is affine in its parameters."""
-        raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """Return the frequency response G as (n, p, r)."""

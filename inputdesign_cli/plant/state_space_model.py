@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import whole_samples
-from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised
+from inputdesign_cli.plant.model import DELAY, Parameter, Parametrised, Signals
 from inputdesign_cli.plant.transfer import StateSpace
 
 # This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.
@@ -67,6 +67,8 @@ class StateSpaceModel(Parametrised):
     sample_time: float | None = None
 
     continuous = False
+    integrates = False
+    repeated_integrators = 0
 
     @property
     def outputs(self) -> int:
@@ -232,22 +234,6 @@ class StateSpaceModel(Parametrised):
         K = self.matrices.K
         return np.pad(K, ((len(self.realisation.A) - len(K), 0), (0, 0)))
 
-    def forcing_at(self, w: ArrayLike) -> ComplexArray:
-        """See `SampledPlant`: I, since R = H^-1."""
-        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
-
-    def forcing(self, e: Array) -> Array:
-        """See `SampledPlant`."""
-        return e
-
-    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return a mask (k,) of all parameters."""
-        return np.ones(len(self.entries), dtype=bool)
-
-    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """Raise an error: no entry is a fraction that is affine in its parameters."""
-        raise ValueError("an entry of a state-space model is no fraction that is affine in its parameters")
-
     def _points(self, w: ArrayLike) -> ComplexArray:
         """Return z (m,), beside one where the model integrates."""
         given = np.atleast_1d(np.asarray(w))
@@ -280,34 +266,21 @@ class StateSpaceModel(Parametrised):
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
-        return self._of_inputs(w, np.zeros_like(self.matrices.K))
-
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
-        return self._of_inputs(w, self.matrices.K)
-
-    def _of_inputs(self, w: ArrayLike, K: Array) -> ComplexArray:
-        z = self._points(w)
-        x = self._resolvent(z, self.held[0]) @ self._entering(z, *self.held[1:])
+        z, (A, early, late) = self._points(w), self.held
         u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (z.size, self.inputs, self.inputs))
-        return self._gradient(z, x, u, None, K)
+        x = self._resolvent(z, A) @ self._entering(z, early, late)
+        return self._gradient(z, x, u, None, np.zeros_like(self.matrices.K))
 
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
-        z = self._points(w)
-        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (z.size, self.outputs, self.outputs))
-        x = self._resolvent(z, self.held[0]) @ self.matrices.K.astype(complex)
-        return self._gradient(z, x, None, e, self.matrices.K)
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
-        driven = (self._entering(z, early, late) - m.K @ self._direct(z, m.D)) @ u + m.K @ y
-        return self._gradient(z, self._resolvent(z, A - m.K @ m.C) @ driven, u, e, m.K)
+        driven = m.K @ e if u is None else self._entering(z, early, late) @ u
+        if y is not None and u is not None:
+            driven = driven + m.K @ (y - self._direct(z, m.D) @ u)
+            A = A - m.K @ m.C
+        return self._gradient(z, self._resolvent(z, A) @ driven, u, e, m.K)
 
-    def _gradient(
-        self, z: ComplexArray, x: ComplexArray, u: NDArray | None, e: NDArray | None, K: Array
-    ) -> ComplexArray:
+    def _gradient(self, z: ComplexArray, x: ComplexArray, u: Signals, e: Signals, K: Array) -> ComplexArray:
         """Return dy^ (n, k, p, m) from states x (n, order, m), inputs and errors of the predictor."""
         read = self.matrices.C @ self._resolvent(z, self.held[0] - K @ self.matrices.C)
         gradient = np.zeros((z.size, len(self.entries), self.outputs, x.shape[2]), dtype=complex)
