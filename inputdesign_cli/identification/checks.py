@@ -39,14 +39,10 @@ def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1
 
 
 def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
-    """Check that no channel keeps one value throughout.
-
-    Args:
-        names: of the parameters, for the diagnostic.
-        u, y: (samples, r), (samples, p).
+    """Check that no channel of u (samples, r) and y (samples, p) keeps one value throughout.
 
     Raises:
-        SpecError: `constant-input`, `constant-output`.
+        SpecError: `constant-input`, `constant-output`; it has the `names` of the parameters.
     """
     for letter, signals in (("u", u), ("y", y)):
         for index, signal in enumerate(signals.T):

@@ -17,10 +17,9 @@ from functools import reduce
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import STEP, Extension, Kind, Part, Starts
+from inputdesign_cli.identification.kind import STEP, Extension, Kind, Mask, Parts, Starts
 from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.records import Point, Records, evaluate
 from inputdesign_cli.identification.stability import is_stable, reflected
@@ -59,7 +58,7 @@ class Derived(Kind):
     def _noise(self, theta: Array) -> Coloured | None:
         return None if self.coloured is None else self.coloured.at(self._all(theta))
 
-    def _moving(self, of_plant: NDArray[np.bool_], own: bool) -> NDArray[np.bool_]:
+    def _moving(self, of_plant: Mask, own: bool) -> Mask:
         """Return the mask (k,) of the parameters that move a marked coefficient; `own` marks C and D."""
         size = 0 if self.coloured is None else len(self.coloured.own_parameters)
         marked = np.concatenate([of_plant, np.full(size, own)])
@@ -71,16 +70,16 @@ class Derived(Kind):
         return self.plant.recent
 
     @property
-    def explaining(self) -> NDArray[np.bool_]:
+    def explaining(self) -> Mask:
         """Return the mask (k,) of parameters that move an explaining coefficient of the plant."""
         return self._moving(self.plant.explaining, own=False)
 
     @property
-    def whitening(self) -> NDArray[np.bool_]:
+    def whitening(self) -> Mask:
         """Return the mask (k,) of parameters that move a whitening coefficient, C or D."""
         return self._moving(self.plant.whitening, own=True)
 
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p); NaN if a coefficient is infinite."""
         here = None if self.by is None else self.by.at(theta)
         if here is not None and here.undefined is not None:
@@ -98,7 +97,7 @@ class Derived(Kind):
             return raw
         return tuple(start.through(C, D) for start, (D, C) in zip(raw, noise.inverse_filters, strict=True))
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.bool_]:
+    def in_starts(self, late: int, *, free: bool) -> Mask:
         """Return the mask of parameters that move a coefficient on which the starts depend."""
         return self._moving(self.plant.in_starts(late, free=free), own=True)
 
@@ -121,7 +120,7 @@ class Derived(Kind):
         back = np.linalg.pinv(jacobian[late], rcond=1e-12)
         return np.asarray(steps @ back.T) if steps.size else np.zeros((0, 2, theta.size))
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         raw, noise = self.plant.whitened(self._of_plant(theta), signals), self._noise(theta)
         if noise is None:
@@ -168,9 +167,7 @@ class Derived(Kind):
                     out[columns] = reflected(monic)[1:]
         return out
 
-    def starting_points(
-        self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
-    ) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return the starting points of all coefficients, mapped to the parameters, and the `given` one."""
         if self.by is not None:
             found = self.plant.starting_points(parts, None, ~np.any(self.by.moves, axis=1))
@@ -239,9 +236,7 @@ def brought_back(at: Parametrisation, point: Point) -> Array:
     return np.asarray(found.x * unit, dtype=float)
 
 
-def _coloured(
-    noise: Coloured, raw: Array, of_plant: NDArray[np.float64]
-) -> tuple[Array, NDArray[np.float64]]:
+def _coloured(noise: Coloured, raw: Array, of_plant: Array) -> tuple[Array, Array]:
     """Return errors (N, p) and psi (K, N, p) of all coefficients from the plant's."""
     first, errors = len(of_plant), np.empty(raw.shape)
     psi = np.zeros((first + len(noise.own_parameters), *raw.shape))

@@ -63,10 +63,10 @@ class Alternative:
     name: str  # of the parameter
     phrase: str  # what it is, for a sentence
     fault: Fault  # what is wrong if it is missing
-    column: NDArray[np.float64]  # (N, p), minus the derivative of the prediction errors with respect to it
+    column: Array  # (N, p), minus the derivative of the prediction errors with respect to it
     slopes: Callable[[Model, ArrayLike], ComplexArray]  # dG by it at (n,), of each state, (states, n, p, r)
     lag: bool = False  # whether it is a pole or a dead time of the plant
-    echo: NDArray[np.float64] | None = None  # (lags, p, p), how `column` responds to past errors, if it does
+    echo: Array | None = None  # (lags, p, p), how `column` responds to past errors, if it does
     estimated: Callable[[], tuple[Model, float]] | None = None  # larger model, its likelihood ratio
 
 
@@ -217,11 +217,8 @@ class Moves:
     def odds(self, probability: float) -> float:
         """Return the odds that the parameter exists and G exceeds the admissible error, from even prior odds.
 
-        The evidence for the parameter is the Bayes factor of a normal estimate ([kass-raftery-1995]). A
-        priori it is normal about zero, of a size that moves G by about the admissible error.
-
-        Args:
-            probability: of an estimate as far from zero, if the parameter is not there.
+        The evidence is the Bayes factor of a normal estimate ([kass-raftery-1995]) that is as far from zero
+        by chance with this `probability`. A priori it is normal and moves G by about the admissible error.
         """
         reach = float(np.max(self.deviation))
         if reach == 0.0:
@@ -286,9 +283,7 @@ def variations(records: Records, theta: Array, simulated: Array | None) -> tuple
     For an input with two values, powers and sign are the input itself about a level: they add nothing.
 
     Args:
-        theta: (k,), the estimate.
-        simulated: (N, p), the response to the inputs; None if it cannot be simulated, or frequencies are not
-            in rad/sample.
+        simulated: (N, p), the response to the inputs; None if unstable, or in continuous time.
     """
     found, u, lengths = [], records.u, records.lengths
     for channel, samples in enumerate(u.T):

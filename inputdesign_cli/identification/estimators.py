@@ -122,8 +122,8 @@ class BatchEstimate:
     """Prediction-error estimates of many records."""
 
     theta: Array  # (runs, k)
-    noise: NDArray[np.float64]  # (runs, p, p) covariance of e, unbiased to first order
-    information: NDArray[np.float64]  # (runs, k, k), whose inverse is the covariance of theta
+    noise: Array  # (runs, p, p) covariance of e, unbiased to first order
+    information: Array  # (runs, k, k), whose inverse is the covariance of theta
     converged: NDArray[np.bool_]  # (runs,)
     steps: NDArray[np.int64]  # (runs,)
 
@@ -132,10 +132,7 @@ class BatchEstimate:
 def estimator(model: Model, step: float) -> Kind:
     """Return the structure of the estimator for models of this kind, from samples `step` apart.
 
-    Models in discrete time have their own step.
-
-    Raises:
-        TypeError: none is registered.
+    Models in discrete time have their own step. A TypeError says that none is registered.
     """
     raise TypeError(f"no estimator is registered for {type(model).__name__}")
 
@@ -249,13 +246,9 @@ def information_of_data(
     free: bool = False,
     earlier: Earlier | None = None,
 ) -> Array:
-    """Return the information matrix (k, k) of records at a model's own parameters and noise.
+    """Return the information matrix (k, k) of records at a model's own parameters and noise, fitting or not.
 
-    The parameters need not fit best.
-
-    Args:
-        model, u, y, step, lengths, earlier: see `identify`.
-        free: whether starts and levels of the records are unknown.
+    If `free`, starts and levels of the records are unknown; for the rest see `identify`.
     """
     parts = split(u, y, lengths)
     records = Records(estimator(model, step), tuple(centred(parts) if free else parts), free=free)
@@ -266,9 +259,7 @@ def information_of_data(
 def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) -> Array:
     """Return the information matrix (k, k) of a record whose initial state and level are unknown.
 
-    Args:
-        u, y: (N, r), (N, p), signals without noise; the excitation of both is all that is counted.
-        step: time between samples of a plant in continuous time.
+    Only the excitation of u (N, r) and y (N, p) counts: they are signals without noise.
     """
     weights = np.asarray(np.linalg.inv(model.covariance), dtype=float)
     records = Records(estimator(model, step), ((u, y),), weights=weights)
@@ -280,13 +271,7 @@ def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) ->
 def concluded(
     found: Search, parts: Sequence[Part], step: float, *, experiments: Sequence[int], feedback: bool
 ) -> Estimate:
-    """Return the estimate with its covariance and the tests of its residuals.
-
-    Args:
-        found: where the search ended.
-        parts: the records as measured, of samples `step` apart.
-        experiments: the samples of each experiment.
-        feedback: whether u(t) depends on y(t).
+    """Return the estimate with its covariance and the tests of its residuals, from records as measured.
 
     Raises:
         SpecError: `noise-free-data` or `not-exciting`.
@@ -375,13 +360,10 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
 
 
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
-    """Return the information of a mixture if minima beyond sampling instants are about as likely.
+    """Return the factor of the information of a mixture if minima beyond instants are about as likely.
 
     The weight of each is its likelihood times the square root of the determinant of its covariance (Laplace's
     method, [tierney-kadane-1986]). The covariance is that of the mixture about the estimate.
-
-    Args:
-        factor: L (k, k) of the best minimum alone, its information L L^T.
     """
     logarithms, spreads = [0.0], [np.eye(len(factor))]
     for point, excess in found.beside:

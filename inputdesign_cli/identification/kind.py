@@ -18,6 +18,8 @@ from inputdesign_cli.plant.model import Listed
 
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""
+Parts = Sequence[Part]
+Mask = NDArray[np.bool_]
 
 STEP = 1e-6
 """The step of central differences, in shares of the size of a parameter."""
@@ -55,7 +57,7 @@ class Extension(NamedTuple):
 class Batch(Problem, Protocol):
     """A problem of many records that knows the noise and the information at its minima."""
 
-    def concluded(self, theta: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def concluded(self, theta: Array) -> tuple[Array, Array]:
         """Return the covariance (runs, p, p) of e and the information (runs, k, k) at theta (runs, k)."""
 
 
@@ -75,17 +77,17 @@ class Kind(ABC):
         return 0
 
     @property
-    def explaining(self) -> NDArray[np.bool_]:
+    def explaining(self) -> Mask:
         """Return the mask (k,) of the parameters that take directions of past inputs away from residuals."""
         return self.model.in_plant
 
     @property
-    def whitening(self) -> NDArray[np.bool_]:
+    def whitening(self) -> Mask:
         """Return the mask (k,) of the parameters that make residuals look whiter."""
         return ~self.explaining
 
     @abstractmethod
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
 
     def batch(self, u: Array, y: Array) -> Batch | None:
@@ -101,7 +103,7 @@ class Kind(ABC):
         """
 
     @abstractmethod
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.bool_]:
+    def in_starts(self, late: int, *, free: bool) -> Mask:
         """Return the mask (k,) of the parameters on which the starts depend."""
 
     def start_steps(self, theta: Array, samples: int) -> Array:
@@ -128,7 +130,7 @@ class Kind(ABC):
                     found.append(np.outer(there, np.eye(theta.size)[index]))
         return np.array(found).reshape(-1, 2, theta.size)
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         return np.repeat(signals[None], self.model.outputs, axis=0)
 
@@ -137,9 +139,7 @@ class Kind(ABC):
         """Return theta (k,), changed where its predictor would be unstable."""
 
     @abstractmethod
-    def starting_points(
-        self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
-    ) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return starting points from records at rest about zero, and the `given` one (k,).
 
         Args:
@@ -154,7 +154,7 @@ class Kind(ABC):
         """
         return []
 
-    def echoes(self, theta: Array, samples: int) -> NDArray[np.float64]:
+    def echoes(self, theta: Array, samples: int) -> Array:
         """Return the responses of gradients to past errors, (k, lags, p, p): parameter, lag, output, error.
 
         They are zero for parameters of the plant alone. They count as zero if the response does not fade: it

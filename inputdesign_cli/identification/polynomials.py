@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
-from inputdesign_cli.identification.kind import Batch, Extension, Kind, Part, Starts
+from inputdesign_cli.identification.kind import Batch, Extension, Kind, Mask, Parts, Starts
 from inputdesign_cli.identification.polynomial_rows import (
     FromRest,
     Row,
@@ -48,11 +47,11 @@ class PolynomialKind(Kind):
         return max(row.memory for row in self.rows)
 
     @property
-    def explaining(self) -> NDArray[np.bool_]:
+    def explaining(self) -> Mask:
         """Return the mask (k,) of the coefficients of B and F."""
         return self._among("bf")
 
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
         errors, each = errors_and_gradients(self.rows, theta[None], u.T[None], y.T[None])
         psi = np.zeros((theta.size, *y.shape))
@@ -67,11 +66,10 @@ class PolynomialKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past on the prediction errors, output by output.
 
-        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j. This sum is off by impulses if y and u
-        before the record are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown
-        level of its input a step through 1/F_j. For a stable F_j the others make up for the
-        step, but not if F_j integrates or nearly does. From rest only y is missing, which noise has moved.
-        That matters only if the predictor remembers y beyond its order.
+        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j, which is off by impulses if earlier y
+        and u are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown level of its
+        input a step, which the others make up for unless F_j integrates or nearly does. From rest only y is
+        missing, which noise has moved. That matters only if the predictor remembers y beyond its order.
         """
         return tuple(_start(row, theta, samples, free=free) for row in self.rows)
 
@@ -80,14 +78,14 @@ class PolynomialKind(Kind):
         entries = (entry for row in self.rows for entry in zip(row.b, row.f, strict=True))
         return max([0, *(b.lags.stop - f.lags.stop for b, f in entries)])
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.bool_]:
+    def in_starts(self, late: int, *, free: bool) -> Mask:
         """Return the mask of the coefficients of C and D; of F as well if the states are free."""
         return self._among("cdf" if free else "cd")
 
-    def _among(self, letters: str) -> NDArray[np.bool_]:
+    def _among(self, letters: str) -> Mask:
         return np.array([parameter.letter in letters for parameter in self.model.parameters], dtype=bool)
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals (N, m) filtered by D/C of each output, as (p, N, m)."""
         return np.array([filtered(*row.whitening(theta), signals, axis=0) for row in self.rows])
 
@@ -95,9 +93,7 @@ class PolynomialKind(Kind):
         """Return theta with the roots of C, D and F inside the unit circle."""
         return stabilised(self.rows, theta[None])[0]
 
-    def starting_points(
-        self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
-    ) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return each output's own estimate; shared parameters are weighted by the information of each."""
         listed = np.zeros((0, len(self.model.names))) if given is None else given[None]
         points, tried = list[Array](), 0

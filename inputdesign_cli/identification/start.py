@@ -36,13 +36,13 @@ _MOST_ROUNDS = 30
 class Start(NamedTuple):
     """The effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
 
-    free: NDArray[np.float64]  # (m, N), by the level and states, of which nothing is known
-    disturbance: NDArray[np.float64]  # (m, N), `free` before the inverse of the noise model
-    noise: NDArray[np.float64]  # (n, N), by independent unknowns of the variance of e
-    zeros: NDArray[np.float64]  # -2 log of a density of the zeros of the noise model, see `density`; a scalar
+    free: Array  # (m, N), by the level and states, of which nothing is known
+    disturbance: Array  # (m, N), `free` before the inverse of the noise model
+    noise: Array  # (n, N), by independent unknowns of the variance of e
+    zeros: Array  # -2 log of a density of the zeros of the noise model, see `density`; a scalar
 
     @classmethod
-    def white(cls, free: NDArray[np.float64]) -> Start:
+    def white(cls, free: Array) -> Start:
         """Return the start under white noise, which has no past."""
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
@@ -53,7 +53,7 @@ class Start(NamedTuple):
         return Start(free, self.disturbance, past, self.zeros + (density(C) if C.size > 1 else 0.0))
 
 
-def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
+def noise_before(C: Array, D: Array, samples: int) -> Array:
     """Return the effect of stationary noise C/D e before a record on (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the

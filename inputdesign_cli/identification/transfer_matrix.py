@@ -8,18 +8,17 @@ its slowest poles.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import polynomial as ascending
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import STEP, Extension, Kind, Part, Starts, late_samples
+from inputdesign_cli.identification.kind import STEP, Extension, Kind, Mask, Parts, Starts, late_samples
 from inputdesign_cli.identification.polynomials import with_entry
 from inputdesign_cli.identification.records import RecordProblem, Records, shifted
 from inputdesign_cli.identification.start import Start
@@ -53,7 +52,7 @@ class TransferKind(Kind):
     plant: ContinuousModel  # the model in s
     between: Intersample
 
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
         model = self.plant.at(theta)
         errors, psi = y.copy(), np.zeros((theta.size, *y.shape))
@@ -69,9 +68,8 @@ class TransferKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past of each output: a level, and the free response of its entries.
 
-        A level of the input is unknown as well. Level and states make it up where poles are stable, but not
-        the ramp that an integrator, or nearly one, makes of it. Inputs before the record that come late by a
-        dead time move the states, sample by sample, as if from anywhere.
+        Level and states make up for an unknown level of the input where poles are stable, but not for the
+        ramp of an integrator, or nearly one. Inputs late by a dead time move the states as from anywhere.
         """
         if not free:
             return (Start.white(np.zeros((0, samples))),) * self.model.outputs
@@ -82,7 +80,7 @@ class TransferKind(Kind):
             found[i].append(_begun(a, self.between.sample_time, samples, late))
         return tuple(Start.white(np.concatenate(parts)) for parts in found)
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.bool_]:
+    def in_starts(self, late: int, *, free: bool) -> Mask:
         """Return the mask of the coefficients of the denominators if the states are free."""
         return np.array([free and parameter.letter == "a" for parameter in self.model.parameters], dtype=bool)
 
@@ -127,9 +125,7 @@ class TransferKind(Kind):
             out[columns] = np.poly(poles).real[:0:-1]
         return out
 
-    def starting_points(
-        self, parts: Sequence[Part], given: Array | None, known: NDArray[np.bool_] | None = None
-    ) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return the likeliest starts after a few steps from rest, and the `given` one."""
         about, parameters = Records(self, tuple(parts)), self.plant.parameters
         above = np.array([parameter.letter == "b" for parameter in parameters])
@@ -188,15 +184,11 @@ def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int)
 def _starting_points(
     model: ContinuousModel, between: Intersample, held: Mapping[Place, float], u: Array, y: Array
 ) -> Iterator[Array]:
-    """Yield dead times and denominators (k,), numerators zero, for each cutoff, from one record.
+    """Yield dead times and denominators (k,), numerators zero, for each cutoff, from u (N, r) and y (N, p).
 
-    Cutoffs lie between the record's length and its step. Dead times are searched on a grid, one after the
-    other, by the residuals of the regression of the row. A single one also takes its next best minima.
-
-    Args:
-        model: gives the structure.
-        held: known dead times of entries.
-        u, y: (N, r), (N, p).
+    Cutoffs lie between the record's length and its step. Dead times that are not `held` are searched on a
+    grid, one after the other, by the residuals of the regression of the row. A single one also takes its
+    next best minima.
     """
     samples, step = len(y), between.sample_time
     for cutoff in np.geomspace(8.0 * np.pi / (samples * step), 0.5 * np.pi / step, _CUTOFFS):

@@ -41,12 +41,9 @@ _DIFFERENCE = np.array([1.0, -1.0])
 class Coloured(Parametrised, Derived):
     """A model `plant` with H0 whose noise is filtered by C_i / (D_i Delta_i); H0 is diagonal.
 
-    Attributes:
-        C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
-            the parameters of the plant.
-        held: of each D, whether it is known. Then it may have roots on the unit circle, and the gradient with
-            respect to its coefficients is not needed (and given as zero).
-        drift: whether the noise integrates, Delta = 1 - q^-1; one for all outputs or one an output.
+    C and D are monic, one common to all outputs or one an output; their coefficients are the last parameters.
+    A D that is `held` is known: it may have roots on the unit circle, and its gradient counts as zero. If the
+    noise `drift`s, it integrates: Delta = 1 - q^-1.
     """
 
     plant: Listed

@@ -6,29 +6,26 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.transfer import Rational, product_of
 
 
-def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], period: float) -> Rational:
+def zero_order_hold(
+    numerator: Sequence[float], denominator: Sequence[float], period: float, delay: float = 0.0
+) -> Rational:
     """Return the zero-order-hold sample of a transfer function in s (descending powers), in q^-1 (ascending).
 
-    `period` is in the unit of time of s. Any leading delay stays in the numerator.
+    Samples are a `period` apart. A leading delay stays in the numerator.
     """
-    if len(denominator) == 1:
-        return Rational(np.array([numerator[-1] / denominator[0]]))
-    import scipy.signal  # only now: see `plant.filtering`
-
-    # scipy takes coefficients below 1e-14 for zeros, so it gets a numerator of order one.
-    given = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
-    gain = float(np.abs(given).max(initial=0.0))
-    scaled = given / gain if gain > 0 else np.ones(1)
-    above, below, _ = scipy.signal.cont2discrete((scaled, denominator), period, method="zoh")
-    # In z both have the same length, so that they are the coefficients in q^-1, ascending.
-    top = gain * np.ravel(above).astype(float)
-    return Rational(np.concatenate([np.zeros(below.size - top.size), top]), (below,))
+    low, high = (np.trim_zeros(np.array(p[::-1], dtype=float), "b") for p in (numerator, denominator))
+    if delay and not low.size:
+        return Rational(np.zeros(1))
+    low = low if low.size else np.zeros(1)
+    above, below = HeldEntry.of(low / high[-1], high / high[-1], period, delay or None).sampled
+    return Rational(above, (below,))
 
 
 def hold_entries(
@@ -43,22 +40,11 @@ def hold_entries(
         delays: the dead times of the entries.
     """
     held = [
-        [_held(above, below, period, late) for above, below, late in zip(*rows, strict=True)]
+        [zero_order_hold(above, below, period, late) for above, below, late in zip(*rows, strict=True)]
         for rows in zip(numerators, denominators, delays, strict=True)
     ]
     above = tuple(tuple(entry.numerator for entry in row) for row in held)
     return above, tuple(tuple(entry.denominator_polynomial for entry in row) for row in held)
-
-
-def _held(above: Sequence[float], below: Sequence[float], period: float, delay: float) -> Rational:
-    """Return one entry with its dead time, sampled behind a hold."""
-    if not delay:
-        return zero_order_hold(above, below, period)
-    low, high = (np.trim_zeros(np.array(p[::-1], dtype=float), "b") for p in (above, below))
-    if not low.size:
-        return Rational(np.zeros(1))
-    numerator, denominator = HeldEntry.of(low / high[-1], high / high[-1], period, delay).sampled
-    return Rational(numerator, (denominator,))
 
 
 Rule = Literal["tustin", "backward", "zoh"]
@@ -69,12 +55,7 @@ _SUM = np.array([1.0, 1.0])
 def discretised(
     numerator: Sequence[float], factors: Sequence[Sequence[float]], period: float, rule: Rule
 ) -> Rational:
-    """Return the discretisation in q^-1 of a proper transfer function in s.
-
-    Args:
-        numerator: descending in s; `factors` of the denominator likewise.
-        period: between samples, in the unit of time of s.
-    """
+    """Return the discretisation in q^-1 of a proper transfer function in s (descending), at this period."""
     if rule == "zoh":
         return zero_order_hold(numerator, product_of(factors).tolist(), period)
     orders = [len(factor) - 1 for factor in factors]
@@ -123,9 +104,7 @@ def _added(parts: Sequence[Rational]) -> Rational:
     total = np.zeros(1)
     for part in parts:
         others = [factor for other in parts if other is not part for factor in other.denominator]
-        term = product_of([part.numerator, *others])
-        size = max(term.size, total.size)
-        total = np.pad(total, (0, size - total.size)) + np.pad(term, (0, size - term.size))
+        total = ascending.polyadd(total, product_of([part.numerator, *others]))
     return Rational(total, below)
 
 

@@ -29,6 +29,12 @@ def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
     return np.abs(np.angle(z)) + 1j * np.abs(np.log(np.abs(z)))
 
 
+def frequency_plane(roots: ArrayLike) -> ComplexArray:
+    """Return roots in s as frequency + j damping."""
+    s = np.asarray(roots, dtype=complex)
+    return np.abs(s.imag) + 1j * np.abs(s.real)
+
+
 def graded_grid(
     singularities: ArrayLike, lo: float, hi: float, *, points: int = 1000, knots: ArrayLike = ()
 ) -> Array:
@@ -84,18 +90,14 @@ def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
 def local_maxima(
     function: Callable[[Array], Array], grid: Array, values: Array, *, above: float = -np.inf
 ) -> tuple[Array, Array]:
-    """Return the local maxima of `function` over [grid[0], grid[-1]], polished between the grid points.
+    """Return frequencies and values of the local maxima of `function` over [grid[0], grid[-1]], ascending.
 
-    `function` maps frequencies (n,) to values (n,) and `values` are its values on `grid`. Around
-    every grid maximum the grid is refined once, which parts twin peaks that share a bracket; then each
-    bracket is narrowed by repeated sampling, all at once. Only continuity is asked for (tables have
-    kinks). Maxima with values <= `above` are left out.
+    It maps frequencies (n,) to values (n,), and `values` are those on the grid. Around every grid maximum the
+    grid is refined once, which parts twin peaks in one bracket; then each bracket is narrowed by repeated
+    sampling, all at once. Only continuity is asked for (tables have kinks). Values <= `above` are left out.
 
-    Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum
-    that differs only by rounding from the value at an end of the grid is at that end.
-
-    Returns:
-        Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
+    Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum that
+    differs only by rounding from the value at an end of the grid is at that end.
     """
     index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
     if index.size == 0:
@@ -139,10 +141,8 @@ def local_maxima(
 def _within_reach(values: Array, around: NDArray[np.intp], above: float) -> NDArray[np.intp]:
     """Return the peaks of a grid beside which the function may exceed `above`.
 
-    The cells `around` are refined: there it has less room to rise, in proportion to the steps at least.
-
-    Args:
-        around: cells of the grid before it was refined, ascending; cell i lies between points i and i + 1.
+    The cells `around`, between points i and i + 1 of the coarse grid, are refined: there it has less room to
+    rise, in proportion to the steps at least.
     """
     if not np.isfinite(above):
         return _peaks(values, above)

@@ -21,7 +21,6 @@ from functools import cached_property
 import numpy as np
 import scipy
 from numpy.polynomial import polynomial as ascending
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.model import DELAY
@@ -297,7 +296,7 @@ class Intersample:
     sample_time: float
     hold: bool
 
-    def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
+    def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> Array:
         """Return the columns (.., N, columns) of an entry that samples (.., N) drive from rest.
 
         Measured outputs are never held, whatever the input is.
@@ -317,6 +316,6 @@ class Intersample:
         driven = scipy.fft.irfft(transform[..., None] * columns, length, axis=-2)
         return np.asarray(driven[..., :samples, :] / weights[:, None])
 
-    def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
+    def caused(self, entry: HeldEntry, u: Array) -> Array:
         """Return the output (.., N) of an entry that samples u (.., N) drive."""
         return np.asarray(self.responses(entry, u, hold=self.hold) @ entry.gain)

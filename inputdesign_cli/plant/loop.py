@@ -50,13 +50,10 @@ class Loop:
         [R  -N] [y]   [R H e]
         [P   Q] [u] = [Q r  ]
 
-    in which nothing has poles on or outside the unit circle. Unstable and integrating poles of plant and
-    controller are zeros of R and Q, so that their effect in the loop stays finite.
-
-    Poles and signals come from the states of G and of the rows of C. One polynomial in q^-1 would lose the
-    digits of poles that crowd at z = 1 when sampling is fast. States that feedback does not reach are poles
-    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has a
-    delay.
+    in which nothing has poles on or outside the unit circle: these are zeros of R and Q, and their effect in
+    the loop stays finite. Poles and signals come from the states of G and of the rows of C, since one
+    polynomial in q^-1 would lose the digits of poles that crowd at z = 1. y(t) is measured before u(t) is
+    applied; a controller that needs time to compute has a delay.
     """
 
     model: SampledPlant
@@ -167,13 +164,10 @@ class Loop:
             )
 
     def check_delay(self) -> None:
-        """Raise `SpecError` where both plant and controller act at once.
+        """Raise `SpecError` (`algebraic-loop`) where both plant and controller act at once.
 
-        Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an
-        estimate from u and y, is biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
-
-        Raises:
-            SpecError: `algebraic-loop`.
+        Then u(t) holds e(t), and so does the gradient of the prediction of y(t): an estimate from u and y is
+        biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
         """
         answers = self.instantaneous[self.model.outputs :, : self.model.outputs] != 0.0
         if np.any(self.model.at_once @ answers):

@@ -45,11 +45,8 @@ class PolynomialModel(Parametrised):
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
     are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
-    common coefficients go without: `a1`. An entry B_ij that is absent has no parameters.
-
-    Attributes:
-        delays: (p, r), the power of the first coefficient of each B that is free, its length where the entry
-            is absent; if None, zeros of B say so.
+    common coefficients go without: `a1`. An absent entry B_ij has no parameters. `delays` (p, r) are the
+    powers of the first free coefficients of B, or its lengths if absent; if None, zeros of B say so.
     """
 
     B: Rows
@@ -75,7 +72,7 @@ class PolynomialModel(Parametrised):
         F: ArrayLike = (1.0,),
         variance: float = 1.0,
     ) -> Self:
-        """Return whether there is one input and one output."""
+        """Build a model of one input and one output."""
         a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
         return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
 

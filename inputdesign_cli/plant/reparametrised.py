@@ -26,9 +26,8 @@ _RECENT = 4
 class Parametrisation:
     """Holds m parameters, k of them `free`, and the K coefficients of a model that follow from them.
 
-    Attributes:
-        labels: (m,) their names for the user; `symbols` (m,) their names in `terms` (K,).
-        values: (m,); parameters that are not free are known.
+    The `labels` (m,) are their names for the user, the `symbols` (m,) their names in the `terms` (K,). The
+    other `values` (m,) are known.
     """
 
     labels: tuple[str, ...]
@@ -112,10 +111,8 @@ Place = Sequence[str | int]
 class Words:
     """Holds a plant section with named parameters as written, so that it can be repeated with other values.
 
-    Attributes:
-        plant: the section as it was written; None if it lists the coefficients of the model.
-        places: label -> where its value stands in the section.
-        known: the parameters of plant and of noise that are listed as known.
+    The `plant` is None if it lists the coefficients. Each label has its `places` in it. The parameters of
+    plant and of noise that are listed as known are in `known`.
     """
 
     plant: Mapping[str, object] | None = None

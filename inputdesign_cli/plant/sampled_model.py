@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
@@ -13,7 +14,7 @@ from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry, Intersample, integrators
 from inputdesign_cli.plant.model import Parameter, WhiteNoise
-from inputdesign_cli.plant.transfer import StateSpace
+from inputdesign_cli.plant.transfer import Drive, StateSpace
 
 
 @dataclass(frozen=True)
@@ -101,36 +102,19 @@ class SampledModel(WhiteNoise):
     @cached_property
     def realisation(self) -> StateSpace:
         """Return a realisation whose states are the past of each input, then the states of each entry."""
-        lags = [(j, entry.direct_lag) for (_, j), entry in self._entries.items()]
-        past = [max((lag for other, lag in lags if other == j), default=0) for j in range(self.inputs)]
-        first = np.concatenate([[0], np.cumsum(past)]).astype(int)
-        orders = [entry.order for entry in self._entries.values()]
-        size = int(first[-1]) + sum(orders)
-        A, B = np.zeros((size, size)), np.zeros((size, self.inputs))
-        C, D = np.zeros((self.outputs, size)), np.zeros((self.outputs, self.inputs))
-        for j, length in enumerate(past):
-            A[first[j] : first[j + 1], first[j] : first[j + 1]] = np.eye(length, k=-1)
-            if length:
-                B[first[j], j] = 1.0
-
-        def read(into: Array, at_once: Array, j: int, lag: int, column: Array) -> None:
-            """Let a column read u_j(k - lag), off the past or off the input itself."""
-            if lag:
-                into[:, first[j] + lag - 1] += column
-            else:
-                at_once[:, j] += column
-
-        start = int(first[-1])
+        entries = self._entries.values()
+        blocks = [entry.transition[: entry.order, : entry.order] for entry in entries]
+        states, drives, start = np.eye(sum(map(len, blocks))), list[Drive](), 0
+        C = np.zeros((self.outputs, len(states)))
         for (i, j), entry in self._entries.items():
-            own = slice(start, start + entry.order)
-            start += entry.order
-            A[own, own], C[i, own] = entry.transition[: entry.order, : entry.order], entry.gain[: entry.order]
-            early, late = entry.entries[: entry.order].T
-            read(A[own], B[own], j, entry.lag, early)
-            if np.any(late):
-                read(A[own], B[own], j, entry.lag + 1, late)
-            read(C[i : i + 1], D[i : i + 1], j, entry.direct_lag, np.array([entry.direct]))
-        return StateSpace(A, B, C, D)
+            own, direct = slice(start, start + entry.order), np.eye(self.outputs)[i] * entry.direct
+            start, C[i, own] = own.stop, entry.gain[: entry.order]
+            early, late = (states[:, own] @ entry.entries[: entry.order]).T
+            drives.append(Drive(j, entry.lag, early, 0.0 * direct))
+            drives.append(Drive(j, entry.direct_lag, late, direct))
+        return StateSpace.behind_past(
+            scipy.linalg.block_diag(np.zeros((0, 0)), *blocks), C, drives, self.inputs
+        )
 
     @property
     def noise_gain(self) -> Array:

@@ -23,7 +23,7 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import whole_samples
 from inputdesign_cli.plant.model import DELAY, Parameter, Parametrised, Signals
-from inputdesign_cli.plant.transfer import StateSpace
+from inputdesign_cli.plant.transfer import Drive, StateSpace
 
 # This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.
 _BESIDE = 1e-8
@@ -56,9 +56,8 @@ class Slope(NamedTuple):
 class StateSpaceModel(Parametrised):
     """A state-space model as above; e is white with a full covariance (p, p).
 
-    Attributes:
-        matrices: in continuous time, and behind a hold, where there is a `sample_time`; otherwise of samples.
-        entries: the free entries: letter, row and column; ("delay", 0, 0) for the dead time.
+    With a `sample_time` the matrices are in continuous time, behind a hold, otherwise of samples. The free
+    `entries` are letter, row and column, and ("delay", 0, 0) for the dead time.
     """
 
     matrices: Matrices
@@ -299,31 +298,11 @@ class StateSpaceModel(Parametrised):
     @cached_property
     def realisation(self) -> StateSpace:
         """Return a realisation whose states are the past of the inputs, then the states of the model."""
-        (A, early, late), m, r = self.held, self.matrices, self.inputs
-        past = max(self.direct_lag, self.lag)
-        first = past * r
-        size = first + self.order
-        full = StateSpace(
-            np.zeros((size, size)),
-            np.zeros((size, r)),
-            np.concatenate([np.zeros((self.outputs, first)), m.C], axis=1),
-            np.zeros((self.outputs, r)),
-        )
-        full.A[first:, first:] = A
-        if past:
-            full.A[r:first, : first - r] = np.eye(first - r)
-            full.B[:r] = np.eye(r)
-        for lag, states, outputs in (
-            (self.lag, early, np.zeros_like(m.D)),
-            (self.lag + 1, late, np.zeros_like(m.D)),
-            (self.direct_lag, np.zeros_like(early), m.D),
-        ):
-            if not (np.any(states) or np.any(outputs)):
-                continue
-            column = slice((lag - 1) * r, lag * r)
-            (full.A if lag else full.B)[first:, column if lag else slice(None)] += states
-            (full.C if lag else full.D)[:, column if lag else slice(None)] += outputs
-        return full
+        (A, early, late), m, drives = self.held, self.matrices, list[Drive]()
+        for j in range(self.inputs):
+            drives.append(Drive(j, self.lag, early[:, j], np.zeros(self.outputs)))
+            drives.append(Drive(j, self.direct_lag, late[:, j], m.D[:, j]))
+        return StateSpace.behind_past(A, m.C, drives, self.inputs)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""

@@ -14,8 +14,7 @@ from inputdesign_cli.identification.white import White, Whitening
 from inputdesign_cli.levels import RATE, SHARES, level
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.plants import arx
-from tests.support.records import shifted, simulated
+from tests.support.records import shifted
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 
@@ -52,17 +51,6 @@ def test_the_level_is_shared_by_all_tests():
     assert failed(five) == ()
     one = ScoreTest("x", "noise", 1.0, 1, 0.19 * level("many signals"), 1)
     assert failed([*five[1:], one]) == (one,)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("model", [SYSTEMS["bj"], SYSTEMS["oe"], arx()], ids=["bj", "oe", "two by two"])
-def test_probabilities_of_right_models_are_uniform(model):
-    """Kolmogorov and Smirnov over 20 records of every test."""
-    u, y = simulated(model, 400, np.random.default_rng(2), 20)
-    found = [identify(model, *record, start=model.theta).tests for record in zip(u, y, strict=True)]
-    every = [[one.whiteness, one.independence, *one.scores] for one in found]
-    for tests in zip(*every, strict=True):
-        assert scipy.stats.kstest([test.probability for test in tests], "uniform").pvalue > 1e-3
 
 
 @pytest.mark.parametrize("w", [0.02, 0.2, 1.5])
