@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import cast
 
 import numpy as np
 import scipy
@@ -174,30 +175,15 @@ class Derived(Kind):
             about = Records(self.plant, tuple(parts))
             points = [brought_back(self.by, evaluate(about, theta)) for theta in found.points]
         else:
-            of_plant = (None if x is None else x[: self._first] for x in (given, known))
-            fixed = [] if self.coloured is None else self.coloured.fixed
-            common = reduce(np.convolve, {tuple(p): p for p in fixed}.values())
-            clear = [(_clear(common, u), _clear(common, y)) for u, y in parts]
-            found, points = self.plant.starting_points(clear, *of_plant), []
-            for theta in found.points:
-                errors, _ = self.plant.errors_and_gradient(theta, *parts[0])
-                points.append(np.concatenate([theta, self._noise_of(errors)]))
+            noise = cast(Coloured, self.coloured)
+            fixed = reduce(np.convolve, {tuple(p): p for p in noise.fixed}.values())
+            clear = [(_clear(fixed, u), _clear(fixed, y)) for u, y in parts]
+            start = None if given is None else given[: self._first]
+            found = self.plant.starting_points(clear, start, None if known is None else known[: self._first])
+            left = [self.plant.errors_and_gradient(theta, *parts[0])[0] for theta in found.points]
+            pairs = zip(found.points, left, strict=True)
+            points = [np.append(theta, _of_residuals(noise, errors)) for theta, errors in pairs]
         return Starts(np.array(points), found.tried).and_given(given)
-
-    def _noise_of(self, errors: Array) -> Array:
-        """Return C and D from residuals (N, p) of the plant; shared ones are means over outputs."""
-        noise = self.coloured
-        if noise is None or not np.all(np.isfinite(errors)):
-            return np.zeros(0 if noise is None else len(noise.own_parameters))
-        own, values = noise.own_parameters, dict[tuple[str, int, int], float]()
-        for i, fixed in enumerate(noise.fixed):
-            c, d = (
-                max((p.power for p in own if p.letter == letter and (i, i) in p.places), default=0)
-                for letter in "cd"
-            )
-            for letter, row in zip("cd", noise_polynomials(_clear(fixed, errors[:, i]), c, d), strict=True):
-                values |= {(letter, lag, i): float(value) for lag, value in enumerate(row, start=1)}
-        return np.array([np.mean([values[one.letter, one.power, i] for i, _ in one.places]) for one in own])
 
     def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions of the plant; the tests with many regressors cover C and D."""
@@ -250,6 +236,21 @@ def _coloured(noise: Coloured, raw: Array, of_plant: Array) -> tuple[Array, Arra
                 late = filtered([sign], polynomial, errors[:, i])
                 psi[index, parameter.power :, i] = late[: len(errors) - parameter.power]
     return errors, psi
+
+
+def _of_residuals(noise: Coloured, errors: Array) -> Array:
+    """Return C and D from residuals (N, p) of the plant; shared ones are means over outputs."""
+    own, values = noise.own_parameters, dict[tuple[str, int, int], float]()
+    if not np.all(np.isfinite(errors)):
+        return np.zeros(len(own))
+    for i, fixed in enumerate(noise.fixed):
+        c, d = (
+            max((p.power for p in own if p.letter == letter and (i, i) in p.places), default=0)
+            for letter in "cd"
+        )
+        for letter, row in zip("cd", noise_polynomials(_clear(fixed, errors[:, i]), c, d), strict=True):
+            values |= {(letter, lag, i): float(value) for lag, value in enumerate(row, start=1)}
+    return np.array([np.mean([values[one.letter, one.power, i] for i, _ in one.places]) for one in own])
 
 
 def _clear(known: Array, signals: Array) -> Array:

@@ -235,14 +235,9 @@ class PolynomialModel(Parametrised):
         rows = zip(self.per_output(self.A), self.B, self.F, strict=True)
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
-    @cached_property
-    def _highest(self) -> int:
-        """Return the highest power of q^-1 that a parameter stands before."""
-        return max((parameter.power for parameter in self.parameters), default=0)
-
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
-        highest, entries = self._highest, self._entries
+        highest, entries = max((p.power for p in self.parameters), default=0), self._entries
         q = unit_circle(w)
         # Frequencies lie side by side in memory.
         shape = (len(self.parameters), self.outputs, self.inputs, q.size)
@@ -332,8 +327,9 @@ def _gradients(
     """Return the prediction gradients (S, n, k, p, m) of models of one structure, by polynomials."""
     (sources,) = {x.shape[-1] for x in (u, e) if x is not None}
     if y is None and "a" in first.letters:
-        y = np.stack([m.plant_at(w) @ u[0] if e is None else m.noise_at(w) @ e[0] for m in models])
-    highest, letters = first._highest, first.letters
+        cause = np.asarray(e if u is None else u)[0]
+        y = np.stack([(m.noise_at(w) if u is None else m.plant_at(w)) @ cause for m in models])
+    highest, letters = max((p.power for p in first.parameters), default=0), first.letters
     active = first.active if u is not None else ()
     wanted = {("c", i, 0): [m.row(m.C, i) for m in models] for i in range(first.outputs)}
     wanted |= {("d", i, 0): [m.row(m.D, i) for m in models] for i in range(first.outputs)}

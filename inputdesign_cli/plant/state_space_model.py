@@ -273,7 +273,7 @@ class StateSpaceModel(Parametrised):
     def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
-        driven = m.K @ e if u is None else self._entering(z, early, late) @ u
+        driven = m.K @ np.asarray(e) if u is None else self._entering(z, early, late) @ u
         if y is not None and u is not None:
             driven = driven + m.K @ (y - self._direct(z, m.D) @ u)
             A = A - m.K @ m.C
