@@ -49,7 +49,7 @@ class Extension(NamedTuple):
 
     @classmethod
     def of(cls, model: Model, larger: Listed, what: str) -> Self:
-        """Return the extension of a model to a larger one, which has one more name."""
+        """Return the extension of a model to a larger one, which has a further name."""
         (name,) = set(larger.names) - set(model.names)
         return cls(larger, name, what)
 

@@ -231,8 +231,7 @@ class White:
 
     def without(self, columns: Array) -> White:
         """Return the estimate if columns ((N + M) p, m) of free sizes explain residuals like starts."""
-        left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
-        left = left[:, sizes > DEPENDENT]
+        left = _orthonormal(self.unexplained(_scaled(columns)))
         freedom = self.residuals.size / self.variance
         return replace(
             self,

@@ -70,8 +70,7 @@ def _spaced(lo: float, hi: float, points: int) -> Array:
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
     """Return one grid for several plants, everywhere about as fine as the finest of theirs.
 
-    Poles that lie side by side share their points. The number of points grows with the places at which there
-    are poles, not with the number of plants.
+    Poles that lie side by side share their points, so that many plants do not need many times as many.
     """
     parts = [np.empty(0), *(graded_grid(singularities, lo, hi) for singularities in plants)]
     grid = np.unique(np.concatenate(parts))

@@ -140,10 +140,7 @@ class HeldEntry:
         return np.concatenate(parts, axis=1).astype(complex)
 
     def _through(self, driven: ComplexArray | Array, z: ComplexArray) -> ComplexArray:
-        """Return the states that inputs (m or 1, 2 order) drive, at points z, (m, 2 order).
-
-        By back-substitution in a triangular form, for all points at once.
-        """
+        """Return the states (m, 2 order) that inputs (m or 1, 2 order) drive at points z, by substitution."""
         if not self.order:
             return np.zeros((z.size, 0), dtype=complex)
         triangle, basis = self._triangular

@@ -137,11 +137,7 @@ class Loop:
         return self.model.memory + self.controller.memory
 
     def check_stability(self) -> None:
-        """Raise `SpecError` unless the loop is well posed and internally stable.
-
-        Raises:
-            SpecError: `unstable-loop` or `algebraic-loop`.
-        """
+        """Raise `SpecError` (`unstable-loop`, `algebraic-loop`) unless the loop is well posed and stable."""
         p, leading = self.model.outputs, self.instantaneous
         # det(I + C G) is the product of 1 + these eigenvalues, which do not depend on the units of u and y.
         gains = np.linalg.eigvals(-leading[:p, p:] @ np.linalg.solve(leading[p:, p:], leading[p:, :p]))
@@ -270,11 +266,7 @@ def _prediction_gradients(
 
 
 def close_loop(model: Model, controller: TransferMatrix) -> Loop:
-    """Return the loop of a model under a controller.
-
-    Raises:
-        SpecError: `not-supported` for a plant that is not sampled.
-    """
+    """Return the loop of a model under a controller; `SpecError` (`not-supported`) if it is not sampled."""
     if model.continuous:
         raise bad_spec(
             "not-supported",

@@ -127,8 +127,7 @@ class Model(Protocol):
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest.
 
-        Args:
-            step: time between samples of a plant in continuous time; sampled plants ignore it.
+        The `step` is the time between samples of a plant in continuous time; sampled plants ignore it.
         """
         return _inner(self).simulate(u, e, step)
 
@@ -245,8 +244,7 @@ def tables_at(
 ) -> dict[str, tuple]:
     """Return copies of polynomials by letter, with other values (k,) of the parameters in them.
 
-    Args:
-        tables: a polynomial for each output, or one for all, or rows of columns of them.
+    Each table has a polynomial for each output, or one for all, or rows of columns of them.
     """
     found = {
         letter: [p.copy() if isinstance(p, np.ndarray) else tuple(one.copy() for one in p) for p in rows]
@@ -266,10 +264,8 @@ def prediction_gradients(
 ) -> ComplexArray:
     """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, `model` the first of them.
 
-    A kind of plant that computes all at once faster registers its own function.
-
-    Args:
-        y, u, e: (S, n, ., m), or one for all; see `Model.prediction_gradient`.
+    Signals (S, n, ., m) may be one for all (1, n, ., m). A kind of plant that computes all at once faster
+    registers its own function.
     """
     every = ([x] * len(models) if x is None or len(x) == 1 else x[:, None] for x in (y, u, e))
     signals = ((None if x is None else x[0] for x in own) for own in zip(*every, strict=True))

@@ -111,8 +111,7 @@ Place = Sequence[str | int]
 class Words:
     """Holds a plant section with named parameters as written, so that it can be repeated with other values.
 
-    The `plant` is None if it lists the coefficients. Each label has its `places` in it. The parameters of
-    plant and of noise that are listed as known are in `known`.
+    The `plant` is None if it lists the coefficients; `places` is by label, and `known` by section.
     """
 
     plant: Mapping[str, object] | None = None

@@ -151,8 +151,7 @@ class StateSpaceModel(Parametrised):
     def _exponentials(self, moved: Array | None) -> tuple[tuple[Array, Array], Array, Array]:
         """Return A and B over a sample, B over its rest after the fraction, and A over that rest.
 
-        Args:
-            moved: (n, n + r), a direction of [A B]: the derivatives in that direction instead.
+        If [A B] is `moved` in a direction (n, n + r), the derivatives in that direction instead.
         """
         n, m = self.order, self.matrices
         if self.sample_time is None:

@@ -142,7 +142,7 @@ class StateSpace(NamedTuple):
 
     @classmethod
     def behind_past(cls, A: Array, C: Array, drives: Sequence[Drive], inputs: int) -> StateSpace:
-        """Return a system whose states are the past of each input, then those of A (n, n), C (q, n)."""
+        """Return a system whose states are the past of each input, then the states of A (n, n), C (q, n)."""
         past = [max((one.lag for one in drives if one.input == j), default=0) for j in range(inputs)]
         first = np.concatenate([[0], np.cumsum(past)]).astype(int)
         own, size = slice(first[-1], None), first[-1] + len(A)

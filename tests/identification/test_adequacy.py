@@ -14,7 +14,7 @@ from inputdesign_cli.identification.white import White, Whitening
 from inputdesign_cli.levels import RATE, SHARES, level
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.records import shifted
+from tests.support.records import arx_regressors, shifted
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 
@@ -27,19 +27,18 @@ def test_of_arx_it_is_the_auxiliary_regression():
     """N times the share of the residuals' squares that a regression with the further lags explains."""
     u, y = (x[0, :, 0] for x in data("arx", 300, np.random.default_rng(1)))
     found = identify(SYSTEMS["arx"], u[:, None], y[:, None], rest=True)
-    own = [shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)]
 
-    def squares(columns):
-        matrix = np.stack(columns, axis=1)
+    def squares(*columns):
+        matrix = np.column_stack([arx_regressors(u, y), *columns])
         left = y - matrix @ np.linalg.lstsq(matrix, y, rcond=None)[0]
         return left, left @ left
 
-    residual, least = squares(own)
+    residual, least = squares()
     for name, further in (
         ("recent_inputs", [np.append(np.zeros(lag), u[: 300 - lag]) for lag in (0, 3, 4, 5, 6)]),
         ("recent_residuals", [shifted(residual, lag) for lag in (1, 2, 3, 4)]),
     ):
-        _, less = squares([*own, *further])
+        _, less = squares(*further)
         test = by_name(found)[name]
         assert test.statistic == pytest.approx(300 * (least - less) / least, rel=1e-6)
         assert test.freedom == len(further)

@@ -15,7 +15,7 @@ from inputdesign_cli.levels import level
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
-from tests.support.records import shifted, simulated
+from tests.support.records import arx_regressors, shifted, simulated
 
 W = np.linspace(0.01, 3.0, 50)
 
@@ -24,35 +24,24 @@ def by_name(found):
     return {one.test.name: one for one in found.tests.directed if one.test.fault in ("plant", "noise")}
 
 
-@pytest.fixture(scope="module")
-def regressed():
-    """An ARX model one lag of u too short, and the regression with that lag."""
+def test_of_arx_it_is_the_comparison_of_two_regressions():
+    """A model one lag of u too short: the likelihood ratio, and the move of G to the larger regression."""
     rng = np.random.default_rng(1)
     u = rng.standard_normal(400)
     y = scipy.signal.lfilter([0, 1.0, 0.5, 0.3], [1, -1.5, 0.7], u)
     y += scipy.signal.lfilter([1], [1, -1.5, 0.7], rng.standard_normal(400))
     found = identify(SYSTEMS["arx"], u[:, None], y[:, None], rest=True)
-    own = [shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)]
 
-    def fitted(columns):
-        matrix = np.stack(columns, axis=1)
+    def fitted(*columns):
+        matrix = np.column_stack([arx_regressors(u, y), *columns])
         theta = np.linalg.lstsq(matrix, y, rcond=None)[0]
         return theta, matrix, float(np.sum((y - matrix @ theta) ** 2))
 
-    return found, fitted(own), fitted([*own, np.append(np.zeros(3), u[:-3])])
-
-
-def test_of_arx_it_is_the_likelihood_ratio_of_two_regressions(regressed):
-    found, (_, _, squares), (_, _, less) = regressed
-    test = by_name(found)["b3"].test
-    assert test.statistic == pytest.approx(400 * np.log(squares / less), rel=1e-8)
-    assert test.probability == pytest.approx(scipy.stats.chi2.sf(test.statistic, 1))
-    assert test.freedom == 1
-
-
-def test_the_move_of_g_is_that_to_the_larger_regression(regressed):
-    found, (theta, _, _), (more, matrix, _) = regressed
+    (theta, _, squares), (more, matrix, less) = fitted(), fitted(np.append(np.zeros(3), u[:-3]))
     one = by_name(found)["b3"]
+    assert one.test.statistic == pytest.approx(400 * np.log(squares / less), rel=1e-8)
+    assert one.test.probability == pytest.approx(scipy.stats.chi2.sf(one.test.statistic, 1))
+    assert one.test.freedom == 1
     assert one.size == pytest.approx(more[4], rel=1e-8)
     assert one.following * one.size == pytest.approx(more[:4] - theta, rel=1e-6)
     alone = np.sqrt(np.mean(found.errors**2) * np.linalg.inv(matrix.T @ matrix)[4, 4])
@@ -232,7 +221,7 @@ def test_of_arx_it_is_the_score_test_of_a_regression(name, signal):
     f = signal(u)
     if "after" not in name and name != "u rising":
         f = f - np.polyval(np.polyfit(u, f, 1), u)
-    own = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
+    own = arx_regressors(u, y)
     b1, b2 = found.theta[2:]
     column = b1 * shifted(f, 1) + b2 * shifted(f, 2)
     left = column - own @ np.linalg.lstsq(own, column, rcond=None)[0]
