@@ -36,8 +36,8 @@ from inputdesign_cli.explore.sweep import (
 )
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
-from inputdesign_cli.identification.estimators import estimator, factor_at, noise_of
-from inputdesign_cli.identification.records import Records, centred
+from inputdesign_cli.identification.estimators import estimator, factor_at
+from inputdesign_cli.identification.records import Records, centred, noise_of
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import Model

@@ -19,7 +19,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.records import Point, Records, shifted
@@ -57,7 +56,7 @@ class Regressors(NamedTuple):
 
     name: str
     fault: Fault
-    columns: NDArray[np.float64]
+    columns: Array
     lags: tuple[int, ...] = ()
     of_residuals: bool = False
 
@@ -108,12 +107,9 @@ def score(white: White, columns: Array, means: Array) -> Score:
 def score_tests(
     records: Records, theta: Array, white: White, *, feedback: bool, robust: White | None
 ) -> tuple[ScoreTest, ...]:
-    """Return the score tests of past inputs, past residuals and trends.
+    """Return the score tests of past inputs, past residuals and trends at the estimate theta (k,).
 
-    Args:
-        theta: (k,), the estimate; `white`, in the units of its noise.
-        feedback: whether u(t) depends on y(t); then past inputs begin with u(t - 1).
-        robust: the estimate with whitened residuals, for all regressors but past residuals.
+    `robust` is the estimate with whitened residuals, for all regressors but past residuals.
     """
     of_inputs = past_inputs(records, theta, feedback=feedback)
     every = [*of_inputs, *past_residuals(records, white), _trend(records, theta)]
@@ -161,22 +157,13 @@ def failed(
 
 
 def robust_white(
-    records: Records,
-    point: Point,
-    white: White,
-    *,
-    less: White,
-    feedback: bool,
-    more: Sequence[NDArray[np.float64]],
+    records: Records, point: Point, white: White, *, less: White, feedback: bool, more: Sequence[Array]
 ) -> White | None:
     """Return the estimate with whitened residuals, or None if the stated noise model is not refuted.
 
     A wrong plant colours residuals as well. So the part that all regressors explain is taken off before the
-    noise is judged. The part that inputs explain is taken off before the noise is estimated.
-
-    Args:
-        less: `white` once level shifts are taken off.
-        more: columns (N, p) of single parameters.
+    noise is judged, level shifts (`less`) and `more` columns (N, p) of single parameters among them. The part
+    that inputs explain is taken off before the noise is estimated.
     """
 
     def white_enough(judged: White) -> bool:
@@ -258,14 +245,12 @@ def _runs(first: int, last: int, *, growth: float = 1.0) -> list[tuple[int, int]
     return runs
 
 
-def _summed(
-    records: Records, x: NDArray[np.float64], runs: Sequence[tuple[int, int]]
-) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+def _summed(records: Records, x: Array, runs: Sequence[tuple[int, int]]) -> tuple[Array, tuple[int, ...]]:
     """Return sums of signals x (p, N, m) over runs of lags, and the first lag of each run."""
     pieces = np.split(x, np.cumsum(records.lengths)[:-1], axis=1)
     total = np.concatenate([np.cumsum(piece, axis=1) for piece in pieces], axis=1).swapaxes(0, 1)
 
-    def until(lag: int) -> NDArray[np.float64]:
+    def until(lag: int) -> Array:
         return shifted(total, lag, records.lengths).swapaxes(0, 1)
 
     parts = [until(begin) - until(end) for begin, end in runs]

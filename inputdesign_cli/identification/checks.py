@@ -39,31 +39,25 @@ def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1
 
 
 def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
-    """Check that no channel keeps one value throughout.
-
-    Args:
-        names: of the parameters, for the diagnostic.
-        u, y: (samples, r), (samples, p).
+    """Check that no channel of u (samples, r) and y (samples, p) keeps one value throughout.
 
     Raises:
-        SpecError: `constant-input`, `constant-output`.
+        SpecError: `constant-input`, `constant-output`; it has the `names` of the parameters.
     """
-    for letter, signals in (("u", u), ("y", y)):
+    alike = f"only a static gain could be seen, and {', '.join(names)} cannot be told apart"
+    for letter, signals, code, says in (
+        ("u", u, "constant-input", alike),
+        ("y", y, "constant-output", "it shows neither the input nor noise"),
+    ):
         for index, signal in enumerate(signals.T):
-            if np.ptp(signal) > 1e-12 * max(float(np.abs(signal).max()), 1e-300):
-                continue
-            name = signal_name(letter, index, signals.shape[1])
-            raise bad_spec(
-                "constant-input" if letter == "u" else "constant-output",
-                f"{name} has the same value {signal[0]:g} in every sample: "
-                + (
-                    f"nothing but a static gain could be seen, and {', '.join(names)} cannot be told apart"
-                    if letter == "u"
-                    else "it shows neither the input nor noise"
-                ),
-                hint="is the signal in another column, or the logger stuck?",
-                key=name,
-            )
+            if np.ptp(signal) <= 1e-12 * max(float(np.abs(signal).max()), 1e-300):
+                name = signal_name(letter, index, signals.shape[1])
+                raise bad_spec(
+                    code,
+                    f"{name} has the same value {signal[0]:g} in every sample: {says}",
+                    hint="is the signal in another column, or the logger stuck?",
+                    key=name,
+                )
 
 
 def check_noisy(covariance: Array, y: Array) -> None:

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.adequacy import Fault, Score, ScoreTest, score
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import Extension
+from inputdesign_cli.identification.kind import Extension, Kind
 from inputdesign_cli.identification.records import RecordProblem, Records, evaluate, split
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
@@ -63,10 +63,10 @@ class Alternative:
     name: str  # of the parameter
     phrase: str  # what it is, for a sentence
     fault: Fault  # what is wrong if it is missing
-    column: NDArray[np.float64]  # (N, p), minus the derivative of the prediction errors with respect to it
+    column: Array  # (N, p), minus the derivative of the prediction errors with respect to it
     slopes: Callable[[Model, ArrayLike], ComplexArray]  # dG by it at (n,), of each state, (states, n, p, r)
     lag: bool = False  # whether it is a pole or a dead time of the plant
-    echo: NDArray[np.float64] | None = None  # (lags, p, p), how `column` responds to past errors, if it does
+    echo: Array | None = None  # (lags, p, p), how `column` responds to past errors, if it does
     estimated: Callable[[], tuple[Model, float]] | None = None  # larger model, its likelihood ratio
 
 
@@ -167,20 +167,22 @@ def _score(white: White, tried: _Tried) -> tuple[Score, float]:
     return score(white, column[:, None], mean), expected / float(along @ column)
 
 
-def alternative(extension: Extension, records: Records) -> Alternative:
-    """Return the parameter as a regressor of the prediction errors of records."""
+def alternative(extension: Extension, kind: Kind, records: Records) -> Alternative:
+    """Return the parameter of a larger model of this kind as a regressor of the errors of records."""
     model, index = extension.model, extension.model.names.index(extension.name)
-    larger, in_plant = replace(records, kind=extension.kind, earlier=None), bool(model.in_plant[index])
+    larger, in_plant = replace(records, kind=kind, earlier=None), bool(model.in_plant[index])
+    # Of other parameters than coefficients the larger structure has further freedom.
+    nested = set(model.names) - set(records.kind.model.names) == {extension.name}
     again = partial(_estimated, larger, model, index)
     return Alternative(
         extension.name,
         f"one more {extension.what} ({extension.name})",
         "plant" if in_plant else "noise",
         larger.gradient(model.theta, index),
-        lambda model, w: extension.model.plant_gradient(w)[None, :, index],
+        lambda _, w: model.plant_gradient(w)[None, :, index],
         lag=model.parameters[index].letter in _LAGS,
-        echo=extension.kind.echoes(model.theta, records.longest)[index],
-        estimated=again if extension.nested and records.earlier is None else None,
+        echo=kind.echoes(model.theta, records.longest)[index],
+        estimated=again if nested and records.earlier is None else None,
     )
 
 
@@ -215,11 +217,8 @@ class Moves:
     def odds(self, probability: float) -> float:
         """Return the odds that the parameter exists and G exceeds the admissible error, from even prior odds.
 
-        The evidence for the parameter is the Bayes factor of a normal estimate ([kass-raftery-1995]). A
-        priori it is normal about zero, of a size that moves G by about the admissible error.
-
-        Args:
-            probability: of an estimate as far from zero, if the parameter is not there.
+        The evidence is the Bayes factor of a normal estimate ([kass-raftery-1995]) that is as far from zero
+        by chance with this `probability`. A priori it is normal and moves G by about the admissible error.
         """
         reach = float(np.max(self.deviation))
         if reach == 0.0:
@@ -284,9 +283,7 @@ def variations(records: Records, theta: Array, simulated: Array | None) -> tuple
     For an input with two values, powers and sign are the input itself about a level: they add nothing.
 
     Args:
-        theta: (k,), the estimate.
-        simulated: (N, p), the response to the inputs; None if it cannot be simulated, or frequencies are not
-            in rad/sample.
+        simulated: (N, p), the response to the inputs; None if unstable, or in continuous time.
     """
     found, u, lengths = [], records.u, records.lengths
     for channel, samples in enumerate(u.T):

@@ -47,9 +47,6 @@ class Earlier:
         """Return whether the estimate is of these data: it has half of the information, and theta stays.
 
         Other data of the same length have another input or another noise, and move theta by a deviation.
-
-        Args:
-            theta, factor: see `agreement`.
         """
         inner = np.linalg.solve(factor, self.rows.T)
         shares = np.linalg.eigvalsh(inner @ inner.T)
@@ -59,9 +56,7 @@ class Earlier:
     def agreement(self, theta: Array, factor: Array) -> float:
         """Return the probability that two estimates of one system differ as much as this one and the data's.
 
-        Args:
-            theta: (k,), the estimate from both.
-            factor: L (k, k), lower triangular, L L^T the information of both.
+        The estimate theta (k,) from both has the information L L^T, L the lower triangular `factor` (k, k).
         """
         statistic, directions = self._apart(theta, factor, _OF_ONE_SIDE, 1.0 - _OF_ONE_SIDE)
         return float(scipy.special.chdtrc(directions, statistic)) if directions else 1.0
@@ -70,9 +65,6 @@ class Earlier:
         """Return the probability that estimates from different data agree as closely as this and the data's.
 
         It is small for a record that is given again, rounded, or with a few rows less.
-
-        Args:
-            theta, factor: see `agreement`.
         """
         statistic, directions = self._apart(theta, factor, _LEAST_SHARE, _MOST_SHARE)
         return float(scipy.special.chdtr(directions, statistic)) if directions else 1.0

@@ -18,12 +18,11 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying
-from inputdesign_cli.identification.coloured import ColouredKind
+from inputdesign_cli.identification.derived import Derived
 from inputdesign_cli.identification.directed import alternative, variations
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import Kind, Part, Starts
-from inputdesign_cli.identification.polynomial_rows import FromRest
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.records import (
     Point,
@@ -31,12 +30,12 @@ from inputdesign_cli.identification.records import (
     Records,
     centred,
     evaluate,
-    inverses,
+    information_of,
     longest,
-    shares,
+    noise_of,
     split,
+    weights_of,
 )
-from inputdesign_cli.identification.reparametrised import ReparametrisedKind
 from inputdesign_cli.identification.search import Rival, Search, from_rest_or_free, search
 from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.tests import Tests, tests_of
@@ -62,19 +61,6 @@ _MOST = 2e7
 # rounded otherwise. Parameters this share apart are the same to rounding.
 _UNCERTAIN = 0.03
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
-
-
-class Ended(NamedTuple):
-    """The end of a search: whether it settled, after `steps` from the best of `starts`, and other minima.
-
-    `rivals` are far from the best minimum; `beside` are beyond sampling instants, and widen the covariance.
-    """
-
-    converged: bool
-    steps: int
-    starts: int
-    rivals: tuple[Rival, ...]
-    beside: tuple[Rival, ...] = ()
 
 
 class Begun(NamedTuple):
@@ -109,7 +95,7 @@ class Estimate:
     noise: Array  # (p, p) covariance of e; of white noise on the samples where the model knows no other
     errors: Array  # (samples, p) prediction errors at theta
     lengths: tuple[int, ...]  # the samples of each of the records, which follow each other
-    search: Ended
+    search: Search
     start: Begun
     simulation: Simulation
     prior: Agreement | None  # None without an earlier estimate
@@ -117,7 +103,7 @@ class Estimate:
 
     def with_rivals(self, rivals: tuple[Rival, ...]) -> Estimate:
         """Return the estimate with other rivals."""
-        return replace(self, search=self.search._replace(rivals=rivals))
+        return replace(self, search=replace(self.search, rivals=rivals))
 
     @cached_property
     def information(self) -> Array:
@@ -136,8 +122,8 @@ class BatchEstimate:
     """Prediction-error estimates of many records."""
 
     theta: Array  # (runs, k)
-    noise: NDArray[np.float64]  # (runs, p, p) covariance of e, unbiased to first order
-    information: NDArray[np.float64]  # (runs, k, k), whose inverse is the covariance of theta
+    noise: Array  # (runs, p, p) covariance of e, unbiased to first order
+    information: Array  # (runs, k, k), whose inverse is the covariance of theta
     converged: NDArray[np.bool_]  # (runs,)
     steps: NDArray[np.int64]  # (runs,)
 
@@ -146,25 +132,27 @@ class BatchEstimate:
 def estimator(model: Model, step: float) -> Kind:
     """Return the structure of the estimator for models of this kind, from samples `step` apart.
 
-    Models in discrete time have their own step.
-
-    Raises:
-        TypeError: none is registered.
+    Models in discrete time have their own step. A TypeError says that none is registered.
     """
     raise TypeError(f"no estimator is registered for {type(model).__name__}")
 
 
 estimator.register(PolynomialModel, lambda model, step: PolynomialKind(model))
 estimator.register(StateSpaceModel, lambda model, step: StateSpaceKind(model))
-estimator.register(ContinuousModel, lambda model, step: TransferKind(model, Intersample(step, hold=False)))
+estimator.register(
+    ContinuousModel, lambda model, step: TransferKind(model, model, Intersample(step, hold=False))
+)
 estimator.register(
     SampledModel,
-    lambda model, step: TransferKind(model.continuous_plant, Intersample(model.sample_time, hold=True)),
+    lambda model, step: TransferKind(
+        model, model.continuous_plant, Intersample(model.sample_time, hold=True)
+    ),
 )
+estimator.register(Coloured, lambda model, step: Derived(model, estimator(model.plant, step), model))
 estimator.register(
-    Reparametrised, lambda model, step: ReparametrisedKind(model, estimator(model.coefficients, step))
+    Reparametrised,
+    lambda model, step: Derived(model, estimator(model.coefficients, step), by=model.parametrisation),
 )
-estimator.register(Coloured, lambda model, step: ColouredKind(model, estimator(model.plant, step)))
 
 
 def identify(
@@ -222,7 +210,7 @@ def identify(
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
     best = from_rest_or_free(records, False if ramp else rest, searched, start)
-    return concluded(best, parts, experiments=experiments or (len(outputs),), feedback=feedback)
+    return concluded(best, parts, step, experiments=experiments or (len(outputs),), feedback=feedback)
 
 
 def fit_batch(
@@ -240,36 +228,12 @@ def fit_batch(
     kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.model.names)))
-    if free:
-        return _each_fitted(kind, inputs, outputs, np.array(begin), free=True)
-    return _fitted(kind, inputs, outputs, np.array(begin))
-
-
-@singledispatch
-def _fitted(kind: Kind, u: Array, y: Array, start: Array) -> BatchEstimate:
-    """Return the estimates of records (runs, N, r), (runs, N, p) from starts (runs, k)."""
-    return _each_fitted(kind, u, y, start, free=False)
-
-
-def _each_fitted(kind: Kind, u: Array, y: Array, start: Array, *, free: bool) -> BatchEstimate:
-    records = tuple(Records(kind, (run,), free=free) for run in zip(u, y, strict=True))
-    found = minimise(RecordProblem(records), start)
-    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
-    noise = np.array([noise_of(*each) for each in zip(records, points, strict=True)])
-    information = np.array([information_of(*each) for each in zip(records, points, noise, strict=True)])
-    return BatchEstimate(found.theta, noise, information, found.converged, found.steps)
-
-
-@_fitted.register
-def _(kind: PolynomialKind, u: Array, y: Array, start: Array) -> BatchEstimate:
-    """Return the estimates from records that begin at rest, noise as well, all in one pass."""
-    problem = FromRest.of(kind.model, u, y)
-    found = minimise(problem, start)
-    sums = problem.sums(found.theta)
-    left = np.sqrt(np.maximum(y.shape[1] - sums.own, 1.0))
-    noise = sums.errors / np.outer(left, left)
-    information = sums.weighed(inverses(noise)[0])[0]
-    return BatchEstimate(found.theta, noise, information, found.converged, found.steps)
+    problem = None if free else kind.batch(inputs, outputs)
+    if problem is None:
+        runs = zip(inputs, outputs, strict=True)
+        problem = RecordProblem(tuple(Records(kind, (run,), free=free) for run in runs))
+    found = minimise(problem, np.array(begin))
+    return BatchEstimate(found.theta, *problem.concluded(found.theta), found.converged, found.steps)
 
 
 def information_of_data(
@@ -282,13 +246,9 @@ def information_of_data(
     free: bool = False,
     earlier: Earlier | None = None,
 ) -> Array:
-    """Return the information matrix (k, k) of records at a model's own parameters and noise.
+    """Return the information matrix (k, k) of records at a model's own parameters and noise, fitting or not.
 
-    The parameters need not fit best.
-
-    Args:
-        model, u, y, step, lengths, earlier: see `identify`.
-        free: whether starts and levels of the records are unknown.
+    If `free`, starts and levels of the records are unknown; for the rest see `identify`.
     """
     parts = split(u, y, lengths)
     records = Records(estimator(model, step), tuple(centred(parts) if free else parts), free=free)
@@ -299,9 +259,7 @@ def information_of_data(
 def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) -> Array:
     """Return the information matrix (k, k) of a record whose initial state and level are unknown.
 
-    Args:
-        u, y: (N, r), (N, p), signals without noise; the excitation of both is all that is counted.
-        step: time between samples of a plant in continuous time.
+    Only the excitation of u (N, r) and y (N, p) counts: they are signals without noise.
     """
     weights = np.asarray(np.linalg.inv(model.covariance), dtype=float)
     records = Records(estimator(model, step), ((u, y),), weights=weights)
@@ -311,15 +269,9 @@ def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) ->
 
 
 def concluded(
-    found: Search, parts: Sequence[Part], *, experiments: Sequence[int], feedback: bool
+    found: Search, parts: Sequence[Part], step: float, *, experiments: Sequence[int], feedback: bool
 ) -> Estimate:
-    """Return the estimate with its covariance and the tests of its residuals.
-
-    Args:
-        found: where the search ended.
-        parts: the records as measured.
-        experiments: the samples of each experiment.
-        feedback: whether u(t) depends on y(t).
+    """Return the estimate with its covariance and the tests of its residuals, from records as measured.
 
     Raises:
         SpecError: `noise-free-data` or `not-exciting`.
@@ -330,8 +282,11 @@ def concluded(
     factor, earlier = factor_at(records, point, noise), records.earlier
     simulation = _simulation(records, point, np.concatenate([y for _, y in parts]))
     first = np.array([kind.errors_and_gradient(theta, *part)[0][0] for part in parts])
-    known = None if kind.continuous or None in simulation.fit else simulation.outputs
-    larger = [alternative(one, records) for one in kind.extensions(theta, feedback=feedback)]
+    known = None if kind.model.continuous or None in simulation.fit else simulation.outputs
+    larger = [
+        alternative(one, estimator(one.model, step), records)
+        for one in kind.extensions(theta, feedback=feedback)
+    ]
     alternatives = [*larger, *variations(records, theta, known)]
     prior = None
     if earlier is not None:
@@ -343,13 +298,7 @@ def concluded(
         noise,
         point.errors,
         records.lengths,
-        Ended(
-            found.converged,
-            found.steps,
-            found.starts,
-            found.rivals,
-            tuple(Rival(one.theta, excess) for one, excess in found.beside),
-        ),
+        found,
         Begun(records.free, found.rest_refuted, first),
         simulation,
         prior,
@@ -361,27 +310,14 @@ def _simulation(records: Records, point: Point, y: Array) -> Simulation:
     """Return the simulated outputs: the outputs less the part that prediction errors cause."""
     kind, ends = records.kind, np.cumsum(records.lengths)[:-1]
     model = kind.model.at(point.theta)
-    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-        noise = [
-            model.simulate(0.0 * u, e, 1.0)[1]
-            for (u, _), e in zip(records.parts, np.split(point.errors, ends), strict=True)
-        ]
-    outputs = y - np.concatenate(noise)
     varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, ends)])
-    with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
-        left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        each = zip(records.parts, np.split(point.errors, ends), strict=True)
+        noise = np.concatenate([model.simulate(0.0 * u, e, 1.0)[1] for (u, _), e in each])
+        left = np.linalg.norm(y - (outputs := y - noise), axis=0) / np.linalg.norm(varying, axis=0)
     able = kind.simulates(point.theta)
     fit = (float(100.0 * (1.0 - x)) if runs else None for x, runs in zip(left, able, strict=True))
     return Simulation(outputs, tuple(fit))
-
-
-def noise_of(records: Records, point: Point) -> Array:
-    """Return the covariance (p, p) of e, corrected for the parameters of every output and unknown starts."""
-    samples, outputs = point.errors.shape
-    own = shares(np.any(records.from_rest(point.theta)[1], axis=1))
-    left = np.sqrt(np.maximum(samples - own - point.unknowns / outputs, 1.0))
-    every = point.all_errors
-    return np.asarray(every.T @ every / np.outer(left, left))
 
 
 def factor_at(records: Records, point: Point, noise: Array) -> Array:
@@ -396,7 +332,7 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
     """
     # What is known besides the data counts as further rows.
     known = np.zeros((0, point.theta.size)) if records.earlier is None else records.earlier.rows
-    root = np.linalg.cholesky(_weights(records, noise)).T
+    root = np.linalg.cholesky(weights_of(records, noise)).T
     last = _LAST_DIGITS * np.resize([1.0, -1.0], point.theta.size)
     rows, again = (
         np.concatenate([(psi @ root.T).reshape(len(psi), -1).T, known])
@@ -424,13 +360,10 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
 
 
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
-    """Return the information of a mixture if minima beyond sampling instants are about as likely.
+    """Return the factor of the information of a mixture if minima beyond instants are about as likely.
 
     The weight of each is its likelihood times the square root of the determinant of its covariance (Laplace's
     method, [tierney-kadane-1986]). The covariance is that of the mixture about the estimate.
-
-    Args:
-        factor: L (k, k) of the best minimum alone, its information L L^T.
     """
     logarithms, spreads = [0.0], [np.eye(len(factor))]
     for point, excess in found.beside:
@@ -450,13 +383,3 @@ def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
     mixture = np.tensordot(weights, spreads, 1) / np.sum(weights)
     rows = scipy.linalg.solve_triangular(np.linalg.cholesky(mixture), factor.T, lower=True)
     return triangular_factor(rows)[0]
-
-
-def information_of(records: Records, point: Point, noise: Array) -> Array:
-    """Return the information matrix (k, k): the sum over the samples of psi noise^-1 psi^T."""
-    return replace(point.of_errors, weights=_weights(records, noise)).hessian
-
-
-def _weights(records: Records, noise: Array) -> Array:
-    """Return the weights W (p, p): the inverse of the noise, which may be no more than rounding."""
-    return inverses((noise + records.rounding)[None])[0][0]

@@ -95,9 +95,6 @@ def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spike
     """Return the spikes of outputs (N, p) of inputs that repeat, as differences between the periods.
 
     Medians of the periods, and over them, keep a spike or a drifting level from counting elsewhere.
-
-    Args:
-        repeats: see `Periods.parts`.
     """
     each = periods.parts(y, repeats)
     apart = each - np.median(each, axis=1, keepdims=True)
@@ -120,12 +117,9 @@ def frozen(
     """Return the stretches in which an output stands still while an input moves, output by output.
 
     Args:
-        held: (samples, p), whether the sample is that before, as recorded.
-        resolution: (p,), the step in which each output is recorded.
-        u: (samples, r).
-        errors: (samples, p), of prediction.
-        apart: (samples, p), the record less the simulation by the model.
-        simulated: (samples, p).
+        held: (samples, p), whether the sample is that before, as recorded in steps of `resolution` (p,).
+        u, errors, simulated: (samples, r), and (samples, p) of prediction and of simulation.
+        apart: (samples, p), the record less the simulation.
         lengths: of the stretches without gaps.
     """
     ends, moves = np.cumsum([0, *lengths]), _MOVES * np.std(u, axis=0)
@@ -166,7 +160,7 @@ def _likely(errors: Array, d: float) -> float:
     return min(1.0, _DENSITY * d / float(np.sqrt(variance))) if variance > 0.0 else 1.0
 
 
-def _spread(x: NDArray[np.float64]) -> float:
+def _spread(x: Array) -> float:
     return float(np.median(np.abs(x - np.median(x)))) / _NORMAL
 
 

@@ -46,7 +46,7 @@ Method = Literal["lines", "local_polynomial"]
 _Records = Sequence[tuple[Array, Array, Array]]  # x, u, y of each, (N, channels)
 _Lines = Sequence[tuple[NDArray, ...]]  # frequencies, and the transforms of x, u and y there
 # G (p, r), its radius, the noise and the coherence (p,), at one frequency.
-_Found = tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+_Found = tuple[ComplexArray, Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ class FrequencyResponse:
 
     frequency: Array  # (n,), rad/sample
     G: ComplexArray  # (n, p, r)
-    radius: NDArray[np.float64]  # (n, p, r): of the disc about G that holds the true one with 95 %
+    radius: Array  # (n, p, r): of the disc about G that holds the true one with 95 %
     # (n, p): the spectrum of the unexplained part of y, for white noise its variance.
-    noise: NDArray[np.float64]
-    coherence: NDArray[np.float64]  # (n, p): the share of the spectrum of y that the inputs explain
+    noise: Array
+    coherence: Array  # (n, p): the share of the spectrum of y that the inputs explain
     method: Method  # how it was estimated
 
 
@@ -119,9 +119,7 @@ def found_period(x: Array) -> int:
 def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.int64]:
     """Return the samples (p, r) until a pulse response first has a tenth of its largest value, otherwise 0.
 
-    Args:
-        samples: of the record; later responses are not looked for.
-        step: time between samples of a plant in continuous time; others know theirs.
+    Responses later than the record of `samples` samples, `step` apart in continuous time, are not seen.
     """
     pulses = np.zeros((model.inputs, samples, model.inputs))
     pulses[np.arange(model.inputs), 0, np.arange(model.inputs)] = 1.0
@@ -259,10 +257,10 @@ def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> 
     return G, _radius(np.outer(power, spread), freedom), power, _coherence(explained, power)
 
 
-def _coherence(explained: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+def _coherence(explained: Array, noise: Array) -> Array:
     return np.asarray(explained / np.maximum(explained + noise, 1e-300))
 
 
-def _radius(variance: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:
+def _radius(variance: Array, freedom: int) -> Array:
     """Return the radius of confidence: |error|^2 / variance follows F with 2 and 2 `freedom` degrees."""
     return np.asarray(np.sqrt(variance * scipy.special.fdtri(2, 2 * freedom, CONFIDENCE)))

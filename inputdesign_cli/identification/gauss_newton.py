@@ -39,7 +39,7 @@ class Problem(Protocol):
     def errors(self) -> int:
         """Return the number of prediction errors of a run."""
 
-    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+    def at(self, theta: Array) -> tuple[Array, Array, Array]:
         """Return cost (runs,), half its first-order Hessian (runs, k, k), minus half its gradient (runs, k).
 
         A cost that overflows is infinite.
@@ -57,7 +57,7 @@ class Minimum(NamedTuple):
 
     theta: Array
     cost: Array
-    hessian: NDArray[np.float64]
+    hessian: Array
     converged: NDArray[np.bool_]
     steps: NDArray[np.int64]
 
@@ -132,7 +132,7 @@ def best_run(found: Minimum) -> int:
     return best
 
 
-def _step(hessian: NDArray[np.float64], slope: Array, damping: Array) -> tuple[Array, Array]:
+def _step(hessian: Array, slope: Array, damping: Array) -> tuple[Array, Array]:
     """Return the step (H + damping diag H)^-1 g (runs, k), scaled, and the gain that it promises (runs,)."""
     k = slope.shape[1]
     scale = np.sqrt(np.maximum(np.einsum("rii->ri", hessian), 1e-300))

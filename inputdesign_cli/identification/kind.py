@@ -5,21 +5,24 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.gauss_newton import Problem
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.model import Listed
 
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""
+Parts = Sequence[Part]
+Mask = NDArray[np.bool_]
 
-# Step of central differences, times max(|theta|, 1).
-_STEP = 1e-6
+STEP = 1e-6
+"""The step of central differences, in shares of the size of a parameter."""
 FADED = 2000
 """Samples after which noise that fades has faded."""
 
@@ -38,13 +41,24 @@ class Starts(NamedTuple):
 
 
 class Extension(NamedTuple):
-    """An additional parameter of a structure."""
+    """A larger model, whose additional parameter is zero."""
 
-    model: Listed  # the larger model, whose new parameter is zero, by its coefficients
-    kind: Kind  # of the larger model; in place of `model`, it may be behind a hold
+    model: Listed  # by its coefficients
     name: str  # of the new parameter
     what: str  # it is
-    nested: bool = True  # whether that structure has no further freedom than the one parameter
+
+    @classmethod
+    def of(cls, model: Model, larger: Listed, what: str) -> Self:
+        """Return the extension of a model to a larger one, which has a further name."""
+        (name,) = set(larger.names) - set(model.names)
+        return cls(larger, name, what)
+
+
+class Batch(Problem, Protocol):
+    """A problem of many records that knows the noise and the information at its minima."""
+
+    def concluded(self, theta: Array) -> tuple[Array, Array]:
+        """Return the covariance (runs, p, p) of e and the information (runs, k, k) at theta (runs, k)."""
 
 
 @dataclass(frozen=True)
@@ -58,28 +72,27 @@ class Kind(ABC):
     model: Model
 
     @property
-    def continuous(self) -> bool:
-        """Return whether frequencies of the model are in rad per time unit."""
-        return self.model.continuous
-
-    @property
     def recent(self) -> int:
         """Return the largest lag at which an input enters directly; older inputs act through the poles."""
         return 0
 
     @property
-    def explaining(self) -> NDArray[np.bool_]:
+    def explaining(self) -> Mask:
         """Return the mask (k,) of the parameters that take directions of past inputs away from residuals."""
         return self.model.in_plant
 
     @property
-    def whitening(self) -> NDArray[np.bool_]:
+    def whitening(self) -> Mask:
         """Return the mask (k,) of the parameters that make residuals look whiter."""
         return ~self.explaining
 
     @abstractmethod
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
+
+    def batch(self, u: Array, y: Array) -> Batch | None:
+        """Return the problem of records (runs, N, r), (runs, N, p), noise at rest as well, if it is fast."""
+        return None
 
     @abstractmethod
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
@@ -90,12 +103,12 @@ class Kind(ABC):
         """
 
     @abstractmethod
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
-        """Return the parameters on which the starts depend."""
+    def in_starts(self, late: int, *, free: bool) -> Mask:
+        """Return the mask (k,) of the parameters on which the starts depend."""
 
-    def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return the step of a parameter in the numerical derivative of the starts."""
-        return _STEP * max(abs(float(theta[index])), 1.0)
+    def start_steps(self, theta: Array, samples: int) -> Array:
+        """Return the steps (k,) of the parameters in the numerical derivative of the starts."""
+        return STEP * np.maximum(np.abs(theta), 1.0)
 
     def lateness(self, theta: Array) -> int:
         """Return the number of samples in which inputs before a record act other than through the states."""
@@ -117,7 +130,7 @@ class Kind(ABC):
                     found.append(np.outer(there, np.eye(theta.size)[index]))
         return np.array(found).reshape(-1, 2, theta.size)
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         return np.repeat(signals[None], self.model.outputs, axis=0)
 
@@ -126,22 +139,22 @@ class Kind(ABC):
         """Return theta (k,), changed where its predictor would be unstable."""
 
     @abstractmethod
-    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Return starting points from records at rest about zero, and the `given` one (k,)."""
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
+        """Return starting points from records at rest about zero, and the `given` one (k,).
 
-    def holding(self, known: NDArray[np.bool_]) -> Self:
-        """Return the kind with starting points that keep `known` parameters (k,), if they can do that."""
-        return self
+        Args:
+            known: the mask (k,) of parameters that need not be looked for; None for none.
+        """
 
-    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+    def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions of the structure at theta (k,) by one parameter.
 
         Args:
             feedback: whether u(t) depends on y(t).
         """
-        return ()
+        return []
 
-    def echoes(self, theta: Array, samples: int) -> NDArray[np.float64]:
+    def echoes(self, theta: Array, samples: int) -> Array:
         """Return the responses of gradients to past errors, (k, lags, p, p): parameter, lag, output, error.
 
         They are zero for parameters of the plant alone. They count as zero if the response does not fade: it

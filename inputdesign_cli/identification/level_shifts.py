@@ -14,7 +14,6 @@ from itertools import product
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import ScoreTest, score
@@ -131,7 +130,7 @@ def _smooth(samples: int, lag: float) -> Array:
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
-def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> NDArray[np.float64]:
+def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> Array:
     """Return the responses (p, n, m) to lagged steps and to a pulse, in errors of the longest record."""
     at, length = int(np.argmax(records.lengths)), records.longest
     begin = sum(records.lengths[:at])
@@ -147,11 +146,8 @@ def _responses(records: Records, theta: Array, lags: Sequence[float], white: Whi
 def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:
     """Return score statistics (n,) of a response (n,) begun at every sample of a record, and their signs.
 
-    A score is the correlation of residuals and response. The power of the response counts without the part
-    that the estimate explains.
-
-    Args:
-        begin: of the record; `response`, in the errors of one output.
+    A score is the correlation of residuals and response, which is in the errors of one output. Its power
+    counts without the part that the estimate explains.
     """
     size, outputs = len(response), len(white.root)
     rows = slice(begin * outputs, (begin + size) * outputs)

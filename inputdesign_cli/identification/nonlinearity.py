@@ -39,10 +39,10 @@ class SilentLines:
     over_noise: Array  # (p,) mean of the power there over that of the noise; about one for noise alone
     probability: Array  # (p,) that noise alone has as much, by an F test over all lines
     rms: Array  # (p,) of the part beyond the noise
-    beyond: NDArray[np.float64]  # (lines, p) mean squares beyond the noise, over neighbours
+    beyond: Array  # (lines, p) mean squares beyond the noise, over neighbours
 
 
-def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> SilentLines | None:
+def silent_lines(Y: ComplexArray, shape: Array | None = None) -> SilentLines | None:
     """Return the power at silent lines from transforms (blocks, periods, lines, p); None without scatter.
 
     Args:
@@ -55,7 +55,7 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
     noise = np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (blocks * (periods - 1))
     if np.any(noise <= 0.0):
         return None
-    level: NDArray[np.float64] = periods * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
+    level: Array = periods * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
     even = _smoothed(noise) if shape is None else shape
     # Over the shape of the noise all lines count alike.
     ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
@@ -73,7 +73,7 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
     )
 
 
-def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
+def _smoothed(noise: Array) -> Array:
     """Return means over neighbouring lines (lines, p), near the ends over equally many nearest ones."""
     window = min(_NEIGHBOURS, len(noise))
     sums = np.concatenate([np.zeros((1, noise.shape[1])), np.cumsum(noise, axis=0)])
@@ -83,15 +83,14 @@ def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def response_error(
     found: PeriodicResponse, period: int, kept: int, odd: SilentLines, harmonics: NDArray[np.int_]
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the mean-square errors (L, p, r) of G at the excited lines: added part and change of gain.
 
-    Args:
-        found: the response, from `kept` periods of `period` samples in all.
-        odd: the power at odd lines without excitation, at these `harmonics`.
+    The response is from `kept` periods of `period` samples in all; `odd` is the power at odd lines without
+    excitation, at these `harmonics`.
     """
 
-    def between(known: NDArray[np.int_], values: NDArray[np.float64], at: NDArray[np.int_]) -> Array:
+    def between(known: NDArray[np.int_], values: Array, at: NDArray[np.int_]) -> Array:
         return np.stack([np.interp(np.log(at), np.log(known), column) for column in values.T], axis=1)
 
     added = between(harmonics, odd.beyond, found.harmonics)
@@ -111,7 +110,7 @@ def response_error(
 class Cubes:
     """The cube that explains most of the power of each of p outputs at silent lines."""
 
-    error: NDArray[np.float64]  # (L, p, r): its change of G at the excited lines
+    error: Array  # (L, p, r): its change of G at the excited lines
     probability: Array  # (p,): that noise alone looks as much like one of the cubes
     source: NDArray[np.int_]  # (p,): the input (from zero) that is cubed, or -1: the output
 
@@ -123,7 +122,7 @@ def cubes(
     periods: Periods,
     silent: NDArray[np.int_],
     model: tuple[ComplexArray, ComplexArray],
-    shape: NDArray[np.float64],
+    shape: Array,
     *,
     repeats: int = 1,
 ) -> Cubes:
@@ -176,9 +175,7 @@ def _carried(
     return carried
 
 
-def _fitted(
-    cubed: ComplexArray, Y: ComplexArray, shape: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _fitted(cubed: ComplexArray, Y: ComplexArray, shape: Array) -> tuple[Array, Array]:
     """Return factors (candidates, p) of cubes (candidates, n, p, blocks), and their probabilities by chance.
 
     Args:

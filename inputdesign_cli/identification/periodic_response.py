@@ -40,16 +40,16 @@ class Periods:
         """Return the number of periods per block that count."""
         return self.each(samples) - self.skip
 
-    def transforms(self, signal: NDArray[np.float64], repeats: int = 1) -> ComplexArray:
+    def transforms(self, signal: Array, repeats: int = 1) -> ComplexArray:
         """Return amplitudes (.., blocks, kept, harmonics, channels) of signals (.., N, channels)."""
         return np.asarray(np.fft.rfft(self.parts(signal, repeats), axis=-2) / self.period)
 
-    def means(self, signal: NDArray[np.float64], harmonics: NDArray[np.int_]) -> ComplexArray:
+    def means(self, signal: Array, harmonics: NDArray[np.int_]) -> ComplexArray:
         """Return the transforms at harmonics of the mean period, (.., L, channels, blocks)."""
         found = np.fft.rfft(self.parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
         return np.asarray(np.moveaxis(found, -3, -1))
 
-    def parts(self, signal: NDArray[np.float64], repeats: int = 1) -> NDArray[np.float64]:
+    def parts(self, signal: Array, repeats: int = 1) -> Array:
         """Return the periods of signals that count, (.., blocks, kept, period, channels), to the end.
 
         Args:
@@ -71,9 +71,9 @@ class PeriodicResponse:
 
     harmonics: NDArray[np.int_]
     G: ComplexArray
-    deviation: NDArray[np.float64]  # (L, p, r): of the entries, |error|^2 being their variance
-    noise: NDArray[np.float64]  # (L, p): the spectrum of the noise; for white noise it is the variance
-    explained: NDArray[np.float64]  # (L, p): mean squares of the part that the inputs explain, per line
+    deviation: Array  # (L, p, r): of the entries, |error|^2 being their variance
+    noise: Array  # (L, p): the spectrum of the noise; for white noise it is the variance
+    explained: Array  # (L, p): mean squares of the part that the inputs explain, per line
     freedom: int  # degrees of freedom of each variance, counted as complex numbers
 
 
@@ -154,13 +154,11 @@ def period_drift(
 ) -> PeriodDrift | None:
     """Return the drift of outputs (N, p) beyond chance, record by record, or None if nothing drifts.
 
-    The mean of a period has the variance Phi(0) / period. A degree counts if the
-    means have more of its orthogonal polynomial than by chance, at 1e-4 for all outputs, records and degrees.
+    The mean of a period has the variance Phi(0) / period. A degree counts if the means have more of its
+    orthogonal polynomial than by chance, at 1e-4 for all outputs, records and degrees.
 
     Args:
-        time: (N,), at which samples were taken, in any unit.
-        noise: (p,), the spectrum of the noise towards frequency zero.
-        repeats: see `Periods.parts`.
+        time: (N,), in any unit; `noise` (p,) the spectrum of the noise towards frequency zero.
     """
     curves, degrees = [], []
     rare = 0.5 * _CERTAIN / (_MOST_DEGREE * repeats * y.shape[1])

@@ -14,9 +14,10 @@ import scipy.linalg.blas
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.records import shares, weighing
+from inputdesign_cli.identification.records import inverses, shares, weighing
 from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
 from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.polynomial import stack
 
 # Samples of as many runs stay in the cache.
 _NUMBERS_AT_ONCE = 16_000
@@ -101,15 +102,10 @@ def owners(rows: Sequence[Row]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.repeat(np.arange(len(rows)), [row.size for row in rows]), columns
 
 
-def errors_and_gradients(
-    rows: Sequence[Row], theta: Array, u: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def errors_and_gradients(rows: Sequence[Row], theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
     """Return errors epsilon (runs, p, N), and gradients psi (runs, m, N) of every coefficient in its output.
 
-    Args:
-        rows: one an output.
-        theta: (runs, k).
-        u, y: (runs, r, N), all inputs of the model, and (runs, p, N).
+    Each of the p rows is for one output; theta (runs, k), u (runs, r, N) of all inputs, y (runs, p, N).
     """
     samples, number = y.shape[2], 0
     errors, psi = np.empty(y.shape), np.zeros((len(theta), sum(row.size for row in rows), samples))
@@ -162,8 +158,8 @@ class FromRest:
     """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`."""
 
     rows: tuple[Row, ...]  # one an output
-    u: NDArray[np.float64]  # (runs, r, N)
-    y: NDArray[np.float64]  # (runs, p, N)
+    u: Array  # (runs, r, N)
+    y: Array  # (runs, p, N)
     skipped: int = 0  # how many errors at the begin of each do not count
 
     @classmethod
@@ -185,7 +181,7 @@ class FromRest:
         """Return theta (runs, k) with stable predictors."""
         return stabilised(self.rows, theta)
 
-    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+    def at(self, theta: Array) -> tuple[Array, Array, Array]:
         """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k); overflow costs infinity."""
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             sums = self.sums(theta)
@@ -196,6 +192,13 @@ class FromRest:
             cost = np.where(finite, cost, np.inf)
             hessian[~finite], slope[~finite] = np.eye(theta.shape[1]), 0.0
         return cost, hessian, slope
+
+    def concluded(self, theta: Array) -> tuple[Array, Array]:
+        """Return the covariance (runs, p, p) of e, unbiased, and the information (runs, k, k) at theta."""
+        sums = self.sums(theta)
+        left = np.sqrt(np.maximum(self.y.shape[2] - sums.own, 1.0))
+        noise = sums.errors / np.outer(left, left)
+        return noise, sums.weighed(inverses(noise)[0])[0]
 
     def sums(self, theta: Array) -> Sums:
         """Return the sums from which the cost and its derivatives at theta (runs, k) are computed."""
@@ -218,9 +221,9 @@ class Sums:
 
     owner: NDArray[np.int64]  # (m,), the output that each gradient is of
     spread: Array  # (m, k), its parameter
-    errors: NDArray[np.float64]  # e e^T (runs, p, p)
-    slopes: NDArray[np.float64]  # psi e^T (runs, m, p)
-    products: NDArray[np.float64]  # psi psi^T (runs, m, m)
+    errors: Array  # e e^T (runs, p, p)
+    slopes: Array  # psi e^T (runs, m, p)
+    products: Array  # psi psi^T (runs, m, m)
 
     @property
     def own(self) -> Array:
@@ -228,7 +231,7 @@ class Sums:
         outputs = self.errors.shape[1]
         return shares(np.array([self.spread[self.owner == i].any(axis=0) for i in range(outputs)]).T)
 
-    def weighed(self, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
+    def weighed(self, weights: Array) -> tuple[Array, Array]:
         """Return psi^T W psi (runs, k, k) and psi^T W e (runs, k) for weights (runs, p, p)."""
         products = self.products * weights[:, self.owner[:, None], self.owner[None, :]]
         slopes = np.sum(self.slopes * weights[:, self.owner, :], axis=2)
@@ -260,9 +263,7 @@ def is_arx(model: PolynomialModel) -> bool:
 def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
     """Return estimates (runs, k) of an ARX model in one step, weighted by its covariance ([ljung-1999], 4.2).
 
-    Args:
-        model: the structure and the covariance are meant.
-        u, y: (runs, samples, r), (runs, samples, p); earlier samples are unknown.
+    Samples before u (runs, samples, r) and y (runs, samples, p) are unknown.
     """
     longest = max(parameter.power for parameter in model.parameters)
     nowhere, weights = np.zeros((len(y), model.theta.size)), np.linalg.inv(model.covariance)
@@ -273,10 +274,6 @@ def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
 
 def estimated_polynomials(model: PolynomialModel, theta: Array) -> tuple[Array, Array]:
     """Return A (runs, p, l) and B (runs, p, r, m) of ARX estimates (runs, k), ascending in q^-1."""
-    A = np.zeros((len(theta), model.outputs, max(a.size for a in model.A)))
-    B = np.zeros((len(theta), model.outputs, model.inputs, max(b.size for row in model.B for b in row)))
-    for i, row in enumerate(rows_of(model)):
-        A[:, i, : row.a.lags.stop] = row.a.polynomial(theta)
-        for j, b in zip(row.inputs, row.b, strict=True):
-            B[:, i, j, : b.lags.stop] = b.polynomial(theta)
-    return A, B
+    models = [model.at(row) for row in theta]
+    A = [stack([one.per_output(one.A)])[0] for one in models]
+    return np.array(A), np.array([stack(one.B) for one in models])

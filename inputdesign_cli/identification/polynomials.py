@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
-from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts
+from inputdesign_cli.identification.kind import Batch, Extension, Kind, Mask, Parts, Starts
 from inputdesign_cli.identification.polynomial_rows import (
     FromRest,
     Row,
@@ -48,11 +47,11 @@ class PolynomialKind(Kind):
         return max(row.memory for row in self.rows)
 
     @property
-    def explaining(self) -> NDArray[np.bool_]:
+    def explaining(self) -> Mask:
         """Return the mask (k,) of the coefficients of B and F."""
-        return np.array([parameter.letter in "bf" for parameter in self.model.parameters], dtype=bool)
+        return self._among("bf")
 
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
         errors, each = errors_and_gradients(self.rows, theta[None], u.T[None], y.T[None])
         psi = np.zeros((theta.size, *y.shape))
@@ -60,14 +59,17 @@ class PolynomialKind(Kind):
             psi[column, :, output] = own
         return errors[0].T, psi
 
+    def batch(self, u: Array, y: Array) -> Batch:
+        """Return the problem of records (runs, N, r), (runs, N, p) that begin at rest, noise as well."""
+        return FromRest.of(self.model, u, y)
+
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past on the prediction errors, output by output.
 
-        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j. This sum is off by impulses if y and u
-        before the record are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown
-        level of its input a step through 1/F_j. For a stable F_j the others make up for the
-        step, but not if F_j integrates or nearly does. From rest only y is missing, which noise has moved.
-        That matters only if the predictor remembers y beyond its order.
+        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j, which is off by impulses if earlier y
+        and u are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown level of its
+        input a step, which the others make up for unless F_j integrates or nearly does. From rest only y is
+        missing, which noise has moved. That matters only if the predictor remembers y beyond its order.
         """
         return tuple(_start(row, theta, samples, free=free) for row in self.rows)
 
@@ -76,12 +78,14 @@ class PolynomialKind(Kind):
         entries = (entry for row in self.rows for entry in zip(row.b, row.f, strict=True))
         return max([0, *(b.lags.stop - f.lags.stop for b, f in entries)])
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
-        """Return the indices of the coefficients of C and D; of F as well if the states are free."""
-        letters = "cdf" if free else "cd"
-        return np.flatnonzero([parameter.letter in letters for parameter in self.model.parameters])
+    def in_starts(self, late: int, *, free: bool) -> Mask:
+        """Return the mask of the coefficients of C and D; of F as well if the states are free."""
+        return self._among("cdf" if free else "cd")
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def _among(self, letters: str) -> Mask:
+        return np.array([parameter.letter in letters for parameter in self.model.parameters], dtype=bool)
+
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals (N, m) filtered by D/C of each output, as (p, N, m)."""
         return np.array([filtered(*row.whitening(theta), signals, axis=0) for row in self.rows])
 
@@ -89,7 +93,7 @@ class PolynomialKind(Kind):
         """Return theta with the roots of C, D and F inside the unit circle."""
         return stabilised(self.rows, theta[None])[0]
 
-    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return each output's own estimate; shared parameters are weighted by the information of each."""
         listed = np.zeros((0, len(self.model.names))) if given is None else given[None]
         points, tried = list[Array](), 0
@@ -119,7 +123,7 @@ class PolynomialKind(Kind):
         scaled = np.linalg.lstsq(total / np.outer(scale, scale), moment / scale, rcond=None)[0]
         return np.asarray(scaled / scale)
 
-    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+    def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions by a further coefficient in any of the polynomials, or by a shorter delay."""
         model, larger = self.model.at(theta), []
         for i, j in model.active:
@@ -134,17 +138,13 @@ class PolynomialKind(Kind):
                 earlier[i, j] -= 1
                 sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
                 larger.append((sooner, "coefficient in B before the others"))
-        for i in (i for i, row in enumerate(model.A) if row.size > 1):
-            larger.append((replace(model, A=_longer(model.A, i)), "pole in A"))
-        for i in range(len(model.C)):
-            larger.append((replace(model, C=_longer(model.C, i)), "coefficient in C"))
-        for i in range(len(model.D)):
-            larger.append((replace(model, D=_longer(model.D, i)), "coefficient in D"))
-        found = []
-        for one, what in larger:
-            (name,) = set(one.names) - set(self.model.names)
-            found.append(Extension(one, PolynomialKind(one), name, what))
-        return tuple(found)
+        for name, rows in (("A", model.A), ("C", model.C), ("D", model.D)):
+            what = "pole in A" if name == "A" else f"coefficient in {name}"
+            for i, row in enumerate(rows):
+                if name != "A" or row.size > 1:
+                    more = (*rows[:i], np.append(row, 0.0), *rows[i + 1 :])
+                    larger.append((replace(model, **{name: more}), what))
+        return [Extension.of(model, one, what) for one, what in larger]
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which rows of G are stable."""
@@ -172,7 +172,3 @@ def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )
-
-
-def _longer(rows: tuple[Array, ...], i: int) -> tuple[Array, ...]:
-    return (*rows[:i], np.append(rows[i], 0.0), *rows[i + 1 :])

@@ -42,7 +42,7 @@ class Point:
 
     theta: Array
     all_errors: Array  # (N + M, p), what unknown starts explain taken off
-    all_psi: NDArray[np.float64]  # (k, N + M, p) = -d errors / d theta, the starts following
+    all_psi: Array  # (k, N + M, p) = -d errors / d theta, the starts following
     samples: int  # N
     directions: Array  # ((N + M) p, m) orthonormal, errors in white units that unknown starts can explain
     towards: Array  # (k,), minus half the gradient of what the cost has beside the errors
@@ -54,7 +54,7 @@ class Point:
     cost: float = np.inf
 
     @classmethod
-    def at_rest(cls, theta: Array, errors: Array, psi: NDArray[np.float64]) -> Point:
+    def at_rest(cls, theta: Array, errors: Array, psi: Array) -> Point:
         """Return errors and gradient without unknown starts, not yet weighted."""
         k, none, weights = theta.size, np.zeros((errors.size, 0)), np.eye(errors.shape[1])
         return cls(theta, errors, psi, len(errors), none, np.zeros(k), np.zeros((k, k)), weights)
@@ -65,7 +65,7 @@ class Point:
         return self.all_errors[: self.samples]
 
     @property
-    def psi(self) -> NDArray[np.float64]:
+    def psi(self) -> Array:
         """Return the negative gradient psi (k, N, p) of the prediction errors."""
         return self.all_psi[:, : self.samples]
 
@@ -145,7 +145,7 @@ class Records:
         """Return a covariance (p, p) below which errors count as rounding."""
         return _EXACT * np.diag(np.mean(self.y**2, axis=0))
 
-    def from_rest(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
+    def from_rest(self, theta: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) and their gradient (k, N, p) if each record began at rest."""
         found = [self.kind.errors_and_gradient(theta, *part) for part in self.parts]
         return np.concatenate([e for e, _ in found]), np.concatenate([psi for _, psi in found], axis=1)
@@ -174,9 +174,9 @@ class Records:
             directions=directions,
             towards=-slopes.sum(axis=1),
             known=slopes @ slopes.T,
-            unknowns=free.unknowns,
+            unknowns=sum(basis.free for *_, basis in free.bases),
             determinant=free.determinant,
-            of_noise=free.of_noise,
+            of_noise=sum(basis.of_noise for *_, basis in free.bases),
         )
 
     def gradient(self, theta: Array, index: int) -> Array:
@@ -193,7 +193,7 @@ class Records:
     @property
     def _moving(self) -> list[int]:
         """Return the indices of the parameters on which the starts depend."""
-        return self.kind.in_starts(self.late, free=self.free).tolist()
+        return np.flatnonzero(self.kind.in_starts(self.late, free=self.free)).tolist()
 
     def _starts(self, theta: Array) -> tuple[Start, ...]:
         starts = self.kind.starts(theta, self.longest, self.late, free=self.free)
@@ -210,14 +210,14 @@ class Records:
 
     def _start_slope(self, theta: Array, index: int) -> tuple[Start, ...]:
         """Return the derivative of the starts by a parameter, by central differences."""
-        size = self.kind.start_step(theta, index, self.longest)
+        size = float(self.kind.start_steps(theta, self.longest)[index])
         step = size * np.eye(theta.size)[index]
         ends = zip(self._starts(theta + step), self._starts(theta - step), strict=True)
         return tuple(
             Start(*(np.subtract(a, b) / (2.0 * size) for a, b in zip(*pair, strict=True))) for pair in ends
         )
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals filtered by the inverse noise models, (p, N, m); see `Kind`."""
         pieces = np.split(signals, np.cumsum(self.lengths)[:-1])
         return np.concatenate([self.kind.whitened(theta, x) for x in pieces], axis=1)
@@ -293,7 +293,7 @@ class RecordProblem:
         """Return the number of output errors of a run."""
         return self.records[0].y.size
 
-    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+    def at(self, theta: Array) -> tuple[Array, Array, Array]:
         """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k)."""
         points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
         hessian = np.array([point.hessian for point in points])
@@ -304,9 +304,35 @@ class RecordProblem:
         """Return theta (runs, k) with stable poles."""
         return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
 
+    def concluded(self, theta: Array) -> tuple[Array, Array]:
+        """Return the covariance (runs, p, p) of e and the information (runs, k, k) at theta (runs, k)."""
+        points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
+        noise = [noise_of(*each) for each in zip(self.records, points, strict=True)]
+        information = [information_of(*each) for each in zip(self.records, points, noise, strict=True)]
+        return np.array(noise), np.array(information)
+
     def kept(self, runs: NDArray[np.bool_]) -> RecordProblem:
         """Return the same problem with some of its runs only."""
         return RecordProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))
+
+
+def noise_of(records: Records, point: Point) -> Array:
+    """Return the covariance (p, p) of e, corrected for the parameters of every output and unknown starts."""
+    samples, outputs = point.errors.shape
+    own = shares(np.any(records.from_rest(point.theta)[1], axis=1))
+    left = np.sqrt(np.maximum(samples - own - point.unknowns / outputs, 1.0))
+    every = point.all_errors
+    return np.asarray(every.T @ every / np.outer(left, left))
+
+
+def information_of(records: Records, point: Point, noise: Array) -> Array:
+    """Return the information matrix (k, k): the sum over the samples of psi noise^-1 psi^T."""
+    return replace(point.of_errors, weights=weights_of(records, noise)).hessian
+
+
+def weights_of(records: Records, noise: Array) -> Array:
+    """Return the weights W (p, p): the inverse of the noise, which may be no more than rounding."""
+    return inverses((noise + records.rounding)[None])[0][0]
 
 
 def shares(acting: NDArray[np.bool_]) -> Array:
@@ -314,14 +340,14 @@ def shares(acting: NDArray[np.bool_]) -> Array:
     return np.asarray(np.sum(acting / np.maximum(np.sum(acting, axis=1, keepdims=True), 1), axis=0))
 
 
-def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.float64]]:
+def weighing(S: Array, samples: int) -> tuple[Array, Array]:
     """Return cost (runs,) and weights W (runs, p, p) of errors with covariances S (runs, p, p)."""
     inverse, logarithm = inverses(S)
     root = np.exp(logarithm / S.shape[1])
     return samples * root, (root / S.shape[1])[:, None, None] * inverse
 
 
-def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
+def inverses(covariances: Array) -> tuple[Array, Array]:
     """Return the inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
 
     They follow from correlations: outputs may differ by orders of magnitude. A singular correlation is raised

@@ -22,9 +22,7 @@ def like_nothing_elsewhere(
 ) -> list[tuple[int, float, float]]:
     """Return the inputs whose column of G may be zero, with the probabilities of zero and of the nominal G.
 
-    Args:
-        nominal, estimated: of one structure.
-        step: between samples, in the unit of time of the models.
+    The `nominal` and the `estimated` model are of one structure; samples are `step` apart.
     """
     gradient, now, before = *_response(estimated, step), _response(nominal, step)[1]
     found = []
@@ -60,14 +58,8 @@ def _chance(
 ) -> float | None:
     """Return the probability that a part of G differs by (n, p) from the estimate through chance alone.
 
-    The Wald statistic is the smallest step of the parameters that moves G there, as far as any step can.
-
-    Args:
-        gradient: (n, k, p), of that part.
-        wholly: whether the step must lead there.
-
-    Returns:
-        None if no step does, or something is infinite.
+    The Wald statistic is the smallest step of the parameters that moves G there, as far as any step can, or
+    `wholly`. None if no step does, or something is infinite; the gradient (n, k, p) is of that part.
     """
     if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(difference))):
         return None

@@ -8,7 +8,7 @@ few standard deviations of it. No single minimum shows how far the parameters ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,10 +67,9 @@ class Search:
 
 
 def search(records: Records, points: Array, *, starts: int, quick: int | None = None) -> Search:
-    """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k).
+    """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k), of `starts` tried ones.
 
     Args:
-        starts: the number of points that were tried.
         quick: the most steps from each, fewer if these gain nothing that matters. Kinks may stop the search,
             and no other minima are returned.
     """
@@ -85,27 +84,30 @@ def search(records: Records, points: Array, *, starts: int, quick: int | None = 
     if not converged and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
-    others = rivals(point, found), _minima_beside(records, point, found)
-    return Search(records, point, converged, steps, starts, *others)
+    return Search(records, point, converged, steps, starts, *_others(records, point, found))
 
 
-def _likely(point: Point, found: Minimum) -> Iterator[tuple[int, Array, float]]:
-    """Yield runs that ended nearly as likely as the best `point`, with their excess, the best first."""
+def _others(
+    records: Records, point: Point, found: Minimum
+) -> tuple[tuple[Rival, ...], tuple[tuple[Point, float], ...]]:
+    """Return the other minima that explain the records nearly as well as the best `point`, likeliest first.
+
+    Rivals are more than five deviations away. Minima beside the best one come with their excess in -2 log
+    likelihood. Only models with dead times have them: kinks separate them from the best one.
+    """
+    far, beside = [Rival(point.theta, 0.0)], list[tuple[Point, float]]()
     for run in np.argsort(found.cost) if point.cost > 0.0 else ():
-        cost = float(found.cost[run])
+        cost, theta = float(found.cost[run]), np.asarray(found.theta[run], dtype=float)
         excess = point.freedom * float(np.log(cost / point.cost)) if np.isfinite(cost) else np.inf
         if excess > _NEARLY:
-            return
-        yield int(run), np.asarray(found.theta[run], dtype=float), excess
-
-
-def rivals(point: Point, found: Minimum) -> tuple[Rival, ...]:
-    """Return the minima that other starts found, likeliest first: far from the best and nearly as likely."""
-    minima = [Rival(point.theta, 0.0)]
-    for _, theta, excess in _likely(point, found):
-        if not any(_is_near(point, theta - other.theta, excess - other.excess) for other in minima):
-            minima.append(Rival(theta, max(excess, 0.0)))
-    return tuple(minima[1:])
+            break
+        if not any(_is_near(point, theta - other.theta, excess - other.excess) for other in far):
+            far.append(Rival(theta, max(excess, 0.0)))
+        if records.dead_times.size and found.converged[run] and _is_near(point, theta - point.theta, excess):
+            here = (point, *(one for one, _ in beside))
+            if min(_distance(point, theta - other.theta) for other in here) > _SAME:
+                beside.append((evaluate(records, theta), max(excess, 0.0)))
+    return tuple(far[1:]), tuple(beside)
 
 
 def _distance(point: Point, step: Array) -> float:
@@ -116,19 +118,6 @@ def _distance(point: Point, step: Array) -> float:
 def _is_near(point: Point, step: Array, excess: float) -> bool:
     """Return whether a step leads to the same minimum, or to one within five deviations."""
     return _distance(point, step) <= max(_APART, _UNEXPLAINED * excess)
-
-
-def _minima_beside(records: Records, point: Point, found: Minimum) -> tuple[tuple[Point, float], ...]:
-    """Return minima near the best `point` and about as likely, each with its excess in -2 log likelihood.
-
-    Only models with dead times have them: kinks separate them from the best one.
-    """
-    kept: list[tuple[Point, float]] = []
-    for run, theta, excess in _likely(point, found) if records.dead_times.size else ():
-        apart = min(_distance(point, theta - other.theta) for other in (point, *(one for one, _ in kept)))
-        if found.converged[run] and apart > _SAME and _is_near(point, theta - point.theta, excess):
-            kept.append((evaluate(records, theta), max(excess, 0.0)))
-    return tuple(kept)
 
 
 def _beyond_instants(records: Records, found: Minimum) -> Minimum:
@@ -215,12 +204,6 @@ def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
     return step
 
 
-def _deviance(records: Records, point: Point) -> float:
-    """Return -2 log of the likelihood at the likeliest levels and states, up to a constant."""
-    products = point.all_errors.T @ point.all_errors
-    return float(records.samples * np.linalg.slogdet(products)[1]) + point.of_noise
-
-
 def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.0) -> float:
     """Return the probability that useless unknown starts at a point lower -2 log likelihood as far.
 
@@ -231,8 +214,12 @@ def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.
     more, left = unknowns - rest.unknowns, errors - len(records.kind.model.names) - unknowns
     if more <= 0 or left <= _FEWEST:
         return 1.0
-    fell = max(_deviance(at_rest.records, rest) - _deviance(records, point) + gain, 0.0)
-    ratio = np.expm1(min(fell / errors, _LARGEST))
+    # -2 log likelihood at the likeliest levels and states, up to a constant.
+    deviances = [
+        records.samples * float(np.linalg.slogdet(one.all_errors.T @ one.all_errors)[1]) + one.of_noise
+        for one in (rest, point)
+    ]
+    ratio = np.expm1(min(max(deviances[0] - deviances[1] + gain, 0.0) / errors, _LARGEST))
     return float(scipy.special.fdtrc(more, left, ratio * left / more))
 
 
@@ -260,7 +247,6 @@ def from_rest_or_free(
     never rests: its values before the record are unknown either way.
 
     Args:
-        records: from rest.
         rest: whether the records begin at rest about zero; None: as the data say.
         searched: a function that searches from its own starts and, if given, from the parameters (k,).
         about: (k,), parameters that show roughly how long unknown inputs act.

@@ -36,13 +36,13 @@ _MOST_ROUNDS = 30
 class Start(NamedTuple):
     """The effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
 
-    free: NDArray[np.float64]  # (m, N), by the level and states, of which nothing is known
-    disturbance: NDArray[np.float64]  # (m, N), `free` before the inverse of the noise model
-    noise: NDArray[np.float64]  # (n, N), by independent unknowns of the variance of e
-    zeros: NDArray[np.float64]  # -2 log of a density of the zeros of the noise model, see `density`; a scalar
+    free: Array  # (m, N), by the level and states, of which nothing is known
+    disturbance: Array  # (m, N), `free` before the inverse of the noise model
+    noise: Array  # (n, N), by independent unknowns of the variance of e
+    zeros: Array  # -2 log of a density of the zeros of the noise model, see `density`; a scalar
 
     @classmethod
-    def white(cls, free: NDArray[np.float64]) -> Start:
+    def white(cls, free: Array) -> Start:
         """Return the start under white noise, which has no past."""
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
@@ -53,7 +53,7 @@ class Start(NamedTuple):
         return Start(free, self.disturbance, past, self.zeros + (density(C) if C.size > 1 else 0.0))
 
 
-def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
+def noise_before(C: Array, D: Array, samples: int) -> Array:
     """Return the effect of stationary noise C/D e before a record on (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
@@ -168,12 +168,14 @@ class FreeStarts:
     @property
     def past(self) -> int:
         """Return M: for every record the most unknowns of past noise that an output has, added up."""
-        return len(self.lengths) * self._past
+        return len(self.lengths) * max(len(start.noise) for start in self.starts)
 
-    @property
-    def unknowns(self) -> int:
-        """Return the number m of free unknowns, without linearly dependent ones."""
-        return sum(basis.free for _, _, basis in self._blocks)
+    @cached_property
+    def bases(self) -> list[tuple[int, int, _Basis]]:
+        """Return the record, the output and the basis of every start; equal lengths share theirs."""
+        each = list(enumerate(self.starts))
+        own = {n: [(i, _Basis.of(start, n)) for i, start in each] for n in sorted(set(self.lengths))}
+        return [(record, i, basis) for record, n in enumerate(self.lengths) for i, basis in own[n]]
 
     @property
     def determinant(self) -> float:
@@ -182,18 +184,12 @@ class FreeStarts:
         Records share the noise model and its zeros.
         """
         zeros = sum(float(start.zeros) for start in self.starts)
-        return zeros + sum(basis.determinant for _, _, basis in self._blocks)
-
-    @property
-    def of_noise(self) -> float:
-        """Return the part of the determinant due to past noise; its unknowns have a density of their own."""
-        return sum(basis.of_noise for _, _, basis in self._blocks)
+        return zeros + sum(basis.determinant for *_, basis in self.bases)
 
     def slopes(self, starts: Sequence[Start]) -> Array:
         """Return the derivatives of the terms of the determinant from the derivatives of the starts."""
-        own = {key: basis.slope(starts[key[1]]) for key, basis in self._bases.items()}
         zeros = [float(start.zeros) for start in starts]
-        return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
+        return np.array([*zeros, *(basis.slope(starts[i]) for _, i, basis in self.bases)])
 
     def combined(self, coefficients: Sequence[Array], starts: Sequence[Start]) -> Array:
         """Return the effect (N, p) of starts, or of their derivatives, for these coefficients of unknowns."""
@@ -204,7 +200,7 @@ class FreeStarts:
 
     def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
         """Return the unknowns of past noise as errors (M, p), zero for outputs that have fewer."""
-        found = np.zeros((len(self.lengths), self._past, len(self.starts)))
+        found = np.zeros((len(self.lengths), self.past // len(self.lengths), len(self.starts)))
         for i, (own, start) in enumerate(zip(coefficients, self.starts, strict=True)):
             found[:, : len(start.noise), i] = -own[:, len(start.free) :]
         return found.reshape(-1, len(self.starts))
@@ -220,16 +216,14 @@ class FreeStarts:
             weights: W (p, p); None: by the covariance of the remaining errors.
         """
         errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
-        plain, of = self._plain
-
-        def projected(weighed: Array) -> Array:
-            return np.asarray((plain.T @ weighed)[np.arange(of.size), of])
+        plain, of = self._directions()
+        every = np.arange(of.size)
 
         def spread(step: Array) -> Array:
             return np.asarray(plain @ (step[:, None] * np.eye(errors.shape[1])[of]))
 
         # Output by output first: levels alone would make all errors look alike.
-        shares, previous, directions = projected(errors), np.inf, plain
+        shares, previous, directions = (plain.T @ errors)[every, of], np.inf, plain
         left = errors - spread(shares)
         root = _root(left, weights)
         if len(root) > 1:
@@ -239,46 +233,29 @@ class FreeStarts:
                 unit = np.linalg.norm(root, axis=0)
                 scaled = root / unit
                 gram = (scaled.T @ scaled)[np.ix_(of, of)] * overlap
-                step = np.linalg.solve(gram, projected(left @ root.T @ scaled)) / unit[of]
+                step = np.linalg.solve(gram, (plain.T @ (left @ root.T @ scaled))[every, of]) / unit[of]
                 shares, left = shares + step, left - spread(step)
                 size = float(np.sum((left @ root.T) ** 2))
                 if weights is not None or abs(size - previous) <= 1e-14 * size:
                     break
                 previous = size
-            directions = (plain[:, None] * scaled[:, of]).reshape(-1, of.size)
-            directions = np.linalg.qr(directions)[0]
+            directions = np.linalg.qr((plain[:, None] * scaled[:, of]).reshape(-1, of.size))[0]
         coefficients = [np.zeros((len(self.lengths), len(x.free) + len(x.noise))) for x in self.starts]
-        ends = np.cumsum([basis.directions.shape[1] for _, _, basis in self._blocks])[:-1]
-        for (record, i, basis), own in zip(self._blocks, np.split(shares, ends), strict=True):
+        ends = np.cumsum([basis.directions.shape[1] for *_, basis in self.bases])[:-1]
+        for (record, i, basis), own in zip(self.bases, np.split(shares, ends), strict=True):
             coefficients[i][record] = basis.coefficients @ own
         return coefficients, root, directions
 
-    @property
-    def _past(self) -> int:
-        return max(len(start.noise) for start in self.starts)
-
-    @cached_property
-    def _bases(self) -> dict[tuple[int, int], _Basis]:
-        """Return the basis for each length of record and each output."""
-        every = [(length, i) for length in sorted(set(self.lengths)) for i in range(len(self.starts))]
-        return {(length, i): _Basis.of(self.starts[i], length) for length, i in every}
-
-    @cached_property
-    def _blocks(self) -> list[tuple[int, int, _Basis]]:
-        """Return the record, the output and the basis of every start."""
-        outputs = range(len(self.starts))
-        return [(k, i, self._bases[n, i]) for k, n in enumerate(self.lengths) for i in outputs]
-
-    @property
-    def _plain(self) -> tuple[Array, NDArray[np.int64]]:
+    def _directions(self) -> tuple[Array, NDArray[np.int64]]:
         """Return the directions (N + M, K) of all starts, and the output of each (K,)."""
-        of = np.concatenate([np.full(b.directions.shape[1], i) for _, i, b in self._blocks])
+        of = np.concatenate([np.full(basis.directions.shape[1], i) for _, i, basis in self.bases])
         samples, column = sum(self.lengths), 0
         found = np.zeros((samples + self.past, of.size))
         begins = np.cumsum([0, *self.lengths])
-        for record, _, basis in self._blocks:
+        for record, _, basis in self.bases:
             length, (rows, wide) = self.lengths[record], basis.directions.shape
-            own, past = slice(column, column + wide), samples + record * self._past
+            past = samples + record * (self.past // len(self.lengths))
+            own = slice(column, column + wide)
             found[begins[record] : begins[record] + length, own] = basis.directions[:length]
             found[past : past + rows - length, own] = basis.directions[length:]
             column += wide

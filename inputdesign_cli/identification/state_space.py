@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import Kind, Part, Starts, late_samples
+from inputdesign_cli.identification.kind import STEP, Kind, Mask, Parts, Starts, late_samples
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import StateSpaceModel
@@ -18,7 +17,6 @@ from inputdesign_cli.plant.model import DELAY
 
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
 _MARGIN = 1e-9
-_STEP = 1e-6
 # A pole this near to one integrates, or nearly does: a level of the input is not made up for by states.
 _INTEGRATES = 1e-2
 
@@ -30,7 +28,7 @@ class StateSpaceKind(Kind):
     model: StateSpaceModel
 
     @cached_property
-    def whitening(self) -> NDArray[np.bool_]:
+    def whitening(self) -> Mask:
         """Return the mask (k,) of the parameters of the noise model H."""
         coloured = bool(np.any(self.model.matrices.K))
         return np.array(
@@ -38,7 +36,7 @@ class StateSpaceKind(Kind):
             dtype=bool,
         )
 
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
         model = self.model.at(theta)
         (_, early, late), m, n, p = model.held, model.matrices, model.order, y.shape[1]
@@ -58,10 +56,9 @@ class StateSpaceKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past: levels of the outputs, and the states at the start.
 
-        Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
-        Inputs before the record that come late by the dead time move the states, sample by sample, along the
-        directions of inputs. Their direct effect through D is not counted. From rest, only noise has moved
-        the states, by an unknown amount.
+        Levels of inputs, which move integrating states for ever, are unknown as well. Earlier inputs that
+        come late by the dead time move the states, sample by sample, along the directions of inputs. Their
+        direct effect through D is not counted. From rest only noise has moved the states.
         """
         coloured, nothing = self._coloured, np.zeros((0, samples))
         if not (free or coloured):
@@ -80,7 +77,7 @@ class StateSpaceKind(Kind):
         x[:n], driven[size - steady :] = np.eye(size, n)[:n], np.eye(steady, n)
         level[n : n + levels] = np.eye(levels, p)
 
-        def responses(K: Array) -> NDArray[np.float64]:
+        def responses(K: Array) -> Array:
             found, state, onward = np.empty((size, samples, p)), x.copy(), (A - K @ m.C).T
             for t in range(samples):
                 if 0 < t <= late:
@@ -96,17 +93,16 @@ class StateSpaceKind(Kind):
         before = responses(np.zeros_like(m.K)) if coloured and stable else through
         return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
-        """Return the indices of entries in A, C and K; of B and delays too if few inputs push many states."""
-        if not (free or self._coloured):
-            return np.zeros(0, dtype=np.int64)
+    def in_starts(self, late: int, *, free: bool) -> Mask:
+        """Return the mask of entries in A, C and K; of B and delays too if few inputs push many states."""
         pushed = free and late > 0 and self.model.order > 2 * self.model.inputs
         letters = ("A", "C", "K", *(("B", DELAY) if pushed else ()))
-        return np.flatnonzero([letter in letters for letter, _, _ in self.model.entries])
+        wanted = np.array([letter in letters for letter, _, _ in self.model.entries], dtype=bool)
+        return wanted & (free or self._coloured)
 
-    def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return a small share of the entry as the differentiation step."""
-        return _STEP * max(abs(float(theta[index])), _STEP)
+    def start_steps(self, theta: Array, samples: int) -> Array:
+        """Return small shares of the entries as the differentiation steps."""
+        return STEP * np.maximum(np.abs(theta), STEP)
 
     def lateness(self, theta: Array) -> int:
         """Return the dead time in samples, rounded up."""
@@ -123,7 +119,7 @@ class StateSpaceKind(Kind):
         estimated = any(letter == "K" for letter, _, _ in self.model.entries)
         return estimated or bool(np.any(self.model.matrices.K))
 
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+    def whitened(self, theta: Array, signals: Array) -> Array:
         """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         model = self.model.at(theta)
         C, K, closed = model.matrices.C, model.matrices.K, self._closed(model)
@@ -139,7 +135,7 @@ class StateSpaceKind(Kind):
             return np.full_like(theta, np.inf)
         return out
 
-    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return the nominal parameters, and the `given` ones."""
         return Starts(self.model.theta[None], 1).and_given(given)
 

@@ -31,7 +31,7 @@ class ResidualTest(NamedTuple):
 
     lags: Array  # (n,)
     # (n, p, columns), normalised, of residuals with residuals or inputs that much earlier.
-    correlation: NDArray[np.float64]
+    correlation: Array
     limit: float  # a single correlation of white noise stays within +- limit with probability 0.99
     statistic: float  # chi-squared if the model is right
     freedom: int  # of that
@@ -49,11 +49,8 @@ def whiteness(
 ) -> ResidualTest:
     """Return the test of correlations of the residuals (samples, p) among all outputs at lags 1 .. `lags`.
 
-    It has the portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978].
-
-    Args:
-        fitted: number of estimated parameters of the noise model, which make residuals look whiter.
-        lengths: of the records that follow each other; None for one.
+    It has the portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978]. The `fitted`
+    parameters of the noise model make residuals look whiter. Records of these `lengths` follow each other.
     """
     n, p = errors.shape
     at = np.arange(1, _most_lags(n, p * p, lags, fitted) + 1)
@@ -77,12 +74,8 @@ def cross_correlations(
 ) -> ResidualTest:
     """Return the score test of whether the past inputs u(t), u(t - 1), .. explain residuals.
 
-    Args:
-        errors, u: (samples, p), (samples, r).
-        lags: the number of lags of the inputs.
-        fitted: number of estimated parameters of the plant, which take as many directions away.
-        feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
-        lengths: see `whiteness`.
+    The `fitted` parameters of the plant take as many directions away. With `feedback` u(t) answers y(t), and
+    the past begins with u(t - 1); for errors (samples, p) and `lengths` see `whiteness`.
     """
     (n, p), r = errors.shape, u.shape[1]
     at = np.arange(_most_lags(n, r, lags, fitted)) + int(feedback)
@@ -173,14 +166,11 @@ def tests_of(
     experiments: Sequence[int],
     feedback: bool,
 ) -> Tests:
-    """Return the tests of an estimate.
+    """Return the tests of an estimate, the `point`, whose noise has this covariance (p, p).
 
     Args:
-        point: the estimate.
-        noise: (p, p), the covariance of e.
         alternatives: the parameters that might be missing.
         experiments: the samples of each experiment.
-        feedback: whether u(t) depends on y(t).
     """
     kind = records.kind
     # Samples that unknown inputs before each record explain whatever they are, if enough are left.
@@ -218,12 +208,8 @@ def of_one_system(point: Point, noise: Array, experiments: Sequence[int]) -> tup
     """Return the probability that each experiment differs from the others as much, if all are of one system.
 
     It is the score test of parameters of its own ([engle-1984]): regressors are the gradients, in this
-    experiment alone. It has as many degrees of freedom as both it and the others determine parameters.
-
-    Args:
-        point: the joint estimate.
-        noise: (p, p), the covariance of e.
-        experiments: the samples of each; of a single one nothing is said.
+    experiment alone. It has as many degrees of freedom as both it and the others determine parameters. The
+    estimate is the joint one; of a single experiment nothing is said.
     """
     if len(experiments) < 2:
         return ()

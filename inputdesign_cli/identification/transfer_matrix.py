@@ -8,18 +8,17 @@ its slowest poles.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import polynomial as ascending
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import Counted, tell
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts, late_samples
+from inputdesign_cli.identification.kind import STEP, Extension, Kind, Mask, Parts, Starts, late_samples
 from inputdesign_cli.identification.polynomials import with_entry
 from inputdesign_cli.identification.records import RecordProblem, Records, shifted
 from inputdesign_cli.identification.start import Start
@@ -35,7 +34,6 @@ _FOLLOWED, _QUICK, _IDLE, _APART = 4, 12, 0.1, 25.0
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
-_STEP = 1e-6
 # Of a sample: a dead time of zero would be none, and no parameter.
 _LEAST_DELAY = 1e-12
 _CUTOFFS = 5
@@ -50,19 +48,13 @@ Place = tuple[int, int]
 class TransferKind(Kind):
     """A transfer matrix in s, of inputs that are held or band-limited; see `Kind`."""
 
-    model: ContinuousModel
+    model: ContinuousModel | SampledModel
+    plant: ContinuousModel  # the model in s
     between: Intersample
-    # Known dead times of entries, which starts keep.
-    held: Mapping[Place, float] = field(default_factory=dict)
 
-    @property
-    def continuous(self) -> bool:
-        """Return whether frequencies are in rad per time unit: not if the inputs are held."""
-        return not self.between.hold
-
-    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
         """Return prediction errors y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
-        model = self.model.at(theta)
+        model = self.plant.at(theta)
         errors, psi = y.copy(), np.zeros((theta.size, *y.shape))
         for i, j in model.active:
             entry = model.held(i, j, self.between.sample_time)
@@ -76,34 +68,33 @@ class TransferKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past of each output: a level, and the free response of its entries.
 
-        A level of the input is unknown as well. Level and states make it up where poles are stable, but not
-        the ramp that an integrator, or nearly one, makes of it. Inputs before the record that come late by a
-        dead time move the states, sample by sample, as if from anywhere.
+        Level and states make up for an unknown level of the input where poles are stable, but not for the
+        ramp of an integrator, or nearly one. Inputs late by a dead time move the states as from anywhere.
         """
         if not free:
             return (Start.white(np.zeros((0, samples))),) * self.model.outputs
-        model = self.model.at(theta)
+        model = self.plant.at(theta)
         found = [[np.ones((1, samples))] for _ in range(self.model.outputs)]
         for i, j in model.active:
             a = tuple(model.denominator[i][j].tolist())
             found[i].append(_begun(a, self.between.sample_time, samples, late))
         return tuple(Start.white(np.concatenate(parts)) for parts in found)
 
-    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
-        """Return the indices of the coefficients of the denominators if the states are free."""
-        return np.flatnonzero([free and parameter.letter == "a" for parameter in self.model.parameters])
+    def in_starts(self, late: int, *, free: bool) -> Mask:
+        """Return the mask of the coefficients of the denominators if the states are free."""
+        return np.array([free and parameter.letter == "a" for parameter in self.model.parameters], dtype=bool)
 
-    def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return a small share of the coefficient, or of its value for modes as slow as the record."""
-        parameter = self.model.parameters[index]
-        i, j = parameter.places[0]
-        slowest = 1.0 / (samples * self.between.sample_time)
-        order = self.model.denominator[i][j].size - 1
-        return _STEP * max(abs(float(theta[index])), slowest ** (order - parameter.power))
+    def start_steps(self, theta: Array, samples: int) -> Array:
+        """Return small shares of the coefficients, or of their values for modes as slow as the record."""
+        slowest, units = 1.0 / (samples * self.between.sample_time), []
+        for parameter in self.model.parameters:
+            i, j = parameter.places[0]
+            units.append(slowest ** (self.plant.denominator[i][j].size - 1 - parameter.power))
+        return STEP * np.maximum(np.abs(theta), units)
 
     def lateness(self, theta: Array) -> int:
         """Return the longest dead time in samples, rounded up."""
-        return late_samples(self.model.at(theta).memory, self.between.sample_time)
+        return late_samples(self.plant.at(theta).memory, self.between.sample_time)
 
     @property
     def instants(self) -> float | None:
@@ -134,13 +125,15 @@ class TransferKind(Kind):
             out[columns] = np.poly(poles).real[:0:-1]
         return out
 
-    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    def starting_points(self, parts: Parts, given: Array | None, known: Mask | None = None) -> Starts:
         """Return the likeliest starts after a few steps from rest, and the `given` one."""
-        about = Records(self, tuple(parts))
-        above = np.array([parameter.letter == "b" for parameter in self.model.parameters])
+        about, parameters = Records(self, tuple(parts)), self.plant.parameters
+        above = np.array([parameter.letter == "b" for parameter in parameters])
+        kept = [] if known is None else [parameters[k] for k in np.flatnonzero(known)]
+        held = {place: one.value for one in kept if one.letter == DELAY for place in one.places}
         made = []
         for u, y in parts:
-            for theta in _starting_points(self.model, self.between, self.held, u, y):
+            for theta in _starting_points(self.plant, self.between, held, u, y):
                 begun = self.stabilised(theta, len(y))
                 # The errors are linear in the numerators, which are zero so far.
                 errors, psi = self.errors_and_gradient(begun, u, y)
@@ -159,19 +152,9 @@ class TransferKind(Kind):
                 chosen.append(found.theta[run])
         return Starts(np.array(chosen[:_FOLLOWED]).reshape(-1, begun.shape[1]), len(begun)).and_given(given)
 
-    def holding(self, known: NDArray[np.bool_]) -> TransferKind:
-        """Return the kind with starting points that keep known dead times."""
-        held = {
-            place: parameter.value
-            for parameter, fixed in zip(self.model.parameters, known, strict=True)
-            for place in parameter.places
-            if fixed and parameter.letter == DELAY
-        }
-        return replace(self, held=held)
-
-    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+    def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions by a further zero in a proper entry, or by a dead time if it has none."""
-        model = self.model.at(theta)
+        model = self.plant.at(theta)
         none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
         model, larger = replace(model, delay=model.delay or none), []
         for i, j in model.active:
@@ -183,12 +166,9 @@ class TransferKind(Kind):
             if not any(model.delay[o][n].size for o, n in shared):
                 late = with_entry(model.delay, i, j, np.zeros(1))
                 larger.append((replace(model, delay=late), "dead time or fast pole"))
-        found = []
-        for one, what in larger:
-            (name,) = set(one.names) - set(self.model.names)
-            shown = SampledModel(one, self.between.sample_time) if self.between.hold else one
-            found.append(Extension(shown, TransferKind(one, self.between), name, what))
-        return tuple(found)
+        step = self.between.sample_time if self.between.hold else None
+        shown = ((one if step is None else SampledModel(one, step), what) for one, what in larger)
+        return [Extension.of(self.model, *one) for one in shown]
 
 
 @lru_cache(maxsize=32)
@@ -203,18 +183,14 @@ def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int)
 
 def _starting_points(
     model: ContinuousModel, between: Intersample, held: Mapping[Place, float], u: Array, y: Array
-) -> Array:
-    """Return dead times and denominators (points, k), numerators zero, for each cutoff, from one record.
+) -> Iterator[Array]:
+    """Yield dead times and denominators (k,), numerators zero, for each cutoff, from u (N, r) and y (N, p).
 
-    Cutoffs lie between the record's length and its step. Dead times are searched on a grid, one after the
-    other, by the residuals of the regression of the row. A single one also takes its next best minima.
-
-    Args:
-        model: gives the structure.
-        held: known dead times of entries.
-        u, y: (N, r), (N, p).
+    Cutoffs lie between the record's length and its step. Dead times that are not `held` are searched on a
+    grid, one after the other, by the residuals of the regression of the row. A single one also takes its
+    next best minima.
     """
-    samples, step, points = len(y), between.sample_time, []
+    samples, step = len(y), between.sample_time
     for cutoff in np.geomspace(8.0 * np.pi / (samples * step), 0.5 * np.pi / step, _CUTOFFS):
         behind = _Filtered(model, between, u, y, float(cutoff))
         for delays in _delays(model, behind, held, _grid(samples) * step):
@@ -225,8 +201,7 @@ def _starting_points(
                     theta[index] = delays[i, j]
                 elif parameter.letter == "a":
                     theta[index] = behind.denominator(i, j, delays)[parameter.power]
-            points.append(theta)
-    return np.array(points)
+            yield theta
 
 
 def _delays(

@@ -77,7 +77,7 @@ class Whitening:
             found.append(reflected(np.append(1.0, -ahead)))
         return cls(tuple(found), lengths)
 
-    def through(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
+    def through(self, signals: Array) -> Array:
         """Return signals (.., N + M, p) filtered record by record; the M errors before the records stay.
 
         The first samples of a record, whose past is not known, are zero.
@@ -91,7 +91,7 @@ class Whitening:
             begin += length
         return found
 
-    def slopes(self, errors: Array) -> NDArray[np.float64]:
+    def slopes(self, errors: Array) -> Array:
         """Return minus the derivative (m, N, p) of filtered residuals by every coefficient."""
         at = [(i, lag) for i, filter in enumerate(self.filters) for lag in range(1, filter.size)]
         found = np.zeros((len(at), *errors.shape))
@@ -99,7 +99,7 @@ class Whitening:
             found[k, :, i] = -shifted(errors[:, i], lag, self.lengths)
         return found
 
-    def echoes(self) -> NDArray[np.float64]:
+    def echoes(self) -> Array:
         """Return the responses (m, lags, p, p) of `slopes` to past white errors; see `Kind.echoes`."""
         samples, p = min(max(self.lengths), FADED), len(self.filters)
         alone, impulse = replace(self, lengths=(samples,)), np.eye(1, samples)[0]
@@ -118,7 +118,7 @@ class White:
     starts: Array  # ((N + M) p, m), orthonormal, what m unknown starts explain
     explained: Array  # ((N + M) p, m + k), what they and the k parameters explain
     basis: Array  # of that, orthonormal
-    echoes: NDArray[np.float64]  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
+    echoes: Array  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
     whitening: Whitening | None = None  # filters of residuals that are not white, estimated along
 
     @classmethod
@@ -155,7 +155,7 @@ class White:
             whitening,
         )
 
-    def columns(self, signals: NDArray[np.float64]) -> Array:
+    def columns(self, signals: Array) -> Array:
         """Return signals (m, N, p) as ((N + M) p, m) in units of the residuals, zero before the records."""
         if self.whitening is not None:
             signals = self.whitening.through(signals)
@@ -163,20 +163,18 @@ class White:
         found[: signals[0].size] = (signals @ self.root.T).reshape(len(signals), -1).T
         return found
 
-    def mean(self, echoes: NDArray[np.float64]) -> Array:
+    def mean(self, echoes: Array) -> Array:
         """Return the means (m,) of the scores of signals that are made of the residuals themselves.
 
         Residuals are P e, with P = I - Q Q^T for the unknown starts Q, and e white. The score (T P e)^T P e
-        has the mean -tr(Q^T T Q), since T looks back in time and has no trace. Under whitening it is zero.
-
-        Args:
-            echoes: T (m, lags, p, p), in the units of residuals.
+        of echoes T (m, lags, p, p) has the mean -tr(Q^T T Q), since T looks back in time and has no trace.
+        Under whitening it is zero.
         """
         known = self.whitening is None and self.starts.shape[1]
         return -self.variance * _traces(echoes, self._of_starts) if known else np.zeros(len(echoes))
 
     @cached_property
-    def _of_starts(self) -> NDArray[np.float64]:
+    def _of_starts(self) -> Array:
         return self._correlations(self.starts)
 
     @cached_property
@@ -208,7 +206,7 @@ class White:
         inverse = np.linalg.pinv(self.explained / scale, rcond=1e-12) / scale[:, None]
         return np.asarray(inverse[len(inverse) - len(self.echoes) :])
 
-    def _correlations(self, directions: Array) -> NDArray[np.float64]:
+    def _correlations(self, directions: Array) -> Array:
         """Return sum over t and directions of D(t) D(t - lag)^T within the records, (lags, p, p)."""
         outputs, ends = len(self.root), np.cumsum(self.lengths)
         signals = directions[: ends[-1] * outputs].reshape(ends[-1], outputs, -1 if directions.size else 0)
@@ -233,8 +231,7 @@ class White:
 
     def without(self, columns: Array) -> White:
         """Return the estimate if columns ((N + M) p, m) of free sizes explain residuals like starts."""
-        left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
-        left = left[:, sizes > DEPENDENT]
+        left = _orthonormal(self.unexplained(_scaled(columns)))
         freedom = self.residuals.size / self.variance
         return replace(
             self,
@@ -250,7 +247,7 @@ class White:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
 
-def _traces(echoes: NDArray[np.float64], correlations: NDArray[np.float64]) -> Array:
+def _traces(echoes: Array, correlations: Array) -> Array:
     """Return tr(D^T T D) for T (m, lags, p, p) and directions with these correlations (lags, p, p)."""
     lags = min(echoes.shape[1], len(correlations))
     return np.asarray(np.tensordot(echoes[:, :lags], correlations[:lags], axes=3))

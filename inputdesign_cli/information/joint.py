@@ -143,11 +143,11 @@ def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> Comple
     """Return the part of x in the gradients of the predictions, in raw parameters, (S, n, k, p, r)."""
     if experiments[0].loop is not None:
         return excitation_gradients([e.loop for e in experiments if e.loop is not None], w)
-    return input_gradients(experiments[0].model, [e.model for e in experiments], w)
+    return input_gradients([e.model for e in experiments], w)
 
 
 def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
     """Return the part of e in the gradients of the predictions (S, n, k, p, p)."""
     if experiments[0].loop is not None:
         return disturbance_gradients([e.loop for e in experiments if e.loop is not None], w)
-    return noise_gradients(experiments[0].model, [e.model for e in experiments], w)
+    return noise_gradients([e.model for e in experiments], w)

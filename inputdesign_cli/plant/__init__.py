@@ -24,7 +24,6 @@ from inputdesign_cli.plant.loop import (
     excited as excited,
 )
 from inputdesign_cli.plant.model import (
-    Fraction as Fraction,
     Listed as Listed,
     Model as Model,
     Parameter as Parameter,

@@ -20,12 +20,13 @@ from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.loop import BESIDE, INTEGRATES, beside_zero
 from inputdesign_cli.plant.model import (
-    Around,
+    Derived,
     Fraction,
     Listed,
     Parameter,
     Parametrised,
     SampledPlant,
+    Signals,
     row_parameters,
     tables_at,
 )
@@ -37,15 +38,12 @@ _DIFFERENCE = np.array([1.0, -1.0])
 
 
 @dataclass(frozen=True)
-class Coloured(Around, Parametrised):
+class Coloured(Parametrised, Derived):
     """A model `plant` with H0 whose noise is filtered by C_i / (D_i Delta_i); H0 is diagonal.
 
-    Attributes:
-        C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
-            the parameters of the plant.
-        held: of each D, whether it is known. Then it may have roots on the unit circle, and the gradient with
-            respect to its coefficients is not needed (and given as zero).
-        drift: whether the noise integrates, Delta = 1 - q^-1; one for all outputs or one an output.
+    C and D are monic, one common to all outputs or one an output; their coefficients are the last parameters.
+    A D that is `held` is known: it may have roots on the unit circle, and its gradient counts as zero. If the
+    noise `drift`s, it integrates: Delta = 1 - q^-1.
     """
 
     plant: Listed
@@ -89,13 +87,9 @@ class Coloured(Around, Parametrised):
     @cached_property
     def inverse_filters(self) -> tuple[tuple[Array, Array], ...]:
         """Return D Delta and C of each output: their quotient filters the prediction errors of the plant."""
-        free = [
-            np.ones(1) if held else d
-            for d, held in zip(self._per_output(self.D), self._per_output(self.held), strict=True)
-        ]
         return tuple(
-            (np.convolve(d, fixed), c)
-            for d, fixed, c in zip(free, self.fixed, self._per_output(self.C), strict=True)
+            (np.convolve(d, _DIFFERENCE if drifts else np.ones(1)), c)
+            for d, drifts, c in zip(*map(self._per_output, (self.D, self.drift, self.C)), strict=True)
         )
 
     def _per_output(self, rows: Sequence[_T]) -> Sequence[_T]:
@@ -172,32 +166,24 @@ class Coloured(Around, Parametrised):
     def _beside_zero(self, w: ArrayLike) -> Array | ComplexArray:
         return beside_zero(w, self._nearest)
 
-    def shape_at(self, w: ArrayLike) -> ComplexArray:
-        """Return C / (D Delta), as (n, p)."""
-        return 1.0 / self._inverse_at(w)
-
     def _inverse_at(self, w: ArrayLike) -> ComplexArray:
         q = unit_circle(w)
         return np.stack([evaluate(a, q) / evaluate(b, q) for a, b in self.inverse_filters], axis=-1)
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
-        beside = self._beside_zero(w)
-        return self._with_own(self.plant.input_gradient(beside) * self._inverse_at(beside)[:, None, :, None])
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
-        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
-        return self._with_own(self.plant.noise_gradient(w), w, e)
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
-        of_signals = self.plant.prediction_gradient(w, y, u, np.zeros_like(e))
+        if y is None and u is None:
+            return self._with_own(self.plant.prediction_gradient(w, None, None, e), w, e)
+        at = self._beside_zero(w) if y is None else w
+        none = None if y is None or e is None else np.zeros_like(e)
+        of_signals = self.plant.prediction_gradient(at, y, u, none) * self._inverse_at(at)[:, None, :, None]
+        if y is None or u is None:
+            return self._with_own(of_signals)
         of_errors = self.plant.prediction_gradient(w, np.zeros_like(y), np.zeros_like(u), e)
-        return self._with_own(of_signals * self._inverse_at(w)[:, None, :, None] + of_errors, w, e)
+        return self._with_own(of_signals + of_errors, w, e)
 
     def _with_own(
-        self, of_plant: ComplexArray, w: ArrayLike | None = None, e: NDArray | None = None
+        self, of_plant: ComplexArray, w: ArrayLike | None = None, e: Signals = None
     ) -> ComplexArray:
         """Return a gradient (n, k, p, m): that of the plant, then the slopes in C and D by e (n, p, m)."""
         shape = (len(of_plant), len(self.own_parameters), *of_plant.shape[2:])
@@ -236,7 +222,7 @@ class Coloured(Around, Parametrised):
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:
         """See `SampledPlant`."""
-        return self.inner.forcing_at(w) * self.shape_at(w)[:, None, :]
+        return self.inner.forcing_at(w) / self._inverse_at(w)[:, None, :]
 
     def forcing(self, e: Array) -> Array:
         """See `SampledPlant`."""

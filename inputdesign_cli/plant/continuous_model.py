@@ -15,32 +15,22 @@ from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray, Rows
+from inputdesign_cli.plant.frequencies import frequency_plane
 from inputdesign_cli.plant.held import HeldEntry, Intersample, polynomial_roots
-from inputdesign_cli.plant.model import (
-    DELAY,
-    Fraction,
-    Parameter,
-    Parametrised,
-    WhiteNoise,
-    entry_label,
-    tables_at,
-)
+from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, WhiteNoise, entry_label, tables_at
 
 
 @dataclass(frozen=True)
-class ContinuousModel(Parametrised, WhiteNoise):
+class ContinuousModel(WhiteNoise):
     """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
 
-    `numerator` and `denominator` hold ascending coefficients, s^0 first; denominators are
-    monic. With `common` all entries share one denominator and its parameters.
+    `numerator` and `denominator` hold ascending coefficients, s^0 first; denominators are monic. With
+    `common` all entries share one denominator and its parameters. `delay` holds a list of one dead time for
+    each entry, an empty one for entries that act at once; it is empty where all do. `entries` are the present
+    ones; if None, zeros of the numerators say so.
 
-    Parameters are named after their power of s: `b0[2,1]` is the constant of the numerator of entry
-    (2, 1), `a1[2,1]` the coefficient of s in its denominator, `delay[2,1]` its dead time; `a1` and `delay`
-    of common ones, and without brackets for one input and output. All coefficients of a numerator are free;
-    an entry that is absent has none.
-
-    `delay` holds a list of one dead time for each entry, an empty list for entries that act at once; it is
-    empty where all do. `entries` are the present entries; if None, zeros of the numerators say so.
+    Parameters are named after their power of s: `b0[2,1]` in the numerator, `a1[2,1]` in the denominator of
+    entry (2, 1), `delay[2,1]` its dead time; common ones, and of one input and output, go without brackets.
     """
 
     numerator: Rows
@@ -67,9 +57,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
     ) -> ContinuousModel:
         """Build from any coefficients: each entry divided by the leading coefficient of its denominator.
 
-        Args:
-            degrees: (p, r), of the numerators, -1 of absent entries; without them trailing zeros are
-                dropped.
+        The `degrees` (p, r) of numerators are -1 for absent entries; without them trailing zeros are dropped.
         """
         tops = [[np.asarray(t, dtype=float) for t in row] for row in numerator]
         sizes = (
@@ -183,7 +171,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
     @cached_property
     def singularities(self) -> ComplexArray:
         """Return the poles of G and of all gradients, as points of the frequency plane."""
-        return _frequency_plane(self.poles)
+        return frequency_plane(self.poles)
 
     @property
     def radius(self) -> float:
@@ -192,7 +180,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
-        return _frequency_plane(
+        return frequency_plane(
             np.concatenate([polynomial_roots(p[output][input]) for p in (self.numerator, self.denominator)])
         )
 
@@ -249,8 +237,3 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     def _below(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
         return np.asarray(ascending.polyval(s, self.denominator[i][j]), dtype=complex)
-
-
-def _frequency_plane(poles: ComplexArray) -> ComplexArray:
-    """Return poles in s as frequency + j damping."""
-    return np.abs(poles.imag) + 1j * np.abs(poles.real)

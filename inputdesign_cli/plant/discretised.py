@@ -6,17 +6,26 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.transfer import Rational, product_of
 
 
-def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], period: float) -> Rational:
+def zero_order_hold(
+    numerator: Sequence[float], denominator: Sequence[float], period: float, delay: float = 0.0
+) -> Rational:
     """Return the zero-order-hold sample of a transfer function in s (descending powers), in q^-1 (ascending).
 
-    `period` is in the unit of time of s. Any leading delay stays in the numerator.
+    The period and the dead time are in the unit of time of s. A leading delay stays in the numerator.
     """
+    if delay:
+        low, high = (np.trim_zeros(np.array(p[::-1], dtype=float), "b") for p in (numerator, denominator))
+        if not low.size:
+            return Rational(np.zeros(1))
+        entry = HeldEntry.of(low / high[-1], high / high[-1], period, delay)
+        return Rational(entry.sampled[0], (entry.sampled[1],))
     if len(denominator) == 1:
         return Rational(np.array([numerator[-1] / denominator[0]]))
     import scipy.signal  # only now: see `plant.filtering`
@@ -37,28 +46,13 @@ def hold_entries(
     period: float,
     delays: Sequence[Sequence[float]],
 ) -> tuple[Rows, Rows]:
-    """Sample every entry of a matrix behind a hold: return polynomials in q^-1, ascending.
-
-    Args:
-        delays: the dead times of the entries.
-    """
+    """Sample every entry of a matrix behind a hold, with its dead time: return B and F, ascending in q^-1."""
     held = [
-        [_held(above, below, period, late) for above, below, late in zip(*rows, strict=True)]
+        [zero_order_hold(above, below, period, late) for above, below, late in zip(*rows, strict=True)]
         for rows in zip(numerators, denominators, delays, strict=True)
     ]
     above = tuple(tuple(entry.numerator for entry in row) for row in held)
     return above, tuple(tuple(entry.denominator_polynomial for entry in row) for row in held)
-
-
-def _held(above: Sequence[float], below: Sequence[float], period: float, delay: float) -> Rational:
-    """Return one entry with its dead time, sampled behind a hold."""
-    if not delay:
-        return zero_order_hold(above, below, period)
-    low, high = (np.trim_zeros(np.array(p[::-1], dtype=float), "b") for p in (above, below))
-    if not low.size:
-        return Rational(np.zeros(1))
-    numerator, denominator = HeldEntry.of(low / high[-1], high / high[-1], period, delay).sampled
-    return Rational(numerator, (denominator,))
 
 
 Rule = Literal["tustin", "backward", "zoh"]
@@ -69,12 +63,7 @@ _SUM = np.array([1.0, 1.0])
 def discretised(
     numerator: Sequence[float], factors: Sequence[Sequence[float]], period: float, rule: Rule
 ) -> Rational:
-    """Return the discretisation in q^-1 of a proper transfer function in s.
-
-    Args:
-        numerator: descending in s; `factors` of the denominator likewise.
-        period: between samples, in the unit of time of s.
-    """
+    """Return the discretisation in q^-1 of a proper transfer function in s (descending), at this period."""
     if rule == "zoh":
         return zero_order_hold(numerator, product_of(factors).tolist(), period)
     orders = [len(factor) - 1 for factor in factors]
@@ -101,8 +90,7 @@ def pid(
 ) -> Rational:
     """Return Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)) in q^-1; its integrator is a factor of its own.
 
-    Args:
-        integral: Ti, None for no integral action; `derivative` Td, `filtering` Tf.
+    The integral time Ti is None for no integral action; `derivative` is Td, `filtering` Tf.
     """
     parts = [Rational(np.array([gain]), ())]
     if integral is not None:
@@ -123,9 +111,7 @@ def _added(parts: Sequence[Rational]) -> Rational:
     total = np.zeros(1)
     for part in parts:
         others = [factor for other in parts if other is not part for factor in other.denominator]
-        term = product_of([part.numerator, *others])
-        size = max(term.size, total.size)
-        total = np.pad(total, (0, size - total.size)) + np.pad(term, (0, size - term.size))
+        total = np.asarray(ascending.polyadd(total, product_of([part.numerator, *others])), dtype=float)
     return Rational(total, below)
 
 

@@ -11,11 +11,9 @@ _LARGE = 50_000
 
 
 def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis: int = -1) -> NDArray:
-    """Return values filtered along an axis by numerator / denominator, ascending in q^-1, from rest.
+    """Return real or complex values of any shape filtered along an axis, from rest.
 
-    Args:
-        numerator, denominator: (m,), (k,); denominator[0] is not zero.
-        values: real or complex, of any shape.
+    The numerator (m,) and the denominator (k,), whose first is not zero, are ascending in q^-1.
     """
     b, a = np.atleast_1d(numerator), np.atleast_1d(denominator)
     b, a = b / a[0], a / a[0]

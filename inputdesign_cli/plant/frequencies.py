@@ -29,6 +29,12 @@ def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
     return np.abs(np.angle(z)) + 1j * np.abs(np.log(np.abs(z)))
 
 
+def frequency_plane(roots: ArrayLike) -> ComplexArray:
+    """Return roots in s as frequency + j damping."""
+    s = np.asarray(roots, dtype=complex)
+    return np.abs(s.imag) + 1j * np.abs(s.real)
+
+
 def graded_grid(
     singularities: ArrayLike, lo: float, hi: float, *, points: int = 1000, knots: ArrayLike = ()
 ) -> Array:
@@ -64,8 +70,7 @@ def _spaced(lo: float, hi: float, points: int) -> Array:
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
     """Return one grid for several plants, everywhere about as fine as the finest of theirs.
 
-    Poles that lie side by side share their points. The number of points grows with the places at which there
-    are poles, not with the number of plants.
+    Poles that lie side by side share their points, so that many plants do not need many times as many.
     """
     parts = [np.empty(0), *(graded_grid(singularities, lo, hi) for singularities in plants)]
     grid = np.unique(np.concatenate(parts))
@@ -84,18 +89,14 @@ def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
 def local_maxima(
     function: Callable[[Array], Array], grid: Array, values: Array, *, above: float = -np.inf
 ) -> tuple[Array, Array]:
-    """Return the local maxima of `function` over [grid[0], grid[-1]], polished between the grid points.
+    """Return frequencies and values of the local maxima of `function` over [grid[0], grid[-1]], ascending.
 
-    `function` maps frequencies (n,) to values (n,) and `values` are its values on `grid`. Around
-    every grid maximum the grid is refined once, which parts twin peaks that share a bracket; then each
-    bracket is narrowed by repeated sampling, all at once. Only continuity is asked for (tables have
-    kinks). Maxima with values <= `above` are left out.
+    It maps frequencies (n,) to values (n,), and `values` are those on the grid. Around every grid maximum the
+    grid is refined once, which parts twin peaks in one bracket; then each bracket is narrowed by repeated
+    sampling, all at once. Only continuity is asked for (tables have kinks). Values <= `above` are left out.
 
-    Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum
-    that differs only by rounding from the value at an end of the grid is at that end.
-
-    Returns:
-        Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
+    Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum that
+    differs only by rounding from the value at an end of the grid is at that end.
     """
     least = above - SLACK * abs(above) if np.isfinite(above) else above
     finer, beside = grid, np.zeros(0, dtype=bool)  # whether the cell before each point is refined

@@ -21,7 +21,6 @@ from functools import cached_property
 import numpy as np
 import scipy
 from numpy.polynomial import polynomial as ascending
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.model import DELAY
@@ -50,6 +49,8 @@ class HeldEntry:
     sample_time: float
     system: Array  # [A b; 0 0] in its own unit of time
     delay: float | None
+    lag: int  # d, the whole samples of the dead time
+    fraction: float  # the rest of it, in the time of the spec
     biproper: bool  # whether the delayed input itself is among the columns
 
     @classmethod
@@ -71,7 +72,8 @@ class HeldEntry:
         if n:
             system[2 * n - 1, 0] = 1.0  # the second copy is driven by 1 / a
             system[n - 1, 2 * n] = 1.0
-        return cls(padded, denominator, unit, sample_time, system, delay, numerator.size == n + 1)
+        split, biproper = whole_samples(delay or 0.0, sample_time), numerator.size == n + 1
+        return cls(padded, denominator, unit, sample_time, system, delay, *split, biproper)
 
     @property
     def order(self) -> int:
@@ -96,23 +98,9 @@ class HeldEntry:
         return np.stack([early, whole - early], axis=1)
 
     @property
-    def lag(self) -> int:
-        """Return d, the whole samples of the dead time."""
-        return self._split[0]
-
-    @property
     def direct_lag(self) -> int:
         """Return the samples after which the direct gain acts: a fraction counts as a whole sample."""
-        return self.lag + (self._fraction > 0.0)
-
-    @cached_property
-    def _split(self) -> tuple[int, float]:
-        """Return the whole samples of the dead time, and the remaining fraction in the time of the spec."""
-        return whole_samples(self.delay or 0.0, self.sample_time)
-
-    @property
-    def _fraction(self) -> float:
-        return self._split[1]
+        return self.lag + (self.fraction > 0.0)
 
     def _exponential(self, time: float) -> Array:
         return np.asarray(scipy.linalg.expm(self.system * (self.unit * time)))
@@ -122,15 +110,9 @@ class HeldEntry:
         return self._exponential(self.sample_time)
 
     @cached_property
-    def _pulse(self) -> Array:
-        """Return the gains by which u(k - d - 1) - u(k - d) enters the states' derivatives, (order,)."""
-        n = self.order
-        return np.asarray(self.unit * self._after_fraction[:n, n - 1])
-
-    @cached_property
     def _after_fraction(self) -> Array:
         """Return the matrix exponential over the rest of a sample after the fraction."""
-        return self._exponential(self.sample_time - self._fraction) if self._fraction else self._held
+        return self._exponential(self.sample_time - self.fraction) if self.fraction else self._held
 
     @cached_property
     def gain(self) -> Array:
@@ -143,24 +125,22 @@ class HeldEntry:
     def responses(self, z: ComplexArray) -> ComplexArray:
         """Return the responses to held samples at points z of the unit circle, (m, columns)."""
         late = z ** -float(self.lag)
-        entries = self.entries if self._fraction else self.entries[:, :1]
-        driven = entries.T[:1] + entries.T[1:] / z[:, None] if self._fraction else entries.T
+        entries = self.entries if self.fraction else self.entries[:, :1]
+        driven = entries.T[:1] + entries.T[1:] / z[:, None] if self.fraction else entries.T
         parts: list[ComplexArray | Array] = [late[:, None] * self._through(driven, z)]
         if self.biproper:
             parts.append(z[:, None] ** -float(self.direct_lag))
         if self.delay is not None:
+            # The gains by which u(k - d - 1) - u(k - d) enters the derivatives of the states.
             n = self.order
-            pulse = np.concatenate([self._pulse, np.zeros(n)])[None]
+            pulse = np.concatenate([self.unit * self._after_fraction[:n, n - 1], np.zeros(n)])[None]
             parts.append((late * (1.0 / z - 1.0))[:, None] * self._through(pulse, z)[:, :n])
             if self.biproper:
                 parts.append(np.zeros((z.size, 1)))
         return np.concatenate(parts, axis=1).astype(complex)
 
     def _through(self, driven: ComplexArray | Array, z: ComplexArray) -> ComplexArray:
-        """Return the states that inputs (m or 1, 2 order) drive, at points z, (m, 2 order).
-
-        By back-substitution in a triangular form, for all points at once.
-        """
+        """Return the states (m, 2 order) that inputs (m or 1, 2 order) drive at points z, by substitution."""
         if not self.order:
             return np.zeros((z.size, 0), dtype=complex)
         triangle, basis = self._triangular
@@ -226,7 +206,11 @@ class HeldEntry:
     def gradient(self, letter: str, power: int) -> Array:
         """Return the row of the gradient with respect to one coefficient, or to the dead time."""
         if letter == DELAY:
-            return self._late_gain
+            n, row = self.order, np.zeros(self.columns)
+            row[2 * n + self.biproper :][:n] = self.gain[:n]
+            if self.biproper:
+                row[-1] = self.direct
+            return row
         above = np.zeros(power + 1)
         above[power] = 1.0
         if letter == "b":
@@ -237,16 +221,6 @@ class HeldEntry:
             return row
         whole, rest = ascending.polydiv(ascending.polymul(above, self.numerator), self.denominator)
         return -self.row(np.asarray(whole), 1) - self.row(np.asarray(rest), 2)
-
-    @property
-    def _late_gain(self) -> Array:
-        """Return the row of the output on the derivatives with respect to the dead time."""
-        n, row = self.order, np.zeros(self.columns)
-        start = 2 * n + self.biproper
-        row[start : start + n] = self.gain[:n]
-        if self.biproper:
-            row[-1] = self.direct
-        return row
 
     @property
     def columns(self) -> int:
@@ -319,7 +293,7 @@ class Intersample:
     sample_time: float
     hold: bool
 
-    def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
+    def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> Array:
         """Return the columns (.., N, columns) of an entry that samples (.., N) drive from rest.
 
         Measured outputs are never held, whatever the input is.
@@ -339,6 +313,6 @@ class Intersample:
         driven = scipy.fft.irfft(transform[..., None] * columns, length, axis=-2)
         return np.asarray(driven[..., :samples, :] / weights[:, None])
 
-    def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
+    def caused(self, entry: HeldEntry, u: Array) -> Array:
         """Return the output (.., N) of an entry that samples u (.., N) drive."""
         return np.asarray(self.responses(entry, u, hold=self.hold) @ entry.gain)

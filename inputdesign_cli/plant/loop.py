@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Model, SampledPlant, forcings_at, lefts_at, prediction_gradients
+from inputdesign_cli.plant.model import Model, SampledPlant, prediction_gradients
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
@@ -50,13 +50,10 @@ class Loop:
         [R  -N] [y]   [R H e]
         [P   Q] [u] = [Q r  ]
 
-    in which nothing has poles on or outside the unit circle. Unstable and integrating poles of plant and
-    controller are zeros of R and Q, so that their effect in the loop stays finite.
-
-    Poles and signals come from the states of G and of the rows of C. One polynomial in q^-1 would lose the
-    digits of poles that crowd at z = 1 when sampling is fast. States that feedback does not reach are poles
-    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has a
-    delay.
+    in which nothing has poles on or outside the unit circle: these are zeros of R and Q, and their effect in
+    the loop stays finite. Poles and signals come from the states of G and of the rows of C, since one
+    polynomial in q^-1 would lose the digits of poles that crowd at z = 1. y(t) is measured before u(t) is
+    applied; a controller that needs time to compute has a delay.
     """
 
     model: SampledPlant
@@ -140,11 +137,7 @@ class Loop:
         return self.model.memory + self.controller.memory
 
     def check_stability(self) -> None:
-        """Raise `SpecError` unless the loop is well posed and internally stable.
-
-        Raises:
-            SpecError: `unstable-loop` or `algebraic-loop`.
-        """
+        """Raise `SpecError` (`unstable-loop`, `algebraic-loop`) unless the loop is well posed and stable."""
         p, leading = self.model.outputs, self.instantaneous
         # det(I + C G) is the product of 1 + these eigenvalues, which do not depend on the units of u and y.
         gains = np.linalg.eigvals(-leading[:p, p:] @ np.linalg.solve(leading[p:, p:], leading[p:, :p]))
@@ -167,13 +160,10 @@ class Loop:
             )
 
     def check_delay(self) -> None:
-        """Raise `SpecError` where both plant and controller act at once.
+        """Raise `SpecError` (`algebraic-loop`) where both plant and controller act at once.
 
-        Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an
-        estimate from u and y, is biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
-
-        Raises:
-            SpecError: `algebraic-loop`.
+        Then u(t) holds e(t), and so does the gradient of the prediction of y(t): an estimate from u and y is
+        biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
         """
         answers = self.instantaneous[self.model.outputs :, : self.model.outputs] != 0.0
         if np.any(self.model.at_once @ answers):
@@ -220,34 +210,23 @@ def disturbed(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, Comple
     """Return `Loop.disturbed` of loops around plants of one structure, (S, n, p, p) and (S, n, r, p)."""
     left, p = _lefts_at(loops, w), loops[0].model.outputs
     right = np.zeros((*left.shape[:-1], p), dtype=complex)
-    if _alike(loops):
-        models = [loop.model for loop in loops]
-        right[..., :p, :] = forcings_at(models[0], models, loops[0].beside_zero(w))
-    else:
-        right[..., :p, :] = [loop.model.forcing_at(loop.beside_zero(w)) for loop in loops]
+    right[..., :p, :] = [loop.model.forcing_at(loop.beside_zero(w)) for loop in loops]
     return _solved(left, right, p)
-
-
-def _alike(loops: Sequence[Loop]) -> bool:
-    """Return whether all loops are evaluated at the same frequencies."""
-    return len({loop.nearest for loop in loops}) == 1
 
 
 def _lefts_at(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
     """Return the matrices on the left of `Loop`, beside zero, (S, n, p + r, p + r)."""
-    first, models = loops[0], [loop.model for loop in loops]
-    if not _alike(loops):
-        return np.concatenate([_lefts_at([loop], w) for loop in loops])
-    at = first.beside_zero(w)
-    R, N = lefts_at(models[0], models, at)
-    p, r = N.shape[-2:]
-    one = all(loop.controller is first.controller for loop in loops)
-    controllers = [loop.controller.fraction_at(at) for loop in (loops[:1] if one else loops)]
+    p, r = loops[0].model.outputs, loops[0].model.inputs
     # In memory the values of an entry stand side by side.
-    left = np.zeros((len(R), p + r, p + r, R.shape[1]), dtype=complex).transpose(0, 3, 1, 2)
-    left[..., :p, :p], left[..., :p, p:] = R, -N
-    left[..., p:, :p] = np.stack([P for P, _ in controllers])
-    left[..., p + np.arange(r), p + np.arange(r)] = np.stack([Q for _, Q in controllers])
+    left = np.zeros((len(loops), p + r, p + r, np.size(w)), dtype=complex).transpose(0, 3, 1, 2)
+    controllers: dict[tuple[int, float], tuple[ComplexArray, ComplexArray]] = {}
+    for own, loop in zip(left, loops, strict=True):
+        at, key = loop.beside_zero(w), (id(loop.controller), loop.nearest)
+        if key not in controllers:
+            controllers[key] = loop.controller.fraction_at(at)
+        own[:, :p, :p], N = loop.model.left_at(at)
+        own[:, :p, p:] = -N
+        own[:, p:, :p], own[:, p + np.arange(r), p + np.arange(r)] = controllers[key]
     return left
 
 
@@ -279,7 +258,7 @@ def _prediction_gradients(
     loops: Sequence[Loop], w: ArrayLike, y: ComplexArray, u: ComplexArray, e: NDArray
 ) -> ComplexArray:
     """Return the prediction gradients of the models, all at once if their frequencies agree."""
-    if _alike(loops):
+    if len({loop.nearest for loop in loops}) == 1:
         models = [loop.model for loop in loops]
         return prediction_gradients(models[0], models, loops[0].beside_zero(w), y, u, e)
     each = zip(loops, y, u, e, strict=True)
@@ -287,11 +266,7 @@ def _prediction_gradients(
 
 
 def close_loop(model: Model, controller: TransferMatrix) -> Loop:
-    """Return the loop of a model under a controller.
-
-    Raises:
-        SpecError: `not-supported` for a plant that is not sampled.
-    """
+    """Return the loop of a model under a controller; `SpecError` (`not-supported`) if it is not sampled."""
     if model.continuous:
         raise bad_spec(
             "not-supported",

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,8 +24,18 @@ class Fraction:
     denominator_gradient: ComplexArray
 
 
+Signals = NDArray | None
+
+
+def _inner(model: object) -> SampledPlant:
+    """Return the plant that a model is made of."""
+    return cast(Derived, model).inner
+
+
 class Model(Protocol):
     """A model y = G(theta) u + H(theta) e: p outputs, r inputs, k parameters, e of a full covariance.
+
+    What has a body here is so for a model that is made of another one, its `inner`, and derives from this.
 
     Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
     plane are frequency + j damping (see `logarithmic_distance`).
@@ -35,22 +44,27 @@ class Model(Protocol):
     @property
     def continuous(self) -> bool:
         """Return whether frequencies are in rad per time unit."""
+        return _inner(self).continuous
 
     @property
     def inputs(self) -> int:
         """Return the number of inputs r."""
+        return _inner(self).inputs
 
     @property
     def outputs(self) -> int:
         """Return the number of outputs p."""
+        return _inner(self).outputs
 
     @property
     def covariance(self) -> Array:
         """Return the covariance (p, p) of e; in continuous time of the noise on each output sample."""
+        return _inner(self).covariance
 
     @property
     def at_once(self) -> NDArray[np.bool_]:
         """Return the entries of G that may act without delay at some parameters, (p, r)."""
+        return _inner(self).at_once
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -75,9 +89,11 @@ class Model(Protocol):
     @property
     def singularities(self) -> ComplexArray:
         """Return the poles of G and of all gradients, as points of the frequency plane."""
+        return _inner(self).singularities
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
+        return _inner(self).entry_singularities(output, input)
 
     @property
     def radius(self) -> float:
@@ -85,10 +101,12 @@ class Model(Protocol):
 
         In continuous time exp of the largest real part in s.
         """
+        return _inner(self).radius
 
     @property
     def memory(self) -> float:
         """Return the samples, or time units, for which signals matter beyond the memory of the poles."""
+        return _inner(self).memory
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
         """Return whether numerator or denominator of an entry of G is not affine in each parameter, (k,)."""
@@ -98,6 +116,7 @@ class Model(Protocol):
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """Return the frequency response G as (n, p, r)."""
+        return _inner(self).plant_at(w)
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
@@ -108,9 +127,9 @@ class Model(Protocol):
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest.
 
-        Args:
-            step: time between samples of a plant in continuous time; sampled plants ignore it.
+        The `step` is the time between samples of a plant in continuous time; sampled plants ignore it.
         """
+        return _inner(self).simulate(u, e, step)
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return H^-1 dG/dtheta as (n, k, p, r), the gradient of the one-step prediction due to u."""
@@ -118,11 +137,12 @@ class Model(Protocol):
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return H^-1 dH/dtheta as (n, k, p, p), the gradient of the one-step prediction due to e."""
 
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return psi = -d epsilon / d theta, the gradient of the one-step prediction, as (n, k, p, m).
 
         `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
-        outputs, inputs and prediction errors epsilon.
+        outputs, inputs and prediction errors epsilon. Without `y` it is the response of the model to one of
+        the others, which is then the only one.
         """
 
 
@@ -135,31 +155,47 @@ class SampledPlant(Model, Protocol):
     @property
     def realisation(self) -> StateSpace:
         """Return a state-space realisation of G."""
+        return _inner(self).realisation
 
     @property
     def noise_gain(self) -> Array:
         """Return the gains by which R H e enters the states besides the way by the outputs, (states, p)."""
+        return _inner(self).noise_gain
 
     @property
     def predictor_poles(self) -> ComplexArray:
         """Return the poles in z of the filters from y, u and e to the gradient of the prediction."""
+        return _inner(self).predictor_poles
 
     @property
     def repeated_integrators(self) -> int:
         """Return the number of integrators of the realisation that take no part in G."""
+        return _inner(self).repeated_integrators
 
     @property
     def integrates(self) -> bool:
         """Return whether some noise has infinite power at frequency zero."""
+        return _inner(self).integrates
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Return R (n, p, p) and N (n, p, r)."""
+        return _inner(self).left_at(w)
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:
         """Return R H as (n, p, p)."""
+        return _inner(self).forcing_at(w)
 
     def forcing(self, e: Array) -> Array:
         """Return R H e (.., n, p) of samples e, from rest."""
+        return _inner(self).forcing(e)
+
+
+class Derived(SampledPlant, Protocol):
+    """A model that is made of another one, and answers like that one unless it says otherwise."""
+
+    @property
+    def inner(self) -> SampledPlant:
+        """Return the other model."""
 
 
 DELAY = "delay"
@@ -208,8 +244,7 @@ def tables_at(
 ) -> dict[str, tuple]:
     """Return copies of polynomials by letter, with other values (k,) of the parameters in them.
 
-    Args:
-        tables: a polynomial for each output, or one for all, or rows of columns of them.
+    Each table has a polynomial for each output, or one for all, or rows of columns of them.
     """
     found = {
         letter: [p.copy() if isinstance(p, np.ndarray) else tuple(one.copy() for one in p) for p in rows]
@@ -224,42 +259,41 @@ def tables_at(
 
 
 @singledispatch
-def input_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return `input_gradient` of models of one structure, `model` the first of them, (S, n, k, p, r).
-
-    A kind of plant that computes all at once faster registers its own function.
-    """
-    return np.stack([each.input_gradient(w) for each in models])
-
-
-@singledispatch
-def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return `noise_gradient` of models of one structure, (S, n, k, p, p)."""
-    return np.stack([each.noise_gradient(w) for each in models])
-
-
-@singledispatch
 def prediction_gradients(
-    model: Model, models: Sequence[Model], w: ArrayLike, y: NDArray, u: NDArray, e: NDArray
+    model: Model, models: Sequence[Model], w: ArrayLike, y: Signals, u: Signals, e: Signals
 ) -> ComplexArray:
-    """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, for y, u, e (S, n, ., m)."""
-    each = zip(models, y, u, e, strict=True)
-    return np.stack([one.prediction_gradient(w, *signals) for one, *signals in each])
+    """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, `model` the first of them.
+
+    Signals (S, n, ., m) may be one for all (1, n, ., m). A kind of plant that computes all at once faster
+    registers its own function.
+    """
+    every = ([x] * len(models) if x is None or len(x) == 1 else x[:, None] for x in (y, u, e))
+    signals = ((None if x is None else x[0] for x in own) for own in zip(*every, strict=True))
+    return np.stack([one.prediction_gradient(w, *own) for one, own in zip(models, signals, strict=True)])
 
 
-@singledispatch
-def lefts_at(
-    model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return R (S, n, p, p) and N (S, n, p, r) of models of one structure, see `left_at`."""
-    R, N = zip(*(each.left_at(w) for each in models), strict=True)
-    return np.stack(R), np.stack(N)
+def input_gradients(models: Sequence[Model], w: ArrayLike) -> ComplexArray:
+    """Return `input_gradient` of models of one structure, (S, n, k, p, r)."""
+    u = np.eye(models[0].inputs, dtype=complex)[None, None]
+    return prediction_gradients(models[0], models, w, None, u, None)
 
 
-@singledispatch
-def forcings_at(model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike) -> ComplexArray:
-    """Return `forcing_at` of models of one structure, (S, n, p, p)."""
-    return np.stack([each.forcing_at(w) for each in models])
+def noise_gradients(models: Sequence[Model], w: ArrayLike) -> ComplexArray:
+    """Return `noise_gradient` of models of one structure, (S, n, k, p, p)."""
+    e = np.eye(models[0].outputs, dtype=complex)[None, None]
+    return prediction_gradients(models[0], models, w, None, None, e)
+
+
+class Predicting:
+    """Derives what u alone and e alone cause from the gradient of the prediction."""
+
+    def input_gradient(self: Model, w: ArrayLike) -> ComplexArray:
+        """Return H^-1 dG/dtheta as (n, k, p, r), the gradient of the one-step prediction due to u."""
+        return input_gradients([self], w)[0]
+
+    def noise_gradient(self: Model, w: ArrayLike) -> ComplexArray:
+        """Return H^-1 dH/dtheta as (n, k, p, p), the gradient of the one-step prediction due to e."""
+        return noise_gradients([self], w)[0]
 
 
 class Listed(Model, Protocol):
@@ -270,42 +304,26 @@ class Listed(Model, Protocol):
         """Return the parameters in the order of theta, (k,)."""
 
 
-class Parametrised:
+class Parametrised(Predicting):
     """Derives the properties of a model from its list of `parameters`."""
 
-    if TYPE_CHECKING:
-
-        @property
-        def parameters(self) -> tuple[Parameter, ...]:
-            """Return all parameters, in the order of theta."""
-
     @cached_property
-    def names(self) -> tuple[str, ...]:
+    def names(self: Listed) -> tuple[str, ...]:
         """Return the names of the k parameters."""
         return tuple(parameter.name for parameter in self.parameters)
 
     @cached_property
-    def theta(self) -> Array:
+    def theta(self: Listed) -> Array:
         """Return the values of the parameters (k,)."""
         return np.array([parameter.value for parameter in self.parameters])
 
-    @property
-    def integrates(self) -> bool:
-        """See `SampledPlant`."""
-        return False
-
-    @property
-    def repeated_integrators(self) -> int:
-        """See `SampledPlant`."""
-        return 0
-
     @cached_property
-    def dead_times(self) -> NDArray[np.bool_]:
+    def dead_times(self: Listed) -> NDArray[np.bool_]:
         """Return whether each parameter is a dead time, (k,)."""
         return np.array([parameter.letter == DELAY for parameter in self.parameters], dtype=bool)
 
     @property
-    def flaw(self) -> str | None:
+    def flaw(self: Listed) -> str | None:
         """See `Model`."""
         for parameter in self.parameters:
             if not np.isfinite(parameter.value):
@@ -314,134 +332,33 @@ class Parametrised:
                 return f"the dead time {parameter.name} is negative"
         return None
 
+    def bends(self: Listed, output: int, input: int) -> NDArray[np.bool_]:
+        """Return a mask (k,) of all parameters: none is taken to enter an entry of G as in a `Fraction`."""
+        return np.ones(len(self.parameters), dtype=bool)
 
-class WhiteNoise:
-    """Predicts G u, since H = I: e reaches the gradient of the prediction through u alone."""
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """Raise an error: no entry is a fraction that is affine in its parameters."""
+        raise ValueError("an entry of this model is no fraction that is affine in its parameters")
 
-    if TYPE_CHECKING:
-
-        @property
-        def outputs(self) -> int:
-            """Return the number of outputs p."""
-
-        @property
-        def theta(self) -> Array:
-            """Return the values of the parameters (k,)."""
-
-        def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-            """Return the gradient dG/dtheta as (n, k, p, r)."""
-
-    @property
-    def in_plant(self) -> NDArray[np.bool_]:
-        """Return a mask (k,) in which all parameters act in the plant."""
-        return np.ones(self.theta.size, dtype=bool)
-
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return the gradient dG/dtheta as (n, k, p, r)."""
-        return self.plant_gradient(w)
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return zero (n, k, p, p)."""
-        return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """Return dG/dtheta u as (n, k, p, m), see `Model`."""
-        return np.asarray(self.plant_gradient(w) @ u[:, None])
-
-
-class Around(ABC):
-    """A model that is made of another one, `inner`, and answers like that one unless it says otherwise."""
-
-    @property
-    @abstractmethod
-    def inner(self) -> SampledPlant:
-        """Return the other model."""
-
-    @property
-    def continuous(self) -> bool:
-        """See `SampledPlant`."""
-        return self.inner.continuous
-
-    @property
-    def inputs(self) -> int:
-        """See `SampledPlant`."""
-        return self.inner.inputs
-
-    @property
-    def outputs(self) -> int:
-        """See `SampledPlant`."""
-        return self.inner.outputs
-
-    @property
-    def covariance(self) -> Array:
-        """See `SampledPlant`."""
-        return self.inner.covariance
-
-    @property
-    def at_once(self) -> NDArray[np.bool_]:
-        """See `SampledPlant`."""
-        return self.inner.at_once
-
-    @property
-    def singularities(self) -> ComplexArray:
-        """See `SampledPlant`."""
-        return self.inner.singularities
-
-    @property
-    def radius(self) -> float:
-        """See `SampledPlant`."""
-        return self.inner.radius
-
-    @property
-    def memory(self) -> float:
-        """See `SampledPlant`."""
-        return self.inner.memory
-
-    @property
-    def realisation(self) -> StateSpace:
-        """See `SampledPlant`."""
-        return self.inner.realisation
-
-    @property
-    def noise_gain(self) -> Array:
-        """See `SampledPlant`."""
-        return self.inner.noise_gain
-
-    @property
-    def predictor_poles(self) -> ComplexArray:
-        """See `SampledPlant`."""
-        return self.inner.predictor_poles
-
-    @property
-    def repeated_integrators(self) -> int:
-        """See `SampledPlant`."""
-        return self.inner.repeated_integrators
-
-    @property
-    def integrates(self) -> bool:
-        """See `SampledPlant`."""
-        return self.inner.integrates
-
-    def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """See `SampledPlant`."""
-        return self.inner.entry_singularities(output, input)
-
-    def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """See `SampledPlant`."""
-        return self.inner.plant_at(w)
-
-    def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """See `SampledPlant`."""
-        return self.inner.left_at(w)
-
-    def forcing_at(self, w: ArrayLike) -> ComplexArray:
-        """See `SampledPlant`."""
-        return self.inner.forcing_at(w)
+    def forcing_at(self: Listed, w: ArrayLike) -> ComplexArray:
+        """Return I: R is the inverse of H unless a model says otherwise; see `SampledPlant`."""
+        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
 
     def forcing(self, e: Array) -> Array:
         """See `SampledPlant`."""
-        return self.inner.forcing(e)
+        return e
 
-    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """See `SampledPlant`."""
-        return self.inner.simulate(u, e, step)
+
+class WhiteNoise(Parametrised):
+    """Predicts G u, since H = I: e reaches the gradient of the prediction through u alone."""
+
+    @property
+    def in_plant(self: Model) -> NDArray[np.bool_]:
+        """Return a mask (k,) in which all parameters act in the plant."""
+        return np.ones(self.theta.size, dtype=bool)
+
+    def prediction_gradient(self: Model, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
+        """Return dG/dtheta u as (n, k, p, m), see `Model`; zero without u."""
+        if u is not None:
+            return np.asarray(self.plant_gradient(w) @ u[:, None])
+        return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)

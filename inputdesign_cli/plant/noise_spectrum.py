@@ -20,7 +20,7 @@ _FORGOTTEN = 1e-24
 class NoiseSpectrum:
     """Holds the responses (p, n, p) of outputs to impulses of independent unit sources, to their end."""
 
-    impulses: NDArray[np.float64]
+    impulses: Array
 
     @classmethod
     def of(cls, model: Model) -> NoiseSpectrum:
@@ -63,7 +63,7 @@ class NoiseSpectrum:
         return np.asarray(2.0 * found.real - r[0])
 
     @staticmethod
-    def _folded(sequence: NDArray[np.float64], period: int) -> NDArray[np.complex128]:
+    def _folded(sequence: Array, period: int) -> NDArray[np.complex128]:
         """Return transforms of sequences (.., n, p) at harmonics of a period, (.., period // 2 + 1, p)."""
         *several, n, p = sequence.shape
         padded = np.zeros((*several, -(-n // period) * period, p))

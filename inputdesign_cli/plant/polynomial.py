@@ -41,13 +41,7 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     """
     stated = np.asarray(coefficients, dtype=float)
     if stated.ndim == 2 and len(stated) > 1:
-        columns = stated.T.reshape(stated.shape[1], len(stated), *(1 for _ in np.shape(q)))
-        several = np.zeros((len(stated), *np.shape(q)), dtype=complex)
-        several += columns[-1]
-        for column in columns[-2::-1]:
-            several *= q
-            several.real += column
-        return several
+        return _horner(stated.reshape(len(stated), *(1 for _ in np.shape(q)), -1), q)
     if stated.ndim == 2:
         return evaluate(stated[0], q)[None]
     c = stated.tolist()
@@ -58,6 +52,16 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     for coefficient in c[-3::-1]:  # Horner
         value *= q
         value += coefficient
+    return value
+
+
+def _horner(coefficients: Array, q: ComplexArray) -> ComplexArray:
+    """Return sum_i coefficients[.., i] q^i for coefficients (.., l), broadcast against q."""
+    value = np.zeros(np.broadcast_shapes(coefficients.shape[:-1], np.shape(q)), dtype=complex)
+    value += coefficients[..., -1]
+    for lag in range(coefficients.shape[-1] - 2, -1, -1):
+        value *= q
+        value.real += coefficients[..., lag]
     return value
 
 
@@ -121,11 +125,7 @@ def at(matrix: Array, q: ComplexArray) -> ComplexArray:
 
     The values of an entry are contiguous in memory.
     """
-    value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
-    value[:] = matrix[..., -1:]
-    for lag in range(matrix.shape[-1] - 2, -1, -1):
-        value *= q
-        value.real += matrix[..., lag, None]
+    value = _horner(matrix[..., None, :], q)
     *leading, rows, columns, last = range(value.ndim)
     return value.transpose(*leading, last, rows, columns)
 

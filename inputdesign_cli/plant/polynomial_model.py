@@ -20,11 +20,8 @@ from inputdesign_cli.plant.model import (
     Fraction,
     Parameter,
     Parametrised,
+    Signals,
     entry_label,
-    forcings_at,
-    input_gradients,
-    lefts_at,
-    noise_gradients,
     prediction_gradients,
     row_parameters,
     tables_at,
@@ -51,11 +48,8 @@ class PolynomialModel(Parametrised):
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
     are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
-    common coefficients go without: `a1`. An entry B_ij that is absent has no parameters.
-
-    Attributes:
-        delays: (p, r), the power of the first coefficient of each B that is free, its length where the entry
-            is absent; if None, zeros of B say so.
+    common coefficients go without: `a1`. An absent entry B_ij has no parameters. `delays` (p, r) are the
+    powers of the first free coefficients of B, or its lengths if absent; if None, zeros of B say so.
     """
 
     B: Rows
@@ -67,6 +61,8 @@ class PolynomialModel(Parametrised):
     delays: tuple[tuple[int, ...], ...] | None = None
 
     continuous = False
+    integrates = False
+    repeated_integrators = 0
 
     @classmethod
     def single(
@@ -79,7 +75,7 @@ class PolynomialModel(Parametrised):
         F: ArrayLike = (1.0,),
         variance: float = 1.0,
     ) -> Self:
-        """Return whether there is one input and one output."""
+        """Build a model of one input and one output."""
         a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
         return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
 
@@ -144,11 +140,6 @@ class PolynomialModel(Parametrised):
     def letters(self) -> frozenset[str]:
         """Return the polynomials that have free coefficients."""
         return frozenset(parameter.letter for parameter in self.parameters)
-
-    @property
-    def outputs_count(self) -> bool:
-        """Return whether the prediction gradient depends on past outputs: through coefficients of A alone."""
-        return "a" in self.letters
 
     def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
         """Return A, C or D as one polynomial an output, a common one repeated."""
@@ -262,14 +253,10 @@ class PolynomialModel(Parametrised):
         rows = zip(self.per_output(self.A), self.B, self.F, strict=True)
         return [[stack([[a, b, f]])[0] for b, f in zip(bs, fs, strict=True)] for a, bs, fs in rows]
 
-    @cached_property
-    def _highest(self) -> int:
-        """Return the highest power of q^-1 that a parameter stands before."""
-        return max((parameter.power for parameter in self.parameters), default=0)
-
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
-        highest, (q, known) = self._highest, self._at_last(w)
+        highest = max((parameter.power for parameter in self.parameters), default=0)
+        q, known = self._at_last(w)
         # Frequencies lie side by side in memory.
         shape = (len(self.parameters), self.outputs, self.inputs, q.size)
         gradient = np.zeros(shape, dtype=complex).transpose(3, 0, 1, 2)
@@ -292,17 +279,9 @@ class PolynomialModel(Parametrised):
                         gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
         return gradient
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
-        return _input_gradients(self, [self], w)[0]
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
-        return _noise_gradients(self, [self], w)[0]
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return psi (n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
-        return _gradients([self], w, y.shape[2], y[None], u[None], e[None])[0]
+        return _gradients(self, [self], w, *(x if x is None else x[None] for x in (y, u, e)))[0]
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""
@@ -336,12 +315,17 @@ class PolynomialModel(Parametrised):
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """See `SampledPlant`."""
-        R, N = _lefts_at(self, [self], w)
-        return R[0], N[0]
+        values = at(self._fractions, unit_circle(w))
+        return values[..., 0, None] * np.eye(self.outputs), values[..., 1:]
 
     def forcing_at(self, w: ArrayLike) -> ComplexArray:
         """See `SampledPlant`: prod_j F_ij C_i / D_i."""
-        return _forcings_at(self, [self], w)[0]
+        q = unit_circle(w)
+        found = np.zeros((q.size, self.outputs, self.outputs), dtype=complex)
+        rows = zip(self.F, self.per_output(self.C), self.per_output(self.D), strict=True)
+        for i, (f, c, d) in enumerate(rows):
+            found[:, i, i] = evaluate(product_of([*f, c]), q) / evaluate(d, q)
+        return found
 
     def forcing(self, e: Array) -> Array:
         """See `SampledPlant`."""
@@ -351,68 +335,21 @@ class PolynomialModel(Parametrised):
         )
 
 
-@lefts_at.register
-def _lefts_at(
-    first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike
-) -> tuple[ComplexArray, ComplexArray]:
-    values = at(np.stack([model._fractions for model in models]), unit_circle(w))
-    return values[..., 0, None] * np.eye(first.outputs), values[..., 1:]
-
-
-@forcings_at.register
-def _forcings_at(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    q, p = unit_circle(w), first.outputs
-    found = np.zeros((len(models), q.size, p, p), dtype=complex)
-    for i in range(p):
-        above = evaluate(np.array([product_of([*m.F[i], m.row(m.C, i)]) for m in models]), q)
-        found[:, :, i, i] = above / evaluate(np.array([m.row(m.D, i) for m in models]), q)
-    return found
-
-
-@input_gradients.register
-def _input_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    """Return the input gradients (S, n, k, p, r) of models of one structure."""
-    G = np.stack([model.plant_at(w) for model in models]) if first.outputs_count else None
-    u = np.eye(first.inputs, dtype=complex)[None, None]
-    return _gradients(models, w, first.inputs, G, u, None)
-
-
-@noise_gradients.register
-def _noise_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    """Return the noise gradients (S, n, k, p, p) of models of one structure."""
-    H = np.stack([model.noise_at(w) for model in models]) if first.outputs_count else None
-    e = np.eye(first.outputs, dtype=complex)[None, None]
-    return _gradients(models, w, first.outputs, H, None, e)
-
-
 @prediction_gradients.register
-def _prediction_gradients(
+def _gradients(
     first: PolynomialModel,
     models: Sequence[PolynomialModel],
     w: ArrayLike,
-    y: NDArray,
-    u: NDArray,
-    e: NDArray,
+    y: Signals,
+    u: Signals,
+    e: Signals,
 ) -> ComplexArray:
-    """Return the prediction gradients (S, n, k, p, m) of models of one structure."""
-    return _gradients(models, w, y.shape[-1], y, u, e)
-
-
-def _gradients(
-    models: Sequence[PolynomialModel],
-    w: ArrayLike,
-    sources: int,
-    y: NDArray | None,
-    u: NDArray | None,
-    e: NDArray | None,
-) -> ComplexArray:
-    """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, by polynomials.
-
-    Args:
-        y, u, e: (S, n, p or r, m); None is a zero signal; axes of length one are broadcast.
-    """
-    first = models[0]
-    highest, letters = first._highest, first.letters
+    """Return the prediction gradients (S, n, k, p, m) of models of one structure, by polynomials."""
+    (sources,) = {x.shape[-1] for x in (u, e) if x is not None}
+    if y is None and "a" in first.letters:
+        cause = np.asarray(e if u is None else u)[0]
+        y = np.stack([(m.noise_at(w) if u is None else m.plant_at(w)) @ cause for m in models])
+    highest, letters = max((p.power for p in first.parameters), default=0), first.letters
     active = first.active if u is not None else ()
     wanted = {("c", i, 0): [m.row(m.C, i) for m in models] for i in range(first.outputs)}
     wanted |= {("d", i, 0): [m.row(m.D, i) for m in models] for i in range(first.outputs)}

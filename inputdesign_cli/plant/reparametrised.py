@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
-from inputdesign_cli.plant.model import Around, Fraction, Model, SampledPlant
+from inputdesign_cli.plant.model import Derived, Fraction, Model, Predicting, SampledPlant, Signals
 
 # Number of recent parameter values that are kept with their coefficients.
 _RECENT = 4
@@ -26,9 +26,8 @@ _RECENT = 4
 class Parametrisation:
     """Holds m parameters, k of them `free`, and the K coefficients of a model that follow from them.
 
-    Attributes:
-        labels: (m,) their names for the user; `symbols` (m,) their names in `terms` (K,).
-        values: (m,); parameters that are not free are known.
+    The `labels` (m,) are their names for the user, the `symbols` (m,) their names in the `terms` (K,). The
+    other `values` (m,) are known.
     """
 
     labels: tuple[str, ...]
@@ -112,10 +111,7 @@ Place = Sequence[str | int]
 class Words:
     """Holds a plant section with named parameters as written, so that it can be repeated with other values.
 
-    Attributes:
-        plant: the section as it was written; None if it lists the coefficients of the model.
-        places: label -> where its value stands in the section.
-        known: the parameters of plant and of noise that are listed as known.
+    The `plant` is None if it lists the coefficients; `places` is by label, and `known` by section.
     """
 
     plant: Mapping[str, object] | None = None
@@ -124,7 +120,7 @@ class Words:
 
 
 @dataclass(frozen=True)
-class Reparametrised(Around):
+class Reparametrised(Predicting, Derived):
     """A model whose `coefficients` follow from `parametrisation`, with k free parameters."""
 
     coefficients: Model
@@ -181,15 +177,7 @@ class Reparametrised(Around):
         """Return the gradient dG/dphi as (n, k, p, r)."""
         return self._chained(self.coefficients.plant_gradient(w))
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dphi as (n, k, p, r), the prediction gradient due to u."""
-        return self._chained(self.coefficients.input_gradient(w))
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dphi as (n, k, p, p), the prediction gradient due to e."""
-        return self._chained(self.coefficients.noise_gradient(w))
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         return self._chained(self.coefficients.prediction_gradient(w, y, u, e))
 

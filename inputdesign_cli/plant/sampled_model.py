@@ -6,18 +6,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry, Intersample, integrators
-from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, WhiteNoise
-from inputdesign_cli.plant.transfer import StateSpace
+from inputdesign_cli.plant.model import Parameter, WhiteNoise
+from inputdesign_cli.plant.transfer import Drive, StateSpace
 
 
 @dataclass(frozen=True)
-class SampledModel(Parametrised, WhiteNoise):
+class SampledModel(WhiteNoise):
     """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay in s.
 
     Sampling is linear in G: the gradient of the sampled plant is the sampled dG/da_k = -s^k b / a^2. Each
@@ -28,6 +29,7 @@ class SampledModel(Parametrised, WhiteNoise):
     sample_time: float
 
     continuous = False
+    integrates = False
 
     @property
     def outputs(self) -> int:
@@ -100,36 +102,19 @@ class SampledModel(Parametrised, WhiteNoise):
     @cached_property
     def realisation(self) -> StateSpace:
         """Return a realisation whose states are the past of each input, then the states of each entry."""
-        lags = [(j, entry.direct_lag) for (_, j), entry in self._entries.items()]
-        past = [max((lag for other, lag in lags if other == j), default=0) for j in range(self.inputs)]
-        first = np.concatenate([[0], np.cumsum(past)]).astype(int)
-        orders = [entry.order for entry in self._entries.values()]
-        size = int(first[-1]) + sum(orders)
-        A, B = np.zeros((size, size)), np.zeros((size, self.inputs))
-        C, D = np.zeros((self.outputs, size)), np.zeros((self.outputs, self.inputs))
-        for j, length in enumerate(past):
-            A[first[j] : first[j + 1], first[j] : first[j + 1]] = np.eye(length, k=-1)
-            if length:
-                B[first[j], j] = 1.0
-
-        def read(into: Array, at_once: Array, j: int, lag: int, column: Array) -> None:
-            """Let a column read u_j(k - lag), off the past or off the input itself."""
-            if lag:
-                into[:, first[j] + lag - 1] += column
-            else:
-                at_once[:, j] += column
-
-        start = int(first[-1])
+        entries = self._entries.values()
+        blocks = [entry.transition[: entry.order, : entry.order] for entry in entries]
+        states, drives, start = np.eye(sum(map(len, blocks))), list[Drive](), 0
+        C = np.zeros((self.outputs, len(states)))
         for (i, j), entry in self._entries.items():
-            own = slice(start, start + entry.order)
-            start += entry.order
-            A[own, own], C[i, own] = entry.transition[: entry.order, : entry.order], entry.gain[: entry.order]
-            early, late = entry.entries[: entry.order].T
-            read(A[own], B[own], j, entry.lag, early)
-            if np.any(late):
-                read(A[own], B[own], j, entry.lag + 1, late)
-            read(C[i : i + 1], D[i : i + 1], j, entry.direct_lag, np.array([entry.direct]))
-        return StateSpace(A, B, C, D)
+            own, direct = slice(start, start + entry.order), np.eye(self.outputs)[i] * entry.direct
+            start, C[i, own] = own.stop, entry.gain[: entry.order]
+            early, late = (states[:, own] @ entry.entries[: entry.order]).T
+            drives.append(Drive(j, entry.lag, early, 0.0 * direct))
+            drives.append(Drive(j, entry.direct_lag, late, direct))
+        return StateSpace.behind_past(
+            scipy.linalg.block_diag(np.zeros((0, 0)), *blocks), C, drives, self.inputs
+        )
 
     @property
     def noise_gain(self) -> Array:
@@ -145,14 +130,6 @@ class SampledModel(Parametrised, WhiteNoise):
         """Return I and G, which has no poles outside the unit circle."""
         return self.forcing_at(w), self.plant_at(w)
 
-    def forcing_at(self, w: ArrayLike) -> ComplexArray:
-        """See `SampledPlant`: I."""
-        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
-
-    def forcing(self, e: Array) -> Array:
-        """See `SampledPlant`."""
-        return e
-
     @cached_property
     def singularities(self) -> ComplexArray:
         """Return the poles of G and of all gradients, as points of the frequency plane."""
@@ -167,14 +144,6 @@ class SampledModel(Parametrised, WhiteNoise):
     def memory(self) -> float:
         """Return the longest dead time in samples, its fraction of a sample counted as a whole one."""
         return max((entry.lag + 1.0 for entry in self._entries.values() if entry.delay), default=0.0)
-
-    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return (k,), all True: sampled coefficients depend on parameters in s through an exponential."""
-        return np.ones(self.theta.size, dtype=bool)
-
-    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """Raise an error: no entry is a fraction that is affine in its parameters."""
-        raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """Return the frequency response G as (n, p, r)."""

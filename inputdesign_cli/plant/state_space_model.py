@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import whole_samples
-from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised
-from inputdesign_cli.plant.transfer import StateSpace
+from inputdesign_cli.plant.model import DELAY, Parameter, Parametrised, Signals
+from inputdesign_cli.plant.transfer import Drive, StateSpace
 
 # This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.
 _BESIDE = 1e-8
@@ -56,9 +56,8 @@ class Slope(NamedTuple):
 class StateSpaceModel(Parametrised):
     """A state-space model as above; e is white with a full covariance (p, p).
 
-    Attributes:
-        matrices: in continuous time, and behind a hold, where there is a `sample_time`; otherwise of samples.
-        entries: the free entries: letter, row and column; ("delay", 0, 0) for the dead time.
+    With a `sample_time` the matrices are in continuous time, behind a hold, otherwise of samples. The free
+    `entries` are letter, row and column, and ("delay", 0, 0) for the dead time.
     """
 
     matrices: Matrices
@@ -67,6 +66,8 @@ class StateSpaceModel(Parametrised):
     sample_time: float | None = None
 
     continuous = False
+    integrates = False
+    repeated_integrators = 0
 
     @property
     def outputs(self) -> int:
@@ -150,8 +151,7 @@ class StateSpaceModel(Parametrised):
     def _exponentials(self, moved: Array | None) -> tuple[tuple[Array, Array], Array, Array]:
         """Return A and B over a sample, B over its rest after the fraction, and A over that rest.
 
-        Args:
-            moved: (n, n + r), a direction of [A B]: the derivatives in that direction instead.
+        If [A B] is `moved` in a direction (n, n + r), the derivatives in that direction instead.
         """
         n, m = self.order, self.matrices
         if self.sample_time is None:
@@ -232,22 +232,6 @@ class StateSpaceModel(Parametrised):
         K = self.matrices.K
         return np.pad(K, ((len(self.realisation.A) - len(K), 0), (0, 0)))
 
-    def forcing_at(self, w: ArrayLike) -> ComplexArray:
-        """See `SampledPlant`: I, since R = H^-1."""
-        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
-
-    def forcing(self, e: Array) -> Array:
-        """See `SampledPlant`."""
-        return e
-
-    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """Return a mask (k,) of all parameters."""
-        return np.ones(len(self.entries), dtype=bool)
-
-    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """Raise an error: no entry is a fraction that is affine in its parameters."""
-        raise ValueError("an entry of a state-space model is no fraction that is affine in its parameters")
-
     def _points(self, w: ArrayLike) -> ComplexArray:
         """Return z (m,), beside one where the model integrates."""
         given = np.atleast_1d(np.asarray(w))
@@ -280,34 +264,21 @@ class StateSpaceModel(Parametrised):
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
-        return self._of_inputs(w, np.zeros_like(self.matrices.K))
-
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the prediction gradient due to u."""
-        return self._of_inputs(w, self.matrices.K)
-
-    def _of_inputs(self, w: ArrayLike, K: Array) -> ComplexArray:
-        z = self._points(w)
-        x = self._resolvent(z, self.held[0]) @ self._entering(z, *self.held[1:])
+        z, (A, early, late) = self._points(w), self.held
         u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (z.size, self.inputs, self.inputs))
-        return self._gradient(z, x, u, None, K)
+        x = self._resolvent(z, A) @ self._entering(z, early, late)
+        return self._gradient(z, x, u, None, np.zeros_like(self.matrices.K))
 
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the prediction gradient due to e."""
-        z = self._points(w)
-        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (z.size, self.outputs, self.outputs))
-        x = self._resolvent(z, self.held[0]) @ self.matrices.K.astype(complex)
-        return self._gradient(z, x, None, e, self.matrices.K)
-
-    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+    def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
-        driven = (self._entering(z, early, late) - m.K @ self._direct(z, m.D)) @ u + m.K @ y
-        return self._gradient(z, self._resolvent(z, A - m.K @ m.C) @ driven, u, e, m.K)
+        driven = m.K @ np.asarray(e) if u is None else self._entering(z, early, late) @ u
+        if y is not None and u is not None:
+            driven = driven + m.K @ (y - self._direct(z, m.D) @ u)
+            A = A - m.K @ m.C
+        return self._gradient(z, self._resolvent(z, A) @ driven, u, e, m.K)
 
-    def _gradient(
-        self, z: ComplexArray, x: ComplexArray, u: NDArray | None, e: NDArray | None, K: Array
-    ) -> ComplexArray:
+    def _gradient(self, z: ComplexArray, x: ComplexArray, u: Signals, e: Signals, K: Array) -> ComplexArray:
         """Return dy^ (n, k, p, m) from states x (n, order, m), inputs and errors of the predictor."""
         read = self.matrices.C @ self._resolvent(z, self.held[0] - K @ self.matrices.C)
         gradient = np.zeros((z.size, len(self.entries), self.outputs, x.shape[2]), dtype=complex)
@@ -326,31 +297,11 @@ class StateSpaceModel(Parametrised):
     @cached_property
     def realisation(self) -> StateSpace:
         """Return a realisation whose states are the past of the inputs, then the states of the model."""
-        (A, early, late), m, r = self.held, self.matrices, self.inputs
-        past = max(self.direct_lag, self.lag)
-        first = past * r
-        size = first + self.order
-        full = StateSpace(
-            np.zeros((size, size)),
-            np.zeros((size, r)),
-            np.concatenate([np.zeros((self.outputs, first)), m.C], axis=1),
-            np.zeros((self.outputs, r)),
-        )
-        full.A[first:, first:] = A
-        if past:
-            full.A[r:first, : first - r] = np.eye(first - r)
-            full.B[:r] = np.eye(r)
-        for lag, states, outputs in (
-            (self.lag, early, np.zeros_like(m.D)),
-            (self.lag + 1, late, np.zeros_like(m.D)),
-            (self.direct_lag, np.zeros_like(early), m.D),
-        ):
-            if not (np.any(states) or np.any(outputs)):
-                continue
-            column = slice((lag - 1) * r, lag * r)
-            (full.A if lag else full.B)[first:, column if lag else slice(None)] += states
-            (full.C if lag else full.D)[:, column if lag else slice(None)] += outputs
-        return full
+        (A, early, late), m, drives = self.held, self.matrices, list[Drive]()
+        for j in range(self.inputs):
+            drives.append(Drive(j, self.lag, early[:, j], np.zeros(self.outputs)))
+            drives.append(Drive(j, self.direct_lag, late[:, j], m.D[:, j]))
+        return StateSpace.behind_past(A, m.C, drives, self.inputs)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""

@@ -18,7 +18,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.frequencies import frequency_plane, logarithmic_distance
 from inputdesign_cli.plant.polynomial import all_roots, at, delay_of, evaluate, roots_in_z, stack, unit_circle
 
 Coefficients = Sequence[float] | Array
@@ -105,17 +105,21 @@ class ContinuousRational(ScalarTransfer):
     @property
     def pole_points(self) -> ComplexArray:
         """Return the poles as points of the frequency plane."""
-        return _in_the_plane(self.denominator)
+        return frequency_plane(np.roots(self.denominator))
 
     @property
     def zero_points(self) -> ComplexArray:
         """Return the zeros as points of the frequency plane."""
-        return _in_the_plane(self.numerator)
+        return frequency_plane(np.roots(self.numerator))
 
 
-def _in_the_plane(polynomial: Array) -> ComplexArray:
-    roots = np.asarray(np.roots(polynomial), dtype=complex)
-    return np.abs(roots.imag) + 1j * np.abs(roots.real)
+class Drive(NamedTuple):
+    """The columns by which an input, `lag` samples earlier, enters states (n,) and outputs (q,)."""
+
+    input: int
+    lag: int
+    states: Array
+    outputs: Array
 
 
 class StateSpace(NamedTuple):
@@ -135,6 +139,26 @@ class StateSpace(NamedTuple):
             found[..., t, :] += x @ C
             x = x @ A + driven[..., t, :]
         return np.asarray(found)
+
+    @classmethod
+    def behind_past(cls, A: Array, C: Array, drives: Sequence[Drive], inputs: int) -> StateSpace:
+        """Return a system whose states are the past of each input, then the states of A (n, n), C (q, n)."""
+        past = [max((one.lag for one in drives if one.input == j), default=0) for j in range(inputs)]
+        first = np.concatenate([[0], np.cumsum(past)]).astype(int)
+        own, size = slice(first[-1], None), first[-1] + len(A)
+        full = cls(
+            *(np.zeros(shape) for shape in ((size,) * 2, (size, inputs), (len(C), size), (len(C), inputs)))
+        )
+        full.A[own, own], full.C[:, own] = A, C
+        for j, length in enumerate(past):
+            full.A[first[j] : first[j + 1], first[j] : first[j + 1]] = np.eye(length, k=-1)
+            full.B[first[j] : first[j] + min(length, 1), j] = 1.0
+        for one in drives:
+            column = first[one.input] + one.lag - 1 if one.lag else one.input
+            into, at_once = (full.A, full.C) if one.lag else (full.B, full.D)
+            into[own, column] += one.states
+            at_once[:, column] += one.outputs
+        return full
 
     @classmethod
     def of(cls, blocks: Iterable[tuple[Array, Array, Array]], direct: Array) -> StateSpace:
@@ -161,14 +185,8 @@ class TransferMatrix:
         cls, numerator: Sequence[Sequence[Coefficients]], denominator: Sequence[Sequence[Coefficients]]
     ) -> TransferMatrix:
         """Build from entries with a denominator each; zero entries have no poles."""
-        rows, below = [], []
-        for tops, bottoms in zip(numerator, denominator, strict=True):
-            own = [tuple(bottom) if np.any(top) else () for top, bottom in zip(tops, bottoms, strict=True)]
-            distinct = [factor for factor in dict.fromkeys(own) if factor]
-            missing = [[f for f in distinct if f != factor] if factor else [] for factor in own]
-            rows.append([product_of([top, *rest]).tolist() for top, rest in zip(tops, missing, strict=True)])
-            below.append(tuple(np.array(factor, dtype=float) for factor in distinct))
-        return cls(stack(rows), tuple(below))
+        rows = zip(numerator, denominator, strict=True)
+        return cls.of([[Rational.build(*entry) for entry in zip(*row, strict=True)] for row in rows])
 
     @classmethod
     def of(cls, rows: Sequence[Sequence[Rational]]) -> TransferMatrix:
@@ -177,10 +195,8 @@ class TransferMatrix:
         for row in rows:
             own = [Counter(map(tuple, entry.denominator if np.any(entry.numerator) else ())) for entry in row]
             shared = reduce(or_, own)
-            missing = [list((shared - factors).elements()) for factors in own]
-            tops.append(
-                [product_of([e.numerator, *rest]).tolist() for e, rest in zip(row, missing, strict=True)]
-            )
+            pairs = [(e.numerator, shared - factors) for e, factors in zip(row, own, strict=True)]
+            tops.append([product_of([p, *rest.elements()]) if np.any(p) else p for p, rest in pairs])
             below.append(tuple(np.array(factor, dtype=float) for factor in shared.elements()))
         return cls(stack(tops), tuple(below))
 

@@ -1,4 +1,4 @@
-"""Estimates of dead times: minima on kinks and beyond instants, their covariance and the Cramer-Rao bound."""
+"""Estimates of dead times: minima on kinks, beyond instants and far away, their covariance and its bound."""
 
 from functools import cache
 
@@ -7,23 +7,22 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
+from inputdesign_cli.compute.time_limit import watching
 from inputdesign_cli.explore.structures import Process, process_models
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant import ContinuousModel, SampledModel
+from inputdesign_cli.plant import SampledModel
+from tests.support.plants import lag_of
 
 SAMPLES, VARIANCE = 400, 0.05
 
 
 def heater(dead_time, gain=2.0, time_constant=12.0) -> SampledModel:
     """K e^(-Ls) / (T s + 1), a sample a time unit."""
-    entries = [((np.array(p),),) for p in ([gain], [1.0, time_constant])]
-    return SampledModel(
-        ContinuousModel.monic(*entries, np.array([[VARIANCE]]), delay=((np.array([dead_time]),),)), 1.0
-    )
+    return SampledModel(lag_of([gain], [time_constant, 1.0], dead_time, variance=VARIANCE), 1.0)
 
 
 def records(model, runs):
@@ -140,3 +139,61 @@ def test_the_covariance_of_dead_times_is_that_of_their_errors():
         away.append(((estimate.theta - truth) / np.sqrt(np.diag(estimate.covariance)))[:3])
     within = np.mean(np.abs(away) < 1.96, axis=0)
     assert np.all(within > 0.95 - 0.055), within
+
+
+LONG = 2000
+T = np.arange(LONG)
+# The fast sine is the same after 2 pi / 0.9 = 7 samples, and the slow one hardly tells a delay of 7.
+TWO_SINES = 0.1 * np.sin(0.01 * T) + np.sin(0.9 * T)
+BINARY = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], LONG // 5), 5)
+SIGNALS = {"sines": TWO_SINES, "binary": BINARY}
+SEEDS = pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
+
+
+@cache
+def sought(kind, seed):
+    u, model = SIGNALS[kind], heater(3.0, 1.0, 4.0)
+    y = answer(u, 4.0, 3.0) + np.sqrt(0.1) * np.random.default_rng(seed).normal(size=LONG)
+    return identify(model, u[:, None], y[:, None], 1.0, start=model.theta, rest=True), y
+
+
+def of_s(theta):
+    """(K, T, L) of K / T over s + 1 / T, late by L."""
+    b, a, dead_time = theta
+    return b / a, 1.0 / a, dead_time
+
+
+@SEEDS
+def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
+    found, y = sought("sines", seed)
+    assert found.search.rivals
+    left = [
+        scipy.optimize.least_squares(
+            lambda theta: y - theta[0] * answer(TWO_SINES, *theta[1:]), of_s(theta), x_scale=(0.1, 0.5, 0.1)
+        )
+        for theta in (found.theta, found.search.rivals[0].theta)
+    ]
+    periods = abs(left[1].x[2] - left[0].x[2]) / (2.0 * np.pi / 0.9)
+    assert round(periods) >= 1
+    assert periods == pytest.approx(round(periods), abs=0.1)
+    # Both are minima of the plain sum of squares, and so far apart in -2 log likelihood.
+    assert found.search.rivals[0].excess == pytest.approx(
+        LONG * np.log(left[1].cost / left[0].cost), abs=0.02
+    )
+
+
+@pytest.mark.slow
+@SEEDS
+def test_a_rich_record_leaves_no_rival(seed):
+    assert sought("binary", seed)[0].search.rivals == ()
+
+
+@pytest.mark.slow
+def test_the_search_tells_how_far_it_is():
+    told = []
+    with watching(told.append):
+        found, _ = sought.__wrapped__("binary", 0)
+    (tried,) = [one for one in told if one.what == "starting points tried"]
+    # All but the given one are made from the data, and tried together.
+    assert found.search.starts == tried.of + 1
+    assert told[-1].what == "starting points followed to a minimum"

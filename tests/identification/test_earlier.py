@@ -9,7 +9,7 @@ from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
 from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
-from tests.support.records import shifted, simulated
+from tests.support.records import arx_regressors, shifted, simulated
 
 ARX = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.2, 0.5], variance=0.3)
 JENKINS = PolynomialModel.single([0, 1.0], F=[1, -0.8], C=[1, 0.4], D=[1, -0.6], variance=0.2)
@@ -26,7 +26,7 @@ def test_arx_with_known_noise_is_ridge_regression():
     earlier = Earlier(ARX.theta + 0.1 * rng.standard_normal(4), 50.0 * root @ root.T)
     records = Records(estimator(ARX, 1.0), ((u, y),), weights=np.array([[1.0 / 0.3]]), earlier=earlier)
     point = evaluate(records, minimise(RecordProblem((records,)), ARX.theta[None]).theta[0])
-    phi = np.array([shifted(-y[:, 0], 1), shifted(-y[:, 0], 2), shifted(u[:, 0], 1), shifted(u[:, 0], 2)]).T
+    phi = arx_regressors(u[:, 0], y[:, 0])
     information = phi.T @ phi / 0.3 + earlier.information
     right = phi.T @ y[:, 0] / 0.3 + earlier.information @ earlier.theta
     np.testing.assert_allclose(point.theta, np.linalg.solve(information, right), rtol=1e-8)

@@ -1,13 +1,17 @@
 """Good data are never refused for rounding, poor ones always are, and units change no answer."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.signal
 from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.expressions import Expression
 from inputdesign_cli.identification import identify
-from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
+from inputdesign_cli.identification.derived import brought_back
+from inputdesign_cli.plant import ContinuousModel, Intersample, Parametrisation, PolynomialModel
 from tests.support.records import simulated
 
 # A slow pole and noise that nearly vanishes at low frequency: scaled, eigenvalues of M are 1e13 apart.
@@ -108,3 +112,22 @@ def test_data_that_cannot_tell_are_refused_in_any_unit(kind, of_u, of_y):
 def _two_inputs():
     one, entry, pole = np.ones(1), np.array([0.0, 1.0]), np.array([1.0, -0.7])
     return PolynomialModel(((entry, entry),), (pole,), ((one, one),), (one,), (one,), np.eye(1))
+
+
+# Numerator and denominator of parameters p, q: none has a negative one, whose infimum lies at infinity.
+OUT_OF_REACH = [("exp(p)", "exp(q)"), ("p*p", "1/(q*q)"), ("exp(p)/q", "1/q"), ("exp(p + q)", "exp(q)")]
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("terms", OUT_OF_REACH)
+def test_a_start_that_no_parameters_reach_is_brought_back_all_the_same(terms):
+    at = Parametrisation(
+        ("p", "q"), ("p", "q"), np.array([1.0, 1.0]), np.ones(2, dtype=bool), tuple(map(Expression.of, terms))
+    )
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        root = rng.standard_normal((2, 2)) * 10.0 ** rng.uniform(-3, 3, 2)
+        theta = -(10.0 ** rng.uniform(-6, 2, 2)) * rng.choice([-1, 1], 2)
+        point = SimpleNamespace(theta=theta, cost=1.0, hessian=root.T @ root)
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            assert np.all(np.isfinite(brought_back(at, point)))

@@ -13,14 +13,9 @@ from inputdesign_cli.identification.records import Records, evaluate
 from inputdesign_cli.plant import SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import box_jenkins, two_by_two
-from tests.support.records import shifted
+from tests.support.records import arx_regressors
 
 CUT = 60
-
-
-def regressors(u, y):
-    """The regressors (samples, 4) of an ARX model with two coefficients in A and in B."""
-    return np.stack([shifted(x, lag) for x in (-y, u) for lag in (1, 2)], axis=1)
 
 
 def model_and_data(name, samples, rng, noise):
@@ -112,7 +107,7 @@ def test_records_at_rest_are_taken_for_such():
 @pytest.mark.parametrize("runs", [1, 2])
 def test_arx_from_rest_is_stacked_least_squares(runs):
     u, y = (x[..., 0] for x in data("arx", 200, np.random.default_rng(8), runs=runs))
-    phi = np.concatenate([regressors(*record) for record in zip(u, y, strict=True)])
+    phi = np.concatenate([arx_regressors(*record) for record in zip(u, y, strict=True)])
     expected = np.linalg.lstsq(phi, y.ravel(), rcond=None)[0]
     left = y.ravel() - phi @ expected
     signals = (x.reshape(-1, 1) for x in (u, y))
@@ -164,7 +159,7 @@ def test_of_arx_it_is_the_test_of_wald():
     found = jointly(*records)
     estimates, variances = [], []
     for u, y in records:
-        matrix = regressors(u, y)
+        matrix = arx_regressors(u, y)
         left = y - matrix @ found.theta
         estimates.append(np.linalg.lstsq(matrix, y, rcond=None)[0])
         variances.append(np.mean(left**2) * np.linalg.inv(matrix.T @ matrix))
@@ -206,6 +201,6 @@ def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
         found = identify(
             SYSTEMS["arx"], u[:, None], y[:, None], experiments=[samples, 200 - samples], rest=True
         )
-    expected = np.linalg.lstsq(regressors(u, y), y, rcond=None)[0]
+    expected = np.linalg.lstsq(arx_regressors(u, y), y, rcond=None)[0]
     np.testing.assert_allclose(found.theta, expected, rtol=1e-6)
     assert np.all(np.array(found.tests.alike) > 0.01)

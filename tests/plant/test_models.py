@@ -5,7 +5,6 @@ from itertools import pairwise
 import control
 import numpy as np
 import pytest
-import scipy.signal
 
 from inputdesign_cli.plant import Coloured, ContinuousModel, PolynomialModel, SampledModel
 from tests.support.loop_error import column, full_plant
@@ -147,17 +146,6 @@ def test_names_carry_output_and_input():
     ):
         assert (model.names[: len(first)], model.names[len(model.names) - len(last) :]) == (first, last)
     assert list(delayed.in_plant) == [True, True, True, False]
-
-
-@pytest.mark.parametrize("model", [two_by_two(), COMMON], ids=["strictly proper", "biproper"])
-def test_zero_order_hold_is_that_of_the_matrix_exponential(model):
-    period = 0.4
-    sampled = SampledModel(model, period)
-    for i, j in model.active:
-        top, bottom = model.numerator[i][j][::-1], model.denominator[i][j][::-1]
-        num, den, _ = scipy.signal.cont2discrete((top, bottom), period, method="zoh")
-        _, expected = scipy.signal.freqz(num.ravel(), den, worN=W)
-        np.testing.assert_allclose(sampled.plant_at(W)[:, i, j], expected, rtol=1e-10)
 
 
 def test_sampled_zeros_and_poles_are_those_of_the_sampled_entry():

@@ -26,6 +26,11 @@ def shifted(x, lag):
     return np.concatenate([np.zeros(lag), x[: x.size - lag]])
 
 
+def arx_regressors(u, y):
+    """The regressors (samples, 4) of an ARX model with two coefficients in A and in B."""
+    return np.stack([shifted(x, lag) for x in (-y, u) for lag in (1, 2)], axis=1)
+
+
 def check_record(model, samples):
     """psi of a record with noise by differences of its errors, which at the truth are the noise itself."""
     rng = np.random.default_rng(3)
