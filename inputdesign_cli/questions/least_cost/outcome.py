@@ -271,6 +271,7 @@ def _findings(done: Designed) -> list[Finding]:
         return [designs.nothing_needed(done.experiment, at_every_plant=bool(done.kept))]
     excited = powers(problem, found.basis, found.x).excitation or ()
     findings = [*designs.inputs_without_power(excited), *designs.short_experiment(done.experiment)]
+    findings += designs.few_samples(done.experiment)
     findings += designs.sign_open(problem.requirements)
     if done.header.units.closed_loop and not found.basis.has_density:
         lines, powers_of_lines = found.basis.lines(found.x)
