@@ -32,17 +32,38 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
     """
     lines = [
         *_lines(facts(outcome, part="campaign_stands")),
+        *(_trouble(outcome) if _is_trouble(outcome) else _told(outcome, time_unit)),
+        *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
+        *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
+    ]
+    title = outcome.title
+    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])
+
+
+def _is_trouble(outcome: Outcome) -> bool:
+    """Return whether one finding leaves a verdict open and explains the others."""
+    assessment = outcome.assessment
+    return outcome.campaign is None and assessment is not None and assessment.next is not None
+
+
+def _trouble(outcome: Outcome) -> Iterator[Line]:
+    """Yield the finding that comes first and the next command: no number of a refuted model counts."""
+    yield from _named("verdict", said("verdict", outcome))
+    more = len(outcome.notes or ()) - 1
+    if more > 0:
+        yield "note", f"{more} more in report.html and result.json; most follow from this one"
+
+
+def _told(outcome: Outcome, time_unit: str) -> list[Line]:
+    """Return what was found and proved, with all notes."""
+    return [
         *_data(outcome, time_unit),
         *(("asked", text) for text in said("asked", outcome)),
         *_lines(facts(outcome, time_unit)),
         *_named("proved", said("proofs", outcome)),
         *_simulated(outcome),
         *(("note", text) for text in outcome.notes or ()),
-        *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
-        *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
     ]
-    title = outcome.title
-    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])
 
 
 def _lines(found: Iterable[Fact]) -> Iterator[Line]:

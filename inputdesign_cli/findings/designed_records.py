@@ -128,18 +128,20 @@ def requirement_missed(kind: FindingKind, names: Sequence[str], ratio: float) ->
 @finding(
     DOUBT,
     "start-from-rest",
-    "Keep the plant at rest before the record. Measure inputs and outputs from their levels there.",
+    "Let the plant come to rest before. Give its levels there to assess (`--operating-point`).",
 )
 def start_matters(kind: FindingKind, growth: float) -> Finding:
-    """The record relies on its start from rest. Spectra have no initial state.
+    """The promised accuracy needs a plant at rest before the record. Its levels there have to be known.
+
+    Otherwise the initial state and the levels are estimated too, which costs accuracy.
 
     Args:
         growth: the factor by which errors grow if the start is not known.
     """
-    start = "with an unknown initial state and unknown levels"
     if not np.isfinite(growth):
-        return kind.found(f"{start} it would not determine all parameters", where="signal", growth=None)
-    return kind.found(f"{start} errors would be {growth:.3g} times as large", where="signal", growth=growth)
+        fact = "otherwise the record does not determine all parameters"
+        return kind.found(fact, where="signal", growth=None)
+    return kind.found(f"otherwise errors are {growth:.3g} times as large", where="signal", growth=growth)
 
 
 def other_signal(kind: str) -> Finding:
@@ -195,12 +197,15 @@ def _about_levels(kind: FindingKind, point: Sequence[float]) -> list[Finding]:
 @finding(
     DOUBT,
     "record-about-zero",
-    "Write `signal.offset` with these levels and assess again, or add them to `signal.csv`.",
+    "Write these levels as `signal.offset` and assess again, or add them to `signal.csv`.",
 )
 def _about_zero(kind: FindingKind, unknown: Mapping[int, float], offsets: Sequence[float]) -> list[Finding]:
-    """The data vary about a level, the record about zero. The spec has no `signal.offset`."""
+    """The new record moves inputs about zero, but the data were recorded at other levels.
+
+    The spec has no `signal.offset`. Applied as it is, the record would move the plant far away.
+    """
     at = " and ".join(f"u{j + 1} = {level:g}" for j, level in unknown.items())
     offset = f"{offsets[0]:g}" if len(offsets) == 1 else f"[{', '.join(f'{x:g}' for x in offsets)}]"
     remedy = f"Write signal.offset: {offset} and assess again, or add that to signal.csv."
-    fact = f"the mean of the data is {at}"
+    fact = f"their mean is {at}"
     return kind.when(unknown, fact, where="signal.offset", remedy=remedy, offset=list(offsets))

@@ -22,6 +22,8 @@ _NOTHING = 1e-9
 _SETTLED = 2.0
 # Below this share of its largest price, power at a frequency is called free of charge.
 _FREE = 1e-3
+# Samples a parameter below which first-order theory understates errors by a tenth or more.
+_FEW = 20
 _SUPPORT = 1e-3
 
 
@@ -46,27 +48,57 @@ def inputs_without_power(kind: FindingKind, excited: Sequence[float]) -> list[Fi
     return [kind.found(f"{name}, whose effects stay unknown", where=name) for name in idle]
 
 
-@finding(DOUBT, "experiment-short", "Compare with the accuracy of the record, and run `idesign simulate`.")
+@finding(
+    DOUBT,
+    "experiment-short",
+    "Raise `experiment.samples` to twice this time constant, or check with `idesign simulate`.",
+)
 def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]:
-    """The experiment ends before the slowest mode settles. Spectra describe long records."""
+    """The experiment ends before the plant settles. It lasts less than two of its slowest time constants.
+
+    The accuracy of a spectrum holds for long records. A short one loses the response after its end.
+    """
     damping, samples = np.abs(experiment.singularities.imag), experiment.samples
     slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
     if experiment.model.continuous or samples == 1 or slowest * samples >= _SETTLED:
         return []
-    fact = f"its time constant is {1.0 / slowest:.2g} samples, of {samples}"
+    fact = f"the slowest time constant is {1.0 / slowest:.2g} samples, and the record has {samples}"
     return [kind.found(fact, time_constant=1.0 / slowest, samples=samples)]
 
 
-@finding(DOUBT, "error-as-large-as-plant", "Ask for a smaller error. A `relative` error of 0.1 means 10 %.")
+@finding(
+    DOUBT,
+    "few-samples",
+    "Take at least 20 samples a parameter, or leave a reserve: ask for half of the error.",
+)
+def few_samples(kind: FindingKind, experiment: Experiment) -> list[Finding]:
+    """The record has few samples for its parameters. Stated deviations hold for many samples.
+
+    Estimates from fewer than 20 samples a parameter may scatter twice as much. `assess` simulates them.
+    """
+    samples, parameters = experiment.samples, len(experiment.model.names)
+    few = samples > 1 and samples * experiment.model.outputs < _FEW * parameters
+    fact = f"{samples} samples for {parameters} parameter{'s' * (parameters > 1)}"
+    return kind.when(few, fact, samples=samples, parameters=parameters)
+
+
+@finding(
+    DOUBT,
+    "error-as-large-as-plant",
+    "Lower `accuracy.model_error`: `relative: 0.1` allows an error of 10 % of |G|.",
+)
 def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Finding]:
-    """The admissible error is as large as the plant, at every frequency of its band."""
+    """The accuracy asks for almost nothing. The error allowed is as large as |G| in the whole band.
+
+    A model without any input would meet it.
+    """
     found = {}
     for error in model_errors(requirements):
         size, admitted = error.nominal_size(error.grid), error.admissible.at(error.grid)
         acts = size > 0.0
         least = float(np.min(admitted[acts] / size[acts], initial=np.inf))
         if 1.0 - _ROUNDING <= least < np.inf:
-            fact = f"it is {least:.4g} times |G| or more, and G may have the wrong sign"
+            fact = f"an error of {least:.4g} times |G| is allowed, and G may have the wrong sign"
             found[fact] = kind.found(fact, ratio=least)
     return list(found.values())
 
@@ -89,10 +121,15 @@ def almost_free(
     return kind.when(np.any(cheap), fact, where="cost.excitation_power", frequency=at)
 
 
-@finding(NOTE, "met-within-table", "Give the table more rows.")
+@finding(NOTE, "met-within-table", "Give the table of `spectrum.given` more rows near its peaks.")
 def met_within_table(kind: FindingKind, error: float) -> Finding:
-    """Interpolation of the table decides whether the requirement is met. Straight lines join its rows."""
-    return kind.found(f"it is met to within {error:.1g}", where="spectrum.given", error=error)
+    """The given table is too coarse to say for sure that the accuracy is met.
+
+    Power between its rows is interpolated by straight lines. The accuracy is met, but by less than the error
+    of this interpolation.
+    """
+    fact = f"interpolation between its rows may be wrong by {error:.1g} of the power"
+    return kind.found(fact, where="spectrum.given", error=error)
 
 
 LIMIT_NOT_KEPT = doubt(

@@ -38,9 +38,17 @@ def _not_settled(kind: FindingKind, estimate: Estimate) -> list[Finding]:
     return kind.when(not search.converged, fact, steps=search.steps, starts=search.starts)
 
 
-@finding(UNDECIDED, "stopped-at-an-end", "Define it for every possible plant.", "unsettled")
+@finding(
+    UNDECIDED,
+    "stopped-at-an-end",
+    "Rewrite the expression in `plant` so that it has a value beyond this point.",
+    "unsettled",
+)
 def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
-    """The search stopped at the boundary of an expression. The likeliest parameters may lie beyond it."""
+    """A parameter stopped where its expression has no value any more, as the root of a negative number.
+
+    The data may ask for a value beyond it, so that the estimate is not the best one.
+    """
     found = []
     deviations = np.sqrt(np.diag(estimate.covariance))
     for k in np.flatnonzero(~model.dead_times).tolist():

@@ -159,22 +159,29 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
     return doubtful
 
 
-@finding(DOUBT, "inputs-unrelated", "Move the inputs by steps of your own, which nothing else follows.")
+@finding(DOUBT, "inputs-unrelated", "Record again with steps of the input that you choose yourself.")
 def _unrelated(kind: FindingKind, found: Found) -> list[Finding]:
-    """The inputs do not help to predict an output. Signals that wander or drift agree without any link."""
+    """An output does not respond to the inputs in this log. Its own past predicts it as well.
+
+    If both drift or wander, they may look alike by chance.
+    """
     idle = set(like_nothing(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
     worse = {i for i, fit in enumerate(found.estimate.simulation.fit) if fit is not None and fit <= 0.0}
     idle |= {i for i in worse if not found.wanders[i]}
     names = [signal_name("y", i, found.model.outputs) for i in sorted(idle)]
-    return [kind.found(f"{name} follows from its own past alone", where=name) for name in names]
+    return [kind.found(f"past inputs do not help to predict {name}", where=name) for name in names]
 
 
-@finding(DOUBT, "structure-unexplained", "Record about one operating point, or what else acts on the output.")
+@finding(
+    DOUBT,
+    "structure-unexplained",
+    "Record smaller moves about one operating point, and log other causes as further inputs.",
+)
 def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
-    """No tested structure explains an output. The simulation explains less than half of it, or than 90 %.
+    """No linear model that was tried explains an output. Tests of past inputs and of residuals fail.
 
-    Every kind of test refutes the model as well, beyond doubt where it explains more than half. The plant may
-    be nonlinear, time-varying, or have unrecorded inputs; its output may wander.
+    The simulation explains less than half of it, or than 90 % where the tests leave no doubt. The plant may
+    be nonlinear or change, or have unrecorded inputs.
     """
     # Enough samples refute every model of a real plant, and a poor fit alone may be strong noise.
     failed = {test.name: test for test in found.estimate.tests.failed}
@@ -183,7 +190,7 @@ def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
     least, doubtful = min(test.probability for test in failed.values()), []
     for i, fit in enumerate(found.validation.simulation):
         output = signal_name("y", i, found.model.outputs)
-        fact = f"the simulation explains {fit:.1f} % of {output}, and tests refute it ({chance(least)})"
+        fact = f"the best simulation explains {fit:.1f} % of {output} (tests: probability {chance(least)})"
         doubtful += kind.when(
             fit < (_MOSTLY if least < _SURELY else HALF),
             fact,

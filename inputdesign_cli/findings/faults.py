@@ -42,9 +42,14 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
             f"{len(one.samples)} of {len(estimate.errors)} samples of {name} hold {100.0 * one.share:.3g} % "
             f"of the squares (at {places(units, data, one.samples)})"
         )
-        remedy = f"Leave out rows that are faults of measurement: {without_option(rows)}."
+        option = without_option(rows)
+        remedy = f"Leave out rows that are faults of measurement: {option}."
         times, at = [float(data.time[at]) for at in one.samples], [row for _, row, _ in rows]
-        found.append(SPIKES.found(fact, where=name, remedy=remedy, share=one.share, times=times, rows=at))
+        found.append(
+            SPIKES.found(
+                fact, where=name, remedy=remedy, share=one.share, times=times, rows=at, option=option
+            )
+        )
     for output, stretches in _still(estimate, data).items():
         runs = [(one.first, one.first + one.length - 1) for one in stretches]
         rows, still, name = rows_of(data, runs), sum(one.length for one in stretches), _named(units, output)
@@ -54,9 +59,10 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
         )
         more = ", .." * (len(runs) > SHOWN)
         fact = f"{name} keeps its value for {still} of {len(data.y)} samples ({listed}{more})"
-        remedy = f"Leave these rows out, which cuts the record there: {without_option(rows)}."
+        option = without_option(rows)
+        remedy = f"Leave these rows out, which cuts the record there: {option}."
         span = [[first, last] for _, first, last in rows]
-        found.append(FROZEN.found(fact, where=name, remedy=remedy, samples=still, rows=span))
+        found.append(FROZEN.found(fact, where=name, remedy=remedy, samples=still, rows=span, option=option))
     return found
 
 
@@ -121,10 +127,11 @@ def shifted_levels(kind: FindingKind, estimate: Estimate, data: Record, time_uni
         return []
     every = np.arange(len(data.y))
     what, runs = _described(estimate.tests.shifted, data, data.recorded.rows, every, time_unit)
-    remedy = f"Leave the shift out: {without_option(runs)}; or record what changed as a further input."
+    option = without_option(runs)
+    remedy = f"Leave the shift out: {option}; or record what changed as a further input."
     rows = [[first, last] for _, first, last in runs]
     probability = chance_of_shifts(estimate.tests.shifted)[0]
-    return [kind.found(what, remedy=remedy, probability=probability, rows=rows)]
+    return [kind.found(what, remedy=remedy, probability=probability, rows=rows, option=option)]
 
 
 def left_out(

@@ -316,11 +316,13 @@ def drifting_periods(
     )
 
 
-@finding(UNDECIDED, "response-within-chance", "Record as many periods as the finding names.", "chance")
+@finding(UNDECIDED, "response-within-chance", "Record more periods; the message says how many.", "chance")
 def within_chance(
     kind: FindingKind, units: Units, ratio: float, limits: tuple[float, float], frequency: float, enough: str
 ) -> Finding:
-    """The scatter of the periods leaves the verdict open. The admissible error is within 95 % limits.
+    """There are too few periods to decide. The noise was estimated from their scatter.
+
+    The true deviation lies between two limits (95 %), and the admissible one is between them too.
 
     Args:
         ratio: the largest one of a deviation to the admissible one; `limits`: of the true one.
@@ -328,7 +330,7 @@ def within_chance(
         enough: how many periods are needed, in words.
     """
     fact = (
-        f"the largest deviation is {ratio:.4g} of the admissible one, at {frequency:.4g} {units.per_time}, "
-        f"and the true one between {limits[0]:.3g} and {limits[1]:.3g}"
+        f"at {frequency:.4g} {units.per_time} the deviation is {ratio:.4g} of the admissible one, and the "
+        f"true one is between {limits[0]:.3g} and {limits[1]:.3g} of it"
     )
     return kind.found(fact, remedy=f"{enough}.", ratio=ratio, limits=limits, frequency=frequency)

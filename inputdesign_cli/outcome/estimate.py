@@ -144,8 +144,9 @@ class Nominal:
 class Assessment:
     """Holds the verdict with its reasons, and the accuracy that a designed top-up would reach.
 
-    `undecided` are the reasons against a verdict, `causes` their kinds. `left` is the largest ratio after the
-    top-up, `experiments` how often it has to be applied (`periods`: how many periods have to count).
+    `undecided` are the reasons against a verdict that explain all others, `causes` their kinds, and `next` is
+    the command to run then. `left` is the largest ratio after the top-up, `experiments` how often it has to
+    be applied (`periods`: how many periods have to count).
     """
 
     verdict: Verdict
@@ -153,6 +154,7 @@ class Assessment:
     requirements: tuple[RequirementMet, ...] = ()
     undecided: tuple[str, ...] | None = None
     causes: tuple[str, ...] | None = None
+    next: str | None = None
     neglected: tuple[Neglected, ...] | None = None
     variations: tuple[Neglected, ...] | None = None
     nominal: Nominal | None = None

@@ -61,6 +61,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "sure": 100.0 * ((None if kept is None else kept.confidence) or DEFAULT_CONFIDENCE),
         "loop_kept": loop,
         "rivals": result.get("foreseen", {}).get("rivals"),
+        "few": [one["message"] for one in result.get("findings", ()) if one["code"] == "few-samples"],
     }
     return _said("verdict", facts)
 

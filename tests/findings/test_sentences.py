@@ -72,6 +72,7 @@ FOUND = {
     "no-excitation-needed": [designs.nothing_needed(Experiment(MODEL, 500), at_every_plant=True)],
     "input-without-power": designs.inputs_without_power([1.0, 0.0]),
     "experiment-short": designs.short_experiment(Experiment(MODEL, 100)),
+    "few-samples": designs.few_samples(Experiment(MODEL, 39)),
     "excitation-almost-free": designs.almost_free(
         UNITS, np.array([0.01, 1.0]), np.ones(2), np.array([1e-6, 1.0]), 1.0
     ),
@@ -122,6 +123,7 @@ def test_what_is_in_order_is_not_noted():
     assert campaigns.shorter("r.csv", "plan_01.csv", 60, 60) == []
     assert designs.inputs_without_power([1.0, 0.5]) == []
     assert designs.short_experiment(Experiment(MODEL, 1000)) == []
+    assert designs.few_samples(Experiment(MODEL, 40)) == []
     assert unfinished.fewer_plants(120, 120) == unfinished.unstable_draws(40, 100) == []
     assert unfinished.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good, held=True) == []

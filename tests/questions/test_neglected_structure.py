@@ -45,7 +45,7 @@ def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow
     outcome = found.results.outcome
     against = [one for one in outcome.findings if one.severity == "refuted"]
     assert {one.code for one in against} <= {"neglected-parameter", "parameter-missing", "plant-structure"}
-    assert outcome.assessment.undecided == tuple(one.message for one in against)
+    assert {*outcome.assessment.undecided} <= {one.message for one in against}
     assert "(f2)" in " ".join(outcome.notes)
 
 

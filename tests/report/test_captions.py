@@ -209,6 +209,31 @@ def test_the_terminal_tells_estimates_with_their_deviations():
     assert "gain 2 +- 0.1, L 25 +- 2.5" in summary(typed({"identification": found}), "s", [])
 
 
+def test_a_summary_has_the_deviations_that_a_design_will_give():
+    information = {"parameters": ["b1", "f1"], "matrix": [[100.0, 0.0], [0.0, 2500.0]]}
+    information["standard_deviation"] = {"b1": 0.1, "f1": 0.02}
+    assert ("std", "b1 0.1, f1 0.02", "") in facts(typed({"information": information}), "s")
+
+
+@pytest.mark.parametrize(("ratio", "reserve"), [(0.04, "a 25-fold reserve"), (0.5, "")])
+def test_a_large_reserve_is_told(ratio, reserve):
+    asked = [{"name": "model_error", "worst_ratio": ratio, "frequency": None}]
+    met = {"verdict": "met", "met": True, "requirements": asked}
+    (told,) = said("verdict", typed({"assessment": met}))
+    assert told.partition("admissible error, ")[2] == reserve
+
+
+def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command():
+    found = {"verdict": "undecided", "met": False, "undecided": ["Past inputs explain residuals."]}
+    found |= {"causes": ["contradicted"], "next": "idesign explore a.csv"}
+    result = {"assessment": found, "notes": ["Past inputs explain residuals.", "The residuals drift."]}
+    told = summary(typed(result), "s", [])
+    assert "next: idesign explore a.csv" in told
+    assert told.count("Past inputs explain residuals.") == 1
+    assert "1 more in report.html" in told
+    assert "The residuals drift." not in told
+
+
 def test_a_loop_error_says_which_theory_its_ratios_are_of():
     """Table I of errata.md: N J of formula (19) and of white noise, and 27.7 % in the mean loss."""
     spec = load_spec("specs/distillation_column.yaml", ["signal={samples: 100, candidates: 1}"])

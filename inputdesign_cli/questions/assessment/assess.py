@@ -22,6 +22,7 @@ from inputdesign_cli.findings.designed_records import level_notes
 from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal, of_first_part
 from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
+from inputdesign_cli.findings.leading import leading
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.findings.other_systems import prior_left_out
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
@@ -109,7 +110,8 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
             far = far_from_nominal(distance)
             more += far if first is None or not far else of_first_part(distance) if first else []
     findings = [*(results.outcome.findings or ()), *more]
-    against = reasons(findings)
+    first_of_all = leading(findings, found.estimate, found.data)
+    against = {} if first_of_all is None else reasons(first_of_all.findings)
     verdict: Verdict = "undecided" if against else "met" if met else "missed"
     if verdict == "met":
         more += unseen(units, without)
@@ -120,10 +122,14 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
         requirements=tuple(listed),
         undecided=tuple(one.message for those in against.values() for one in those) or None,
         causes=tuple(against) or None,
+        next=None if first_of_all is None else first_of_all.command,
         neglected=tuple(entry for of_structure, entry in entries if of_structure) if entries else None,
         variations=tuple(entry for of_structure, entry in entries if not of_structure) if entries else None,
         nominal=None if distance is None else distance.nominal,
     )
+    if first_of_all is not None:
+        known = {one.message for one in findings}
+        more = [*(one for one in first_of_all.findings if one.message not in known), *more]
     outcome = replace(results.outcome, status=verdict, assessment=assessment).saying(more)
     judged = replace(results, outcome=outcome)
     return Assessment(verdict, _without_model(judged, units, found) if against else judged)

@@ -17,6 +17,7 @@ from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings import frequency_responses as responses
+from inputdesign_cli.findings.leading import leading
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.faults import period_spikes
@@ -254,13 +255,14 @@ def _assessment(
             no_top_up = remedy if periods is None else f"repeat the record: {remedy}"
         else:
             doubts = [*doubts, responses.within_chance(units, ratio, judged.limits, at, remedy)]
-    answer, why = verdict(doubts, met=met), reasons(doubts)
+    answer, why, first = verdict(doubts, met=met), reasons(doubts), leading(doubts, None, counted.data)
     return Assessment(
         verdict=answer,
         met=answer == "met",
         requirements=(RequirementMet("frequency_response", ratio, at),),
         undecided=tuple(one.message for those in why.values() for one in those) or None,
         causes=tuple(why) or None,
+        next=None if first is None else first.command,
         no_top_up=no_top_up,
         periods=periods,
     ), doubts

@@ -259,6 +259,7 @@ def _findings(done: Designed, used: out.Powers) -> list[Finding]:
     findings = [
         *designs.inputs_without_power(used.excitation or ()),
         *designs.short_experiment(done.experiment),
+        *designs.few_samples(done.experiment),
     ]
     findings += designs.sign_open(problem.requirements)
     if done.header.units.closed_loop and not found.basis.has_density:

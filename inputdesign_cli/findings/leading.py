@@ -1,0 +1,94 @@
+"""Find what invalidates the other objections to an estimate, and the one command to run next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from inputdesign_cli.explore.drift import slopes_of
+from inputdesign_cli.finding import Finding, undecided
+from inputdesign_cli.findings.places import Record
+from inputdesign_cli.findings.refuted_structure import DRIFT
+from inputdesign_cli.identification import Estimate
+
+_AGAIN = "the same command with "
+_EXPLORE = "idesign explore {logs}"
+_NEXT = {
+    # Samples that are wrong or of another system upset every test.
+    "samples-repeated": "idesign assess SPEC {first}",
+    "columns-misaligned": _EXPLORE,
+    "sensor-stands-still": _AGAIN + "{rows}",
+    "spikes": _AGAIN + "{rows}",
+    "input-logged-late": _EXPLORE,
+    "input-answers-output": _AGAIN
+    + '--set "experiment.controller={{numerator: [..], denominator: [..]}}", the controller of the loop',
+    "input-without-effect": _EXPLORE,
+    "records-differ": "idesign assess SPEC {first}",
+    "prior-of-these-data": _AGAIN + "--set experiment.prior=null",
+    "prior-contradicted": _AGAIN + "--set experiment.prior=null",
+    "level-shift": _AGAIN + "{rows}",
+    # An error of G, or a trend, makes tests of the noise and of constant parameters fail.
+    "plant-structure": _EXPLORE,
+    "drift": _AGAIN + "--set noise.drift=true",
+    "noise-structure": _EXPLORE,
+    "search-not-settled": _EXPLORE,
+    "stopped-at-an-end": _EXPLORE,
+    "parameter-missing": _EXPLORE,
+    "plant-nonlinear": _EXPLORE,
+    "plant-changed": _AGAIN + "--range {half}",
+    "no-accuracy-here": _EXPLORE,
+    "neglected-parameter": _EXPLORE,
+    "other-minimum": "idesign solve SPEC --set signal.seed=2, and assess both records",
+    # Of a frequency response without a model.
+    "spiked-periods": _AGAIN + "--without ROWS",
+    "drifting-periods": _AGAIN + "--detrend linear",
+    "nonlinear-response": "idesign solve SPEC --set signal.phases=random, and apply half of it",
+    "response-within-chance": "idesign assess SPEC {logs} MORE.csv, a further record of this signal",
+}
+"""The command after each finding that leaves a verdict open; an earlier one silences the later ones."""
+_DETREND = _AGAIN + "--detrend linear"
+_ORDER = list(_NEXT)
+# A shift of level that takes more than this share of a record is a drift.
+_WIDE = 0.1
+
+
+class Leading(NamedTuple):
+    """The findings that come first, usually one, and the command to run next."""
+
+    findings: list[Finding]
+    command: str
+
+
+def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record) -> Leading | None:
+    """Return the findings that leave a verdict open and explain the others; None if nothing does.
+
+    Args:
+        estimate: of a model from the `data`; None for a response without one.
+    """
+    against = [one for one in findings if undecided([one])]
+    if not against:
+        return None
+    first = min(against, key=lambda one: _ORDER.index(one.code) if one.code in _ORDER else len(_ORDER))
+    alike, command = [one for one in against if one.code == first.code], _NEXT.get(first.code, _EXPLORE)
+    if estimate and not data.lined and _may_drift(first, data) and np.any(slopes_of(data.parts)):
+        found = [one for one in against if one.code == DRIFT.code]
+        alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
+        command = _DETREND
+    middle, files = float(data.time[len(data.time) // 2]), [name for name, _ in data.files]
+    figures = {
+        "logs": " ".join(files),
+        "first": files[0],
+        "rows": alike[0].figures.get("option", "--without ROWS"),
+        "half": f"{float(data.time[0]):g}:{middle:g}",
+    }
+    return Leading(alike, command.format(**figures))
+
+
+def _may_drift(first: Finding, data: Record) -> bool:
+    """Return whether a drift along a line may explain a finding."""
+    rows = first.figures.get("rows")
+    if first.code == "level-shift" and isinstance(rows, list):
+        return any(last - begin > _WIDE * len(data.y) for begin, last in rows)
+    return _ORDER.index(first.code) > _ORDER.index("level-shift") if first.code in _ORDER else True

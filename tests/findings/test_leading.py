@@ -1,0 +1,113 @@
+"""One finding explains the others, and the command that it names ends the matter."""
+
+import shlex
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import assess, parse_spec
+from inputdesign_cli.finding import REFUTED, UNDECIDED, Finding
+from inputdesign_cli.findings import kinds
+from inputdesign_cli.findings.leading import leading
+from inputdesign_cli.findings.places import Record
+from inputdesign_cli.questions import explore
+from inputdesign_cli.records import Preparation
+from tests.support.heater import said
+
+ASKED = "accuracy={model_error: {relative: 0.15, band: [0.0005, 0.01]}}"
+SPEC = f"""
+sample_time: 15
+noise: {{variance: 0.01}}
+experiment: {{samples: 480}}
+limits: {{input_power: 36}}
+spectrum: {{type: fir, order: 10}}
+{ASKED.replace("=", ": ")}
+"""
+IN_S = "{continuous: {gain: 1.6, time_constant: 240, dead_time: 35}, sample: zoh}"
+IN_Q = "{B: [0, 0, 0, 0.08, 0.01], F: [1, -0.944]}"
+STEP, K, T, L = 15, 1.72, 262.0, 31
+AGAIN = "the same command with "
+
+
+def record(path, fault, seed, samples=480):
+    """Write a record of a heat exchanger whose model in the spec is right but for one fault."""
+    rng = np.random.default_rng(seed)
+    n, pole, lag = samples * STEP, np.exp(-1.0 / T), np.exp(-1.0 / 60.0)
+    u = np.repeat(rng.choice([-6.0, 6.0], n // 150 + 1), 150)[:n]
+    late = L + 45 * (fault == "delay")
+    y = scipy.signal.lfilter([0, K * (1 - pole)], [1, -pole], np.concatenate([np.zeros(late), u])[:n])
+    if fault == "lag":
+        y = scipy.signal.lfilter([1 - lag], [1, -lag], y)
+    if fault == "inverse":
+        y = y - 60.0 * np.diff(y, prepend=0.0)
+    colour = np.exp(-STEP / 60.0) * (fault == "noise")
+    e = 0.1 * np.sqrt(1.0 - colour**2) * rng.standard_normal(samples)
+    time, slope = STEP * np.arange(samples), (fault == "drift") / 3600.0
+    values = y[::STEP] + scipy.signal.lfilter([1], [1, -colour], e) + slope * time
+    table = np.column_stack([time, u[::STEP] + 45, values + 82])
+    np.savetxt(path, table, delimiter=",", header="time,u1,y1", comments="")
+    return path
+
+
+def followed(spec, data, command):
+    """What comes of the command that a verdict names."""
+    if command.startswith("idesign explore"):
+        assert command == f"idesign explore {data.name}"
+        found = explore([data]).results.resolved_spec
+        return assess(parse_spec(found, overrides=[ASKED]), data)
+    option, value = shlex.split(command.removeprefix(AGAIN))
+    if option == "--detrend":
+        return assess(spec, data, preparation=Preparation(detrend=value))
+    assert option == "--set"
+    return assess(parse_spec(spec.to_yaml(), overrides=[value]), data)
+
+
+def ended(fault, plant, seed, path):
+    """Whether a verdict is reached, with the first command that is named if need be."""
+    spec, data = parse_spec(f"plant: {plant}{SPEC}"), record(path / f"{fault}.csv", fault, seed)
+    found = assess(spec, data)
+    command = found.results.outcome.assessment.next
+    assert (command is not None) == (found.verdict == "undecided")
+    if command is None:
+        return True
+    assert len(said(found.results).split()) <= 150
+    return followed(spec, data, command).verdict != "undecided"
+
+
+@pytest.mark.parametrize(("fault", "seed"), [("drift", 0), ("delay", 0)])
+def test_the_command_ends_the_matter(fault, seed, tmp_path):
+    assert ended(fault, IN_Q, seed, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", [IN_S, IN_Q], ids=["s", "q"])
+@pytest.mark.parametrize("fault", ["noise", "drift", "lag", "inverse", "delay"])
+def test_the_command_ends_nearly_every_matter(fault, plant, tmp_path):
+    assert sum(ended(fault, plant, seed, tmp_path) for seed in range(10)) >= 9
+
+
+def test_every_kind_that_leaves_a_verdict_open_names_a_command():
+    """The end of a campaign has its own in the message."""
+    open_ = {code for code, kind in kinds().items() if kind.severity in (REFUTED, UNDECIDED)}
+    data = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
+    for code in open_ - {"campaign-refuted"}:
+        first = leading([Finding(code, REFUTED, "x", "", {"rows": []})], None, data)
+        assert first.command.startswith(("idesign ", AGAIN))
+        assert "{" not in first.command.replace("{numerator", "")
+
+
+@pytest.mark.parametrize(
+    ("codes", "first"),
+    [
+        (["noise-structure", "plant-structure", "drift", "plant-changed"], "plant-structure"),
+        (["plant-nonlinear", "drift", "noise-structure"], "drift"),
+        (["plant-structure", "input-logged-late"], "input-logged-late"),
+        (["no-accuracy-here", "search-not-settled"], "search-not-settled"),
+    ],
+)
+def test_what_explains_the_others_comes_first(codes, first):
+    data = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
+    found = leading([Finding(code, REFUTED, code) for code in codes], None, data)
+    assert [one.code for one in found.findings] == [first]
+    assert leading([], None, data) is None
