@@ -37,7 +37,8 @@ def wizard(
 
     The plant, what the model is for, what the experiment may use, the noise: say it in SENTENCE, and three
     questions are left. Without it all are asked that no option answers, in the terminal or from a pipe, a
-    line an answer. What is written is an ordinary spec.
+    line an answer; KEY=TEXT answers a question out of turn. The middle of the range is the operating point:
+    `idesign assess` takes it as --operating-point. What is written is an ordinary spec.
     """
     from inputdesign_cli.wizard.questions import needed_of, read_answers
     from inputdesign_cli.wizard.sentence import spread

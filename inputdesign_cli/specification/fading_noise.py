@@ -93,7 +93,7 @@ def _faults(
     if unfit[0]:
         message = f"{{key}} does not go with this plant: {unfit[0]}"
         yield PathDiagnostic("unsuitable-key", message, unfit[1], (*path, key))
-    if _TIME in noise and "sample_time" not in data:
+    if noise.get(_TIME) is not None and "sample_time" not in data:
         message = "{key} needs sample_time, which decides how much of the noise is left in the next sample"
         yield PathDiagnostic("missing-key", message, "add sample_time: 10, in time_unit", timed, at_key=True)
         return

@@ -168,7 +168,7 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
         noise.setdefault("variance", 1.0)  # it may be left out if it is to be estimated
     reported: list[PathDiagnostic] = []
     broken = set(tree.broken)
-    for find in (_empty, in_samples, in_filters):
+    for find in (in_filters, _empty, in_samples):  # a noise without a size has its variance nevertheless
         for one in list(find(data)):
             reported.append(one)
             broken.add(one.path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,9 +17,10 @@ from inputdesign_cli.wizard import questions as asking
 from inputdesign_cli.wizard.grammar import Phrase, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
-from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, in_their_words
-from inputdesign_cli.wizard.sentence import in_sentence
+from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, Question, bad_answer, in_their_words, question
+from inputdesign_cli.wizard.sentence import in_sentence, question_of
 from inputdesign_cli.wizard.wishes import (
+    Range,
     channels_of,
     controller,
     dwell,
@@ -49,6 +51,8 @@ _POSITIONS = 10  # the fewest of an input that keeps them
 _PERIODS = 5  # of a record for a Bode plot
 _BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
 
+_NAMED = re.compile(rf"\s*({'|'.join(KEYS)})\s*[=:]\s*(.*)", re.I | re.S)  # "time=2 h"
+
 Solve = Callable[[Spec], Result]
 
 
@@ -61,7 +65,7 @@ class Draft:
     spectrum: str | None  # as in a spec; None if the accuracy has the lines
     folder: Path
     said: Mapping[str, str]  # the answers
-    there: float  # seconds that may be taken
+    there: float  # the time that may be taken
     notes: tuple[str, ...] = ()  # what the user must know of the plant, a sentence each
     why: str = "filtered noise"  # the comment on the spectrum
 
@@ -108,18 +112,18 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         DataError: a file cannot be used.
     """
     said = asking.complete(answers)
-    span, there = input_range(said["range"]), Phrase(said["time"], "time").seconds()
     plant = plant or understand_plant(said["plant"], stem, folder)
-    step, why = plant.sample_time, plant.why_sampling
+    span, there = input_range(said["range"], plant), Phrase(said["time"], "time", plant.clock).lasting()
+    step, why, unit = plant.sample_time, plant.why_sampling, plant.time_unit
     if plant.sampling is None:
-        why = f"a twentieth of the time constant of {short(plant.slow)} s, or a little less"
+        why = f"a twentieth of the time constant of {short(plant.slow)} {unit}, or a little less"
     if there < LEAST * step:
-        short_of = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
-        raise bad_answer("time", short_of)
-    hold, control = dwell(said["hold"], step), controller(said["loop"], plant)
+        short_of = f"{short(there)} {unit} are less than {LEAST} samples, one every {short(step)} {unit}"
+        raise bad_answer("time", f"{short_of} ({why})")
+    hold, control = dwell(said["hold"], plant), controller(said["loop"], plant)
     asked = wished(said["wish"], plant, control is not None, min(there, _MOST * step))
     nonparametric = any("frequency_response" in line for line in asked)
-    rate, output = limited(said["limits"])
+    rate, output = limited(said["limits"], plant)
     made = asking.chosen("signals", said["signals"], _TYPES)
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
     unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
@@ -136,6 +140,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "controller": control,
         "asked": asked,
         "span": span,
+        "points": _points(span),
         "rate": rate,
         "output": output,
         "duration": _duration(there, step, hold, nonparametric=nonparametric),
@@ -154,8 +159,15 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     return Draft(facts, plant.files, spectrum, folder, said, there, notes)
 
 
+def _points(span: Range) -> str:
+    """Return the comment that per cents of a range are points of the actuator, not a share of its middle."""
+    low, high = (short(span.offset + side * span.amplitude) for side in (-1, 1))
+    percent = span.unit == "%" and span.offset
+    return f"  # from {low} to {high} %: not a share of {short(span.offset)}" if percent else ""
+
+
 def _duration(there: float, step: float, hold: int, *, nonparametric: bool) -> float:
-    """Return the seconds of a record in whole positions of the input, each of `hold` samples."""
+    """Return the length of a record in whole positions of the input, each of `hold` samples."""
     # Lines of a response are one over the time apart: it takes all of it.
     most = there if nonparametric else min(there, _MOST * step)
     if hold == 1:
@@ -207,7 +219,7 @@ class Conversation:
     """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again.
 
     The first answer may be a sentence that answers several questions. Then only the others are asked, and
-    three about the actuator.
+    three about the actuator. An answer that names its question, as in "time=2 h", may come at any time.
     """
 
     def __init__(self, known: Mapping[str, str], stem: str, folder: Path, *, brief: bool = False) -> None:
@@ -232,10 +244,13 @@ class Conversation:
         """
         asked = self.question
         assert asked is not None
+        named = _NAMED.match(text)
+        key, text = (named[1].lower(), named[2]) if named else (asked.key, text)
         try:
-            several = in_sentence(text) if asked.key == "plant" else {}
+            several = in_sentence(text) if key == "plant" else {}
             self._brief = self._brief or bool(several)
-            self.answers |= several or {asked.key: text}
+            self.answers |= several or {key: text}
+            self._plant = None if key == "plant" else self._plant
             # The plant, which may be a log to be explored, is read once only.
             if self._plant is None and (plant := self.answers.get("plant", "").strip()):
                 self._plant = understand_plant(plant, self._stem, self._folder)
@@ -246,10 +261,14 @@ class Conversation:
         except OutputError:
             raise  # no answer can help
         except IdesignError as error:
-            key = error.diagnostics[0].key
-            if self.answers.pop(key, None) is None and key != asked.key:
+            wrong = error.diagnostics[0].key
+            if self.answers.pop(wrong, None) is None and wrong != key:
                 return None  # it is about what stands in for an answer
-            if key == "plant":
+            if wrong == "plant":
                 self._plant = None
-            return error
+            meant = question_of(text)
+            if wrong != key or named or meant in (None, key):
+                return error
+            hint = f'to answer "{question(meant or key).asks}" write {meant}={text}'
+            return type(error)([replace(one, hint=f"{hint}; {one.hint}") for one in error.diagnostics])
         return None

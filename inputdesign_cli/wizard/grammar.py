@@ -7,61 +7,86 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
 from inputdesign_cli.wizard.questions import bad_answer
 
 # Sizes beyond these would overflow, or vanish, where they are squared.
 LARGEST, SMALLEST = 1e15, 1e-15
-NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = rf"([-+]?{_DIGITS})"
 ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 PLUS_MINUS = r"(?:plus/minus|plus or minus|\+/?-|±)"
-# A unit that is not converted: "%", "bar", "degC", "m/s"; not a word of the answers.
+# The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
 UNIT = r"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)[^\s\d,;|+±-][^\s,;|]*)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
 ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly)\b\.?|~|≈)"
 _OF = rf"\s*(?:,\s+|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
-_WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*{NUMBER}{_PER_CENT})?"
+_WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS}){_PER_CENT})?"
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
 VAGUE = 0.2
 """The share within which a value that is "about" right is taken to be known."""
-# Kinds of units -> each unit in the one that a spec has.
-SCALES = {
-    "time": {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "second": 1.0, "min": _MINUTE, "minute": _MINUTE,
-             "h": _HOUR, "hour": _HOUR, "shift": _SHIFT, "d": _DAY, "day": _DAY, "week": 7 * _DAY},
-    "frequency": {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "mhz": 2e-3 * math.pi, "hz": 2.0 * math.pi,
-                  "khz": 2e3 * math.pi},
-    "rate": {"s": 1.0, "sec": 1.0, "second": 1.0, "min": 1.0 / _MINUTE, "minute": 1.0 / _MINUTE,
-             "h": 1.0 / _HOUR, "hour": 1.0 / _HOUR},
-}  # fmt: skip
+_TIMES = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "second": 1.0, "min": _MINUTE, "minute": _MINUTE,
+          "h": _HOUR, "hr": _HOUR, "hour": _HOUR, "shift": _SHIFT, "d": _DAY, "day": _DAY,
+          "week": 7 * _DAY}  # fmt: skip
+_FREQUENCIES = {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "rad/h": 1.0 / _HOUR, "mhz": 2e-3 * math.pi,
+                "hz": 2.0 * math.pi, "khz": 2e3 * math.pi}  # fmt: skip
+# Units whose differences convert into each other, relative to the first ones. A degree is a kelvin.
+_ALIKE: tuple[dict[str, float], ...] = (
+    {"k": 1.0, "kelvin": 1.0, "mk": 1e-3, "degc": 1.0, "°c": 1.0, "celsius": 1.0, "degf": 5 / 9, "°f": 5 / 9},
+    {"%": 1.0, "percent": 1.0},
+    {"v": 1.0, "mv": 1e-3, "kv": 1e3},
+    {"a": 1.0, "ma": 1e-3},
+    {"bar": 1.0, "mbar": 1e-3, "pa": 1e-5, "kpa": 1e-2},
+    {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    {"w": 1.0, "kw": 1e3},
+)
 # "a minute", "half an hour", "two shifts": words in place of numbers.
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
             "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30}  # fmt: skip
-_UNIT_OF_TIME = rf"(?:{'|'.join(SCALES['time'])})s?\b"
+_TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
+_UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={_UNIT_OF_TIME})", re.I)
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+\.?\d*|\.\d+)\s*){_UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
-_PER = rf"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?(?:\s*(?:per|/)\s*({'|'.join(SCALES['rate'])})\b)?"
-# A group each, which holds a unit of the kind; the last three convert nothing.
-_UNITS = {kind: rf"(?:\s*({'|'.join(scales)})s?\b)?" for kind, scales in SCALES.items()} | {
-    "rate": _PER,
-    "slope": rf"{_PER}(?:\s*(?:per|/)\s*[^\s,;|]+)?",
-    "gain": r"((?:\s*[^\s\d,;|]*/[^\s,;|]+)?)",
-    "any": rf"({UNIT})",
-    "none": "()",
+# "per minute", and of a gain "per 10 % of valve".
+_RATE = rf"(?:\s*(?P<size>(?!(?:per|and)\b)[^\s\d,;|/]+))?(?:\s*(?:per|/)\s*{_TIME})?"
+_BASE = rf"\s*(?:/|\bper\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>[^\s\d,;|]+)(?:\s+of\s+(?:the\s+)?[a-z]+)?"
+# What stands behind the number of each kind.
+_BEHIND = {
+    "time": rf"(?:\s*{_TIME})?",
+    "frequency": rf"(?:\s*(?P<unit>{'|'.join(_FREQUENCIES)})\b)?",
+    "rate": _RATE,
+    "slope": rf"{_RATE}(?:{_BASE})?",
+    "gain": rf"(?:\s*(?!plus/)(?P<size>[^\s\d,;|+±]*){_BASE})?",
+    "any": rf"(?P<size>{UNIT})",
+    "none": "",
 }
 _FILLING = "a an the of and with in at each all about is for by i want"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Holds a value in units of the spec, and how it was said."""
+
+    value: float
+    share: float | None = None  # "within 30 %"
+    about: bool = False
+    size: str = ""  # the unit of what is measured
+    base: str = ""  # what a gain is per
 
 
 class Phrase:
     """Reads an answer piece by piece; `finish` refuses what nobody read.
 
-    A method returns None if the text has no piece of its kind.
+    A method returns None if the text has no piece of its kind. Times become multiples of `clock` seconds,
+    and sizes in other units become sizes in `unit`, where that is known.
     """
 
-    def __init__(self, text: str, key: str) -> None:
+    def __init__(self, text: str, key: str, clock: float = 1.0, unit: str = "") -> None:
         """Begin with the whole answer to a question; refuse numbers too large or too small to be meant."""
         spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", text)
-        self.text, self.key, self._left = text, key, spoken
+        self.text, self.key, self._left, self._clock, self._unit = text, key, spoken, clock, unit
         sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
         strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
         if strange is not None:
@@ -81,54 +106,70 @@ class Phrase:
         return found
 
     def number(self, pattern: str) -> float | None:
-        """Read a piece and return the number in its first group."""
+        """Read a piece and return the number in its first group; a second group has its unit."""
         found = self.take(pattern)
-        return None if found is None else float(found[1])
-
-    def after(self, words: str, kind: str = "any", *, named: bool = False) -> float | None:
-        """Read words (a pattern), a number and its unit, and return the number in units of the spec.
-
-        Args:
-            kind: of the unit: time, frequency, rate, gain, any (which is not converted) or none.
-            named: whether words without a number are refused.
-        """
-        found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}")
-        if found is None and named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
-            raise bad_answer(self.key, f'"{alone[0]}" has no number behind it')
-        return None if found is None else _scaled(found[1], found[2], kind)
-
-    def known_within(self, words: str, kind: str) -> tuple[float, float | None, bool] | None:
-        """Read as `after` does; also the share "within 30 %" that may follow, and whether it is "about"."""
-        found = self.take(rf"({ABOUT}?\s*\b(?:{words})\b{_OF}){NUMBER}{_UNITS[kind]}{_WITHIN}")
         if found is None:
             return None
-        share = None if found[4] is None else float(found[4]) / 100.0
-        return _scaled(found[2], found[3], kind), share, re.search(ABOUT, found[1], re.I) is not None
+        unit = (found[2] or "").strip() if found.re.groups > 1 else ""
+        return self.sized(float(found[1]), unit)
+
+    def quantity(
+        self, words: str, kind: str, within: str = _WITHIN, unit: str | None = None
+    ) -> Quantity | None:
+        """Read words (a pattern), a number, its unit, and the share "within 30 %" that may follow."""
+        head = rf"(?P<words>(?:{ABOUT}\s*|\b)(?:{words})\b{_OF})"
+        found = self.take(rf"{head}(?P<number>[-+]?{_DIGITS}){_BEHIND[kind]}{within}")
+        if found is None:
+            return None
+        said = {name: (text or "").strip() for name, text in found.groupdict().items()}
+        value = self._scaled(float(said["number"]), said.get("unit", ""), kind)
+        if kind in ("any", "rate"):
+            value = self.sized(value, said["size"], unit)
+        if said.get("many"):
+            value /= needed(float(said["many"]), self.key, "what the gain is per")
+        share = float(said["share"]) / 100.0 if said["share"] else None
+        about = re.search(ABOUT, said["words"], re.I) is not None
+        return Quantity(value, share, about, said.get("size", "").strip("()"), said.get("base", ""))
+
+    def after(
+        self, words: str, kind: str = "any", *, named: bool = False, unit: str | None = None
+    ) -> float | None:
+        """Read words, a number and its unit, and return the number in units of the spec.
+
+        Args:
+            kind: of the unit: time, frequency, rate, slope, gain, any (a size) or none.
+            named: whether words without a number are refused.
+            unit: of a size in the spec, where it is another than that of the phrase.
+        """
+        found = self.quantity(words, kind, "(?P<share>)", unit)
+        if found is None and named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
+            raise bad_answer(self.key, f'"{alone[0]}" has no number behind it')
+        return None if found is None else found.value
 
     def band(self) -> tuple[float | None, float | None]:
-        """Read the ends of a band of frequencies in rad/s; one unit holds for both."""
-        frequency = NUMBER + _UNITS["frequency"]
+        """Read the ends of a band of frequencies; one unit holds for both."""
+        frequency = NUMBER + _BEHIND["frequency"].replace("?P<unit>", "")
         found = self.take(rf"\bfrom\b{_OF}{frequency}\s*(?:\bup to\b|\bto\b|-)\s*{frequency}")
         if found is None:
             return self.after("from", "frequency"), self.after("up to|to", "frequency")
-        low, high = ((found[1], found[2] or found[4]), (found[3], found[4] or found[2]))
-        return _scaled(*low, "frequency"), _scaled(*high, "frequency")
+        low, high = (float(found[1]), found[2] or found[4]), (float(found[3]), found[4] or found[2])
+        return self._scaled(*low, "frequency"), self._scaled(*high, "frequency")
 
     def share(self) -> float | None:
         """Read "within 30 %" and return the fraction."""
-        found = self.number(rf"(?:\b(?:within)\b|{PLUS_MINUS})?\s*{NUMBER}{_PER_CENT}")
-        return None if found is None else found / 100.0
+        found = self.take(rf"(?:\b(?:within)\b|{PLUS_MINUS})?\s*{NUMBER}{_PER_CENT}")
+        return None if found is None else float(found[1]) / 100.0
 
-    def seconds(self) -> float:
+    def lasting(self) -> float:
         """Read the whole answer as a time, as in "45 min" or "one shift"."""
         found = self.take(rf"{NUMBER}\s*([a-z]*?)s?(?![a-z])")
         if found is None:
             raise bad_answer(self.key, f'"{self.text}" is no time')
         unit = found[2].lower() or "s"
-        if unit not in SCALES["time"]:
+        if unit not in _TIMES:
             raise bad_answer(self.key, f'"{found[2]}" is no unit of time: s, min, h, shifts or days')
         self.finish("there only for up to")
-        return needed(_scaled(found[1], unit, "time"), self.key, "the time")
+        return needed(self._scaled(float(found[1]), unit, "time"), self.key, "the time")
 
     def finish(self, also: str = "") -> None:
         """Refuse what was not read, except words without content and `also` (words between blanks)."""
@@ -137,10 +178,24 @@ class Phrase:
             if any(word and word not in known for word in re.split(r"[\s,;.:]+", piece.lower())):
                 raise bad_answer(self.key, f'"{piece.strip(" ,;.:")}" is not understood')
 
+    def sized(self, value: float, unit: str, wanted: str | None = None) -> float:
+        """Return a difference in units of the spec; unknown units are not converted."""
+        wanted = self._unit if wanted is None else wanted
+        ours, theirs = (one.strip("()").lower() for one in (wanted, unit))
+        group, other = (next((group for group in _ALIKE if one in group), None) for one in (ours, theirs))
+        if ours == theirs or group is None or other is None:
+            return value
+        if group is not other:
+            raise bad_answer(self.key, f"it is in {unit}, but the gain of the plant has {wanted} there")
+        return value * group[theirs] / group[ours]
 
-def _scaled(number: str, unit: str | None, kind: str) -> float:
-    scales = SCALES.get("rate" if kind == "slope" else kind, {})
-    return float(number) * scales.get((unit or "").lower(), 1.0)
+    def _scaled(self, value: float, unit: str | None, kind: str) -> float:
+        unit = (unit or "").lower()
+        if kind == "time":
+            return value * _TIMES.get(unit, 1.0) / self._clock
+        if kind == "frequency":
+            return value * _FREQUENCIES.get(unit, 1.0) * self._clock
+        return value / _TIMES.get(unit, 1.0) * self._clock if kind in ("rate", "slope") else value
 
 
 def needed(value: float | None, key: str, what: str) -> float:

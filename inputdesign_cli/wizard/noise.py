@@ -15,8 +15,9 @@ import numpy as np
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
 from inputdesign_cli.specification.fading_noise import WHITE, discrete
-from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
-from inputdesign_cli.wizard.plants import PlantAnswer
+from inputdesign_cli.specification.models.units import SECONDS
+from inputdesign_cli.wizard.grammar import NUMBER, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.plants import PlantAnswer, unit_of_time
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
 _DRIFTING = 0.2  # the step of a drift from one sample to the next, of the deviation of white noise
@@ -55,7 +56,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     """
     explored = plant.explored
     moves = explored is not None and _moves(explored.noise)
-    level = None if text.lower() in AS_LOGGED and explored else _stated(text, folder, plant.sample_time)
+    level = None if text.lower() in AS_LOGGED and explored else _stated(text, folder, plant)
     moved = moves or (level is not None and level.drifts)
     drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moved})
     regressed = explored is not None and explored.plant.kind == "polynomial" and len(explored.plant.A) > 1
@@ -63,7 +64,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
         return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
     assert level is not None
     fades, pole, why = level.fades, level.pole, level.why
-    colour = f"fades in {short(fades)} s, as you said" if fades else "white"
+    colour = f"fades in {short(fades)} {plant.time_unit}, as you said" if fades else "white"
     if level.guessed and not drifts:
         fades = float(f"{max(_FADING * plant.slow, 2.0 * plant.sample_time):.1g}")
         colour = "a guess, for noise is seldom white; called white it would promise too much accuracy"
@@ -73,7 +74,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     exact = f"D: [1, {short(-pole)}], variance: {short(variance)}"
     if fades and not drifts:
         return [
-            f"noise:  # every {short(plant.sample_time)} s exactly e/D with {exact}",
+            f"noise:  # every {short(plant.sample_time)} {plant.time_unit} exactly e/D with {exact}",
             f"  standard_deviation: {short(level.deviation)}  # {why}",
             f"  correlation_time: {short(fades)}  # {colour}",
         ]
@@ -133,13 +134,13 @@ def _drift(drift: Any) -> list[str]:
     return [f"  drift: {json.dumps(drift)}  # an integrator in the noise"] * bool(np.any(drift))
 
 
-def _stated(text: str, folder: Path, step: float) -> _Level:
-    """Return the noise level that an answer states; `step` is the seconds between samples."""
+def _stated(text: str, folder: Path, plant: PlantAnswer) -> _Level:
+    """Return the noise level that an answer states."""
     if text.lower() in AS_LOGGED:
         raise bad_answer("noise", 'the plant is no log: write plant "log FILE", or here "rest FILE"')
     if rests := re.fullmatch(r"(?:rest|as in)\s+(.*)", text, re.I):
-        return _at_rest(folder / rests[1].strip(), step)
-    said = Phrase(text, "noise")
+        return _at_rest(folder / rests[1].strip(), plant)
+    said, step = Phrase(text, "noise", plant.clock, plant.units[0]), plant.sample_time
     white, drifts = said.take(r"\bwhite\b") is not None, said.take(r"\bdrift\w*") is not None
     fades = 0.0 if white else said.after(_LASTING, "time")
     if (
@@ -147,12 +148,13 @@ def _stated(text: str, folder: Path, step: float) -> _Level:
         and not white
         and needed(fades, "noise", "the time in which it fades") < WHITE * step
     ):
-        why = f"noise that fades in {short(fades)} s is white in samples {short(step)} s apart"
+        unit = plant.time_unit
+        why = f"noise that fades in {short(fades)} {unit} is white in samples {short(step)} {unit} apart"
         raise bad_answer("noise", f'{why}: write "white"')
     rounding = _resolution(said)
     deviation = said.after("standard deviation|deviation|std|noise", named=True)
     if deviation is None and not re.fullmatch(rf"\s*{NUMBER}\s*", text):
-        deviation = said.number(rf"^[\s|]*{NUMBER}{UNIT}")
+        deviation = said.number(rf"^[\s|]*{NUMBER}({UNIT})")
     said_both = {"the standard deviation": deviation, "the resolution": rounding}
     sizes = {what: needed(one, "noise", what) for what, one in said_both.items() if one is not None}
     if not sizes:
@@ -172,9 +174,9 @@ def _stated(text: str, folder: Path, step: float) -> _Level:
 def _resolution(said: Phrase) -> float | None:
     """Return the step of a sensor's resolution, stated or computed from bits and range; None if neither."""
     begins = r"\bresolution\b\s*(?:of\s*)?"
-    bits = said.take(rf"{begins}(\d+)\s*bits?\s*(?:up to|over|to|range)\s*{NUMBER}{UNIT}")
+    bits = said.take(rf"{begins}(\d+)\s*bits?\s*(?:up to|over|to|range)\s*{NUMBER}({UNIT})")
     if bits is not None:
-        return needed(float(bits[2]), "noise", "its range") / 2.0 ** int(bits[1])
+        return needed(said.sized(float(bits[2]), bits[3].strip()), "noise", "its range") / 2.0 ** int(bits[1])
     counted = said.take(rf"{begins}{NUMBER}[\s-]*(bits?|digits?|levels?|counts?|steps?)\b")
     if counted is not None:
         why = f"{counted[1]} {counted[2]} are no size without a range"
@@ -182,7 +184,7 @@ def _resolution(said: Phrase) -> float | None:
     return said.after("resolution", named=True)
 
 
-def _at_rest(path: Path, step: float) -> _Level:
+def _at_rest(path: Path, plant: PlantAnswer) -> _Level:
     """Return the level of the noise in the column y of a file in which u, if it is there, rests.
 
     Noise with one pole is assumed where rows are not as far apart as samples. Its correlation then fades by
@@ -190,7 +192,7 @@ def _at_rest(path: Path, step: float) -> _Level:
     """
     from inputdesign_cli.questions.building.header import read_samples
     from inputdesign_cli.records import read_sheet
-    from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
+    from inputdesign_cli.records.columns import columns_of, time_columns
 
     file_of("noise", path)
     with in_their_words({}, "noise"):
@@ -198,10 +200,9 @@ def _at_rest(path: Path, step: float) -> _Level:
         wanted = {"y": "y"} | {name: name for name in sheet.header if name.lower() in ("u", "u1")}
         found, apart = read_samples(path, wanted, key="noise"), 0.0
         for name in time_columns(sheet)[:1]:
-            unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
-            apart = (
-                float(np.median(np.diff(columns_of(sheet, {"time": name})["time"]))) * SCALES["time"][unit]
-            )
+            times = columns_of(sheet, {"time": name})["time"]
+            apart = float(np.median(np.diff(times))) * SECONDS[unit_of_time(sheet, name)] / plant.clock
+    step = plant.sample_time
     y, apart = found.pop("y"), apart if apart > 0.0 else step
     if any(np.ptp(u) > 0.0 for u in found.values()):
         raise bad_answer("noise", f'u in {path.name} moves: name its plant, too, as "log {path.name}"')
@@ -213,7 +214,7 @@ def _at_rest(path: Path, step: float) -> _Level:
         raise bad_answer("noise", f"y of {path.name} does not change; write the resolution of the sensor")
     rho = float(np.mean(v[1:] * v[:-1]) / power)
     same = abs(apart - step) <= _SAME_STEP * step
-    seen = f"of {path.name}: {y.size} samples" + ("" if same else f", {short(apart)} s apart")
+    seen = f"of {path.name}: {y.size} samples" + ("" if same else f", {short(apart)} {plant.time_unit} apart")
     if abs(rho) <= _WHITE / np.sqrt(y.size):
         return _Level(math.sqrt(power), f"{seen}, white as far as they show")
     pole = min(rho if same else max(rho, 0.0) ** (step / apart), _STRONGEST)

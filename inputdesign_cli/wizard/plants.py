@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -19,17 +19,20 @@ from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.wizard.grammar import ABOUT, VAGUE, Phrase, needed, short
 from inputdesign_cli.wizard.questions import bad_answer, file_of, in_their_words, package_data
 
 if TYPE_CHECKING:
     from inputdesign_cli.questions.exploration.explore import Exploration
+    from inputdesign_cli.records.sheet import Sheet
 
 _NONE: Mapping[str, float] = MappingProxyType({})
+INTEGRATES = r"integrat\w+(?: (?:with|gain|slope))*|(?:(?:the )?(?:level|output) )?(?:rises|grows)(?: by)?"
 # Names in a spec -> words and units of an answer.
 _QUANTITIES = {
     "gain": ("gain", "gain"),
-    "slope": (r"integrat\w+(?: (?:with|gain|slope))*", "slope"),
+    "slope": (INTEGRATES, "slope"),
     "time_constant": ("time constant|lag", "time"),
     "dead_time": ("dead time|delay", "time"),
 }
@@ -51,13 +54,13 @@ class PlantAnswer:
     """Holds what is known of the plant."""
 
     lines: tuple[str, ...]  # of the spec, with comments
-    slow: float  # its slowest time constant, in seconds
+    slow: float  # its slowest time constant, in time_unit
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of the parameters
     values: Mapping[str, float] = field(default_factory=dict)  # of the parameters
     controller: str | None = None  # of its usual operation, as YAML
     files: Mapping[str, bytes] = field(default_factory=dict)  # to be written next to the spec, by name
     covariance: str | None = None  # the name of the file with the covariance of the estimate
-    sampling: float | None = None  # seconds between samples, where they are known already
+    sampling: float | None = None  # time_unit between samples, where that is known already
     why_sampling: str = "as the plant is sampled"  # the reason for these
     tunable: bool = False  # whether rules of tuning know it
     channels: int = 1  # the larger number of its inputs and outputs
@@ -66,10 +69,17 @@ class PlantAnswer:
     source: str = ""  # the name of the data file
     against: tuple[str, ...] = ()  # what the data say against the model, a sentence each
     heard: tuple[str, ...] = ()  # how the answer was taken, a sentence each
+    time_unit: str = "s"  # of a record; all times of the spec are in it
+    units: tuple[str, str] = ("", "")  # of output and input, as the gain has them
+
+    @property
+    def clock(self) -> float:
+        """Return the seconds in the unit of time."""
+        return SECONDS[self.time_unit]
 
     @property
     def sample_time(self) -> float:
-        """Return the sample time in seconds: a twentieth of the time constant, if nothing else is known."""
+        """Return the sample time in time_unit: a twentieth of the time constant, if nothing else is known."""
         return _round_step(self.slow / 20.0) if self.sampling is None else self.sampling
 
 
@@ -91,7 +101,7 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
             return (_stepped if word.lower() == "step" else _explored)(path, stem, columns)
     if text.endswith(".json"):
         return system_of(file_of("plant", folder / text))
-    if re.search(r"\b(?:gain|integrat\w+)\b", text, re.I):
+    if re.search(rf"\b(?:gain|{INTEGRATES})\b", text, re.I):
         return plant_of_words(text)
     raise bad_answer("plant", f'"{text}" is none of these')
 
@@ -112,20 +122,19 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     An integrator has a slope in place of the gain: "integrates 0.02 %/s per %, dead time 20 s".
     """
     phrase = Phrase(text, "plant")
-    read = {name: phrase.known_within(*words) for name, words in _QUANTITIES.items()}
+    read = {name: phrase.quantity(*words) for name, words in _QUANTITIES.items()}
     found = {name: one for name, one in read.items() if one is not None}
-    values = {name: value for name, (value, _, _) in found.items()}
-    own = {name: share for name, (_, share, _) in found.items() if share is not None}
+    own = {name: one.share for name, one in found.items() if one.share is not None}
     part, whole = phrase.share(), phrase.take(ABOUT)
-    phrase.finish("known it")
-    if not values.get("slope", values.get("gain")) or {"slope", "gain"} <= values.keys():
+    phrase.finish("known it tank")
+    values = {name: one.value for name, one in found.items() if one.value}
+    if len(values.keys() & {"slope", "gain"}) != 1 or {"slope", "gain"} <= found.keys():
         raise bad_answer("plant", "it does not say the gain, or says that it is zero")
-    if "gain" in values or "time_constant" in values:
+    if "gain" in values or "time_constant" in found:
         needed(values.get("time_constant"), "plant", "the time constant")
     if values.get("dead_time", 0.0) < 0.0:
         raise bad_answer("plant", "the dead time is negative")
-    values = {name: value for name, value in values.items() if value}
-    vague = [name for name in values if name not in own and (whole or found[name][2])]
+    vague = [name for name in values if name not in own and (whole or found[name].about)]
     if part is None and len(own) == 1 and list(own) == list(values)[-1:] and not vague:
         part, own = own.popitem()[1], {}  # a share at the end is that of all quantities
     shares = own if part is None else dict.fromkeys(values, part) | own
@@ -133,23 +142,26 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         raise bad_answer("plant", "within must be more than 0 and less than 90 %")
     vague = [name for name in vague if name not in shares]
     around = _around(values, shares | dict.fromkeys(vague, VAGUE))
-    ends = (
+    ends = [
         f"{name.replace('_', ' ')} {short(around[name][0])} to {short(around[name][1])}" for name in vague
+    ]
+    taken = f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}'
+    gain = found.get("slope") or found["gain"]
+    plant = PlantAnswer(
+        (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds"),
+        values.get("time_constant", 0.0),
+        around,
+        values,
+        tunable=True,
+        heard=(f"{taken}; the design holds for all of these",) if vague else (),
+        units=(gain.size, gain.base),
     )
-    said = (
-        f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}; the design holds for all of these'
-    )
-    heard = (said,) if vague else ()
-    if "slope" in values:
-        return _integrating(head, values, around, heard)
-    lines = (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds")
-    return PlantAnswer(lines, values["time_constant"], around, values, tunable=True, heard=heard)
+    return _integrating(plant) if "slope" in values else plant
 
 
-def _integrating(
-    head: str, values: Mapping[str, float], around: Mapping[str, tuple[float, float]], heard: tuple[str, ...]
-) -> PlantAnswer:
+def _integrating(plant: PlantAnswer) -> PlantAnswer:
     """Return an integrator behind a lag and a dead time, held by a slow PI of Skogestad's rule meanwhile."""
+    values = plant.values
     late = values.get("dead_time", 0.0) + values.get("time_constant", 0.0)
     if not late:
         raise bad_answer(
@@ -158,21 +170,19 @@ def _integrating(
     below = "[time_constant, 1, 0]" if "time_constant" in values else "[1, 0]"
     delay = ", delay: dead_time" if "dead_time" in values else ""
     settings = f"Kp: {short(1.0 / (values['slope'] * _SLOWER * late))}, Ti: {short(4.0 * _SLOWER * late)}"
-    return PlantAnswer(
-        (
-            head,
+    written = f"{{numerator: [slope], denominator: {below}{delay}}}  # it is known to integrate"
+    return replace(
+        plant,
+        lines=(
+            plant.lines[0],
             f"  parameters: {_listed(values)}",
-            f"  continuous: {{numerator: [slope], denominator: {below}{delay}}}  # it is known to integrate",
-            "  sample: zoh  # what a converter holds",
+            f"  continuous: {written}",
+            plant.lines[2],
         ),
-        values.get("time_constant", late),
-        around,
-        values,
+        slow=values.get("time_constant", late),
         controller=f"{{pid: {{{settings}}}}}",
         sampling=_round_step(late / 2.0),
         why_sampling="half of dead time and lag, or a little less",
-        tunable=True,
-        heard=heard,
     )
 
 
@@ -256,14 +266,25 @@ def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dic
     return values, [f"  parameters: {{{listed}}}", f"  continuous: {written}  # it is known to integrate"]
 
 
+def unit_of_time(sheet: Sheet, name: str) -> str:
+    """Return the unit in which a column counts times: seconds, if the file does not say."""
+    from inputdesign_cli.records.columns import named_columns, time_unit_in
+
+    at = named_columns(sheet, name.lower())[0]
+    full = sheet.header[at] if at < len(sheet.header) else name
+    return time_unit_in(sheet, full, dated=sheet.columns[at].dated) or "s"
+
+
 def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     """Estimate gain, time constant and dead time from a record that begins at rest."""
     from inputdesign_cli import questions
     from inputdesign_cli.questions.building.header import read_columns
-    from inputdesign_cli.records import Preparation
+    from inputdesign_cli.records import Preparation, read_sheet
 
     wanted = {"time": "time", "u1": "u", "y1": "y"} | dict(columns)
-    t, u, y = (read_columns(path, wanted, key="plant")[role] for role in ("time", "u1", "y1"))
+    found = read_columns(path, wanted, key="plant")
+    unit = unit_of_time(read_sheet(path, key="plant"), wanted["time"])
+    t, u, y = (found[role] for role in ("time", "u1", "y1"))
     if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
         raise bad_answer("plant", f"{path.name} needs {_LEAST_ROWS} rows at least, at times that grow")
     moved, step = np.abs(u - u[0]), float(np.median(np.diff(t)))
@@ -280,7 +301,7 @@ def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     rise = (y - y[0]) / answers
     late, slow = (max(float(t[int(np.argmax(rise > part))] - t[begun]), step) for part in (0.05, 0.632))
     start = f"gain: {answers / moves!r}, time_constant: {slow!r}, dead_time: {late!r}"
-    text = f"sample_time: {step!r}\nplant: {{continuous: {{{start}}}, sample: zoh}}\n"
+    text = f"sample_time: {step!r}\ntime_unit: {unit}\nplant: {{continuous: {{{start}}}, sample: zoh}}\n"
     point = {"u1": float(u[0]), "y1": float(np.mean(y[: max(begun, 1)]))}
     spec, named = parse_spec(text, design=False), Preparation(columns=columns)
     identified = questions.identify(spec, path, operating_point=point, preparation=named)
@@ -290,8 +311,8 @@ def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     if values["time_constant"] > _LONGER * lasts:
         raise bad_answer(
             "plant",
-            f"the output in {path.name} still goes on as an integrator would, {short(lasts)} s after the "
-            "step: record until it settles, or write a plant that integrates as a file, "
+            f"the output in {path.name} still goes on as an integrator would, {short(lasts)} {unit} after "
+            "the step: record until it settles, or write a plant that integrates as a file, "
             '{"num": [0.05], "den": [1, 0], "delay": 5}',
         )
     return PlantAnswer(
@@ -303,6 +324,7 @@ def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         sampling=step,
         tunable=True,
         source=path.name,
+        time_unit=unit,
         against=() if not failed else (_REJECTED.format(", ".join(failed).replace("_", " "), path.name),),
     )
 
@@ -344,6 +366,7 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         explored=spec,
         called={channel: header for channel, header in columns.items() if channel != "time"},
         source=path.name,
+        time_unit=spec.time_unit,
         against=found.against,
         heard=(heard,) if heard else (),
     )

@@ -20,13 +20,16 @@ from inputdesign_cli.specification.yaml.reader import read
 
 @dataclass(frozen=True)
 class Question:
-    """Holds a question, the answers that it allows, and its default."""
+    """Holds a question, the answers that it allows, its default, and what the answer sets."""
 
     key: str
     asks: str
     allowed: str
     default: str | None = None
     always: bool = False  # it is asked beyond a sentence, too
+    clause: str = ""  # a pattern of words in a clause that answers it
+    part: str = ".*"  # what counts of this clause
+    sets: tuple[str, ...] = ()  # sections of the spec
 
 
 def package_data(name: str) -> Any:
@@ -37,6 +40,10 @@ def package_data(name: str) -> Any:
 QUESTIONS = tuple(Question(**entry) for entry in package_data("questions.yaml"))
 KEYS = tuple(question.key for question in QUESTIONS)
 _FAULTS = package_data("faults.yaml")
+# Sections of a spec -> their questions, the longer paths first.
+_SECTIONS = dict(
+    sorted(((path, one.key) for one in QUESTIONS for path in one.sets), key=lambda at: -len(at[0]))
+)
 _ALL = f"the questions are {', '.join(KEYS)}"
 AS_LOGGED = ("as the log", "as in the log", "as in this log")
 _COLUMNS = re.compile(r'--columns "([^"]*)"')
@@ -182,7 +189,7 @@ def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     # In open loop the only controller is that of the wish, and none holds a plant that integrates.
     held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
     by_code: dict[str, str] = _FAULTS["codes"] | ({} if held else _FAULTS["open"])
-    found = (name for path, name in _FAULTS["sections"].items() if f"{one.key}.".startswith(f"{path}."))
+    found = (name for path, name in _SECTIONS.items() if f"{one.key}.".startswith(f"{path}."))
     blamed = by_code.get(one.code) or next(found, one.key if one.key in KEYS else "")
     asked = question(blamed or key or "wish")
     begins = f"{asked.asks} ({asked.key}): "

@@ -5,25 +5,28 @@ from __future__ import annotations
 import re
 
 from inputdesign_cli.wizard.grammar import AMOUNT, NUMBER, PLUS_MINUS
-from inputdesign_cli.wizard.questions import Answers, bad_answer
+from inputdesign_cli.wizard.plants import INTEGRATES
+from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
-# The question that a clause answers: the first of which it has a word.
-_WORDS = {
-    "wish": r"\b(?:loop|margin|Kp|Ti|Td|predict\w*|parameters?|bode|frequency response)\b",
-    "noise": r"\b(?:nois\w*|fad\w*|white|drift\w*|standard deviation|std|sensor|lasts)\b|\brest \S+\.\w+",
-    "plant": r"\b(?:gain|time constant|dead time|delay|lag|integrat\w*|each)\b",
-    "hold": r"\b(?:keeps?|holds?|dwell\w*|at least|shortest)\b",
-    "converter": r"\b(?:steps?|bits|resolution)\b",
-    "return": r"\b(?:returns?|back|ends? where)\b",
-    "limits": r"\b(?:rate|output)\b",
-    "range": rf"{PLUS_MINUS}|\b(?:may|can) (?:be )?move|\baround\b|{NUMBER}\s*\S*\s+to\s+{NUMBER}",
-    "time": rf"\b{AMOUNT}",
-}
-# What is taken of a clause where it is not all.
-_PART = {"hold": AMOUNT, "time": AMOUNT, "converter": r"(?:\b\d+ bits|\bsteps?|\bresolution)\b.*"}
+_TURNS = ("wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "time")
+"""The questions that a clause may answer: the first of which it has a word."""
+_PATTERNS = {"AMOUNT": AMOUNT, "INTEGRATES": INTEGRATES, "NUMBER": NUMBER, "PLUS_MINUS": PLUS_MINUS}
 _FILE = re.compile(r"\s*(?:(?:time|[uy]\d*)\s*=|(?:step|log)\s+\S*\.\w)", re.I)  # and its columns
+_WHAT = re.compile(r"\s*(?:for\s+)?(?:an?|the|my|our)\s+\w+(?:\s+\w+)?\s*", re.I)  # "a tank", for the reader
 _LASTS = re.compile(rf"\s*\b(?:for|in|within|during)\s+({AMOUNT})\s*$", re.I)
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
+
+
+def question_of(clause: str) -> str | None:
+    """Return the question that a clause answers, by the words in it."""
+    if _FILE.match(clause):
+        return "plant"
+    return next((key for key in _TURNS if _found(question(key).clause, clause)), None)
+
+
+def _found(pattern: str, clause: str) -> re.Match[str] | None:
+    """Return the first match of a pattern, in which <NUMBER> and the like stand for pieces of the grammar."""
+    return re.search(re.sub(r"<(\w+)>", lambda name: _PATTERNS[name[1]], pattern), clause, re.I)
 
 
 def in_sentence(text: str) -> dict[str, str]:
@@ -35,16 +38,16 @@ def in_sentence(text: str) -> dict[str, str]:
     found: dict[str, list[str]] = {}
     pieces, unread = _ENDS.split(text.strip()), []
     for clause, end in zip(pieces[::2], [*pieces[1::2], ""], strict=True):
-        words = _WORDS if not _FILE.match(clause) else {"plant": ""}
-        key = next((key for key, known in words.items() if re.search(known, clause, re.I)), None)
+        key = question_of(clause)
         lasts = _LASTS.search(clause) if key in ("wish", "range") else None
         if lasts is not None:
             clause = clause[: lasts.start()]
             found.setdefault("time", []).append(lasts[1])
         if key is None:
-            unread += [clause] * bool(clause.strip() and end != ":")  # before a colon stands what it is about
+            known = end == ":" or _WHAT.fullmatch(clause) or not clause.strip()  # what it is about
+            unread += [] if known else [clause]
             continue
-        part = re.search(_PART.get(key, ".*"), clause, re.I)
+        part = _found(question(key).part, clause)
         found.setdefault(key, []).append(part[0] if part else clause)
     if len(found) < 2:
         return {}

@@ -15,6 +15,7 @@ from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.outcome.sentences import sentences
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
+from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.wizard.composing import LEAST, Solve
 
 _MOST_OF = 0.99  # of a limit, which then binds
@@ -28,7 +29,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     """Say whether a design is enough for what is asked, and which length would do, at its estimates, too.
 
     Args:
-        there: seconds that may be taken, where the experiment is shorter.
+        there: the time that may be taken, in its unit, where the experiment is shorter.
     """
     signal, robust, kept = result["signal"], result.get("robust", {}), spec.accuracy.loop
     ratio, amplitude = float(signal["worst_ratio"]), spec.limits.amplitude
@@ -63,11 +64,11 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "rivals": result.get("foreseen", {}).get("rivals"),
         "few": [one["message"] for one in result.get("findings", ()) if one["code"] == "few-samples"],
     }
-    return _said("verdict", facts)
+    return _said("verdict", facts, SECONDS[spec.time_unit])
 
 
-def _said(part: str, facts: Mapping[str, object]) -> list[str]:
-    filters = {"lasting": lasting, "decibels": decibels}
+def _said(part: str, facts: Mapping[str, object], clock: float = 1.0) -> list[str]:
+    filters = {"lasting": lambda time: lasting(time * clock), "decibels": decibels}
     return sentences("inputdesign_cli.wizard", "verdict.txt", part, facts, filters)
 
 

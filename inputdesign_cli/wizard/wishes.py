@@ -42,40 +42,40 @@ class Range:
     unit: str = ""
 
 
-def input_range(text: str) -> Range:
-    """Return the range of "valve 40 +- 5 %", of "may move +-5 around 40", or of "35 to 45"."""
-    said, number = Phrase(text, "range"), f"{NUMBER}({UNIT})"
+def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
+    """Return the range of "valve 40 +- 5 %", of "may move +-5 around 40", or of "35 to 45".
+
+    A per cent is a unit of the input here, never a share of the operating point. Where the plant has a gain
+    with another unit of the input, the range is converted into that.
+    """
+    ours = plant.units[1] if plant else ""
+    said, number = Phrase(text, "range", unit=ours), f"{NUMBER}({UNIT})"
     named = said.take(rf"\b(?:(?:the|our|my)\s+)?{_ACTUATOR}\b")
     ends = said.take(rf"(?<![-+±\w.]){number}\s*(?:to\b|\.\.)\s*{number}")
     about = None if ends else said.take(rf"(?<![-+±\w.]){number}\s*{PLUS_MINUS}\s*{number}")
-    units = [unit for found in (ends, about) if found for unit in (found[2], found[4])]
-    if ends is not None:
-        low, high = float(ends[1]), float(ends[3])
-        if not low < high:
-            raise bad_answer("range", f"{low:g} is not below {high:g}")
-        side, middle = 0.5 * (high - low), 0.5 * (low + high)
-    elif about is not None:
-        side, middle = float(about[3]), float(about[1])
+    if found := ends or about:
+        sizes = [(found[1], found[2]), (found[3], found[4])]
     else:
         around = said.take(rf"\b(?:around|about|at)\b\s*{number}")
         by = said.take(rf"(?:{PLUS_MINUS}|\bby\b)\s*{number}") or (around and said.take(number))
         if by is None:
             raise bad_answer("range", f'"{text}" is no range')
-        side, middle = float(by[1]), float(around[1]) if around else 0.0
-        units = [by[2], around[2] if around else ""]
+        sizes = [(around[1], around[2]) if around else ("0", ""), (by[1], by[2])]
     said.finish("may move moves moved can be go goes swing from it")
-    unit = next((one.strip() for one in units if one.strip()), "")
+    unit = next((one.strip() for _, one in sizes if one.strip()), "")
+    one, other = (said.sized(float(number), own.strip() or unit) for number, own in sizes)
+    middle, side = (one, other) if ends is None else (0.5 * (one + other), 0.5 * (other - one))
+    if ends is not None and not one < other:
+        raise bad_answer("range", f"{one:g} is not below {other:g}")
     name = named[1].strip() if named and named[1].lower() not in ("input", "actuator") else ""
-    return Range(needed(side, "range", "the amplitude"), middle, name, unit)
+    return Range(needed(side, "range", "the amplitude"), middle, name, ours or unit)
 
 
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
     """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
     if said["names"].lower() == "as said":
-        ratio = re.search(rf"\bgain\b\D*{NUMBER}\s*(\S+)/([^\s,;/]+)", said["plant"])
-        output, unit = (ratio[2].strip("()"), ratio[3]) if ratio else ("", "")
-        told = {"u1": (span.name, span.unit or unit), "y1": ("", output)}
+        told = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
         told |= {channel: (header, "") for channel, header in plant.called.items()}
     else:
         parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
@@ -86,10 +86,11 @@ def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dic
     return {name: kept for name, row in rows.items() if (kept := {k: v for k, v in row.items() if v})}
 
 
-def limited(text: str) -> tuple[float | None, float | None]:
-    """Return the limits on the rate, per second, and on the output."""
-    said = Phrase(text, "limits")
-    output, rate = said.after("output", named=True), said.after("rate", "rate", named=True)
+def limited(text: str, plant: PlantAnswer) -> tuple[float | None, float | None]:
+    """Return the limits on the rate, per unit of time, and on the output."""
+    said = Phrase(text, "limits", plant.clock, plant.units[0])
+    output = said.after("output", named=True)
+    rate = said.after("rate", "rate", named=True, unit=plant.units[1])
     if rate is None and output is None and text.lower() not in ("none", "no"):
         raise bad_answer("limits", f'"{text}" is none of these')
     said.finish("none no")
@@ -106,7 +107,7 @@ def controller(text: str, plant: PlantAnswer) -> str | None:
         return known[text.lower()]
     if plant.channels > 1:
         raise bad_answer("loop", f"the plant has {plant.channels} channels, and one PI has one: write open")
-    said = Phrase(text, "loop")
+    said = Phrase(text, "loop", plant.clock)
     settings = _pid(said, stated=True)
     said.finish("PI PID controller")
     return f"{{pid: {settings}}}"
@@ -116,11 +117,11 @@ def quantisation(text: str, span: Range) -> str | None:
     """Return the converter of "12 bits up to 100", or of "steps of 0.1 %", as YAML; None without one."""
     if text.lower() in ("no", "none"):
         return None
-    said = Phrase(text, "converter")
+    said = Phrase(text, "converter", unit=span.unit)
     bits, most = said.number(r"(?<![\w.+-])(\d+)\s*bits?\b"), said.after("up to|over|to|range")
     if bits is None and most is None:
         step = said.after("steps?|resolution")
-        step = said.number(rf"{NUMBER}{UNIT}") if step is None else step
+        step = said.number(rf"{NUMBER}({UNIT})") if step is None else step
         reach = abs(span.offset) + span.amplitude
         bits = max(math.ceil(math.log2(reach / needed(step, "converter", "its step") + 1.0)) + 1, _LEAST_BITS)
         most = (step or 0.0) * 2.0 ** (bits - 1)
@@ -132,11 +133,11 @@ def quantisation(text: str, span: Range) -> str | None:
     return f"{{bits: {bits:.0f}, range: {short(needed(most, 'converter', 'its range'))}}}"
 
 
-def dwell(text: str, step: float) -> int:
+def dwell(text: str, plant: PlantAnswer) -> int:
     """Return the samples for which the actuator keeps a position, in answer to "60 s" or "no"."""
     if text.lower() in ("no", "none"):
         return 1
-    return max(math.ceil(Phrase(text, "hold").seconds() / step - 1e-9), 1)
+    return max(math.ceil(Phrase(text, "hold", plant.clock).lasting() / plant.sample_time - 1e-9), 1)
 
 
 def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> list[str]:
@@ -144,9 +145,9 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
 
     Args:
         controlled: whether the experiment runs under a controller.
-        duration: of the experiment, in seconds.
+        duration: of the experiment, in the unit of time of the plant.
     """
-    said = Phrase(text, "wish")
+    said = Phrase(text, "wish", plant.clock)
     said.take(r"\bfor (?:an?|the|my|our) [a-z][^,;]*$")  # which plant, for the reader
     if said.take(r"\bloop\b"):
         return _loop(said, plant, controlled)
@@ -166,15 +167,16 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         how = f"{100 * part:g} % is 1.96 standard deviations, so that 95 % of estimates are within it"
         return [f"accuracy:  # {how}", f"  standard_deviation: {{{listed}}}"]
     begins, ends = said.band()
-    high = needed(ends, "wish", "up to which frequency (rad/s)")
+    high = needed(ends, "wish", f"up to which frequency (rad/{plant.time_unit})")
     said.finish()
     highest, step = math.pi / plant.sample_time, short(plant.sample_time)
     if high > highest:
-        why = f"a sample every {step} s, which suits this plant, reaches up to {highest:.3g} rad/s"
+        unit = plant.time_unit
+        why = f"a sample every {step} {unit}, which suits this plant, reaches up to {highest:.3g} rad/{unit}"
         raise bad_answer("wish", why)
     if kind == "prediction" and begins is None:
         begins = min(2.0 * math.pi / duration, 0.1 * high)  # one period in the experiment
-    low = needed(begins, "wish", "from which frequency (rad/s)")
+    low = needed(begins, "wish", f"from which frequency (rad/{plant.time_unit})")
     if low >= high:
         raise bad_answer("wish", f"{low:g} is not below {high:g}")
     band = f"band: [{short(low)}, {short(high)}]"

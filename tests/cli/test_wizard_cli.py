@@ -141,7 +141,7 @@ SENTENCE = (
 
 def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
     """A line that is not understood is asked for again; the rest has its default where the lines end."""
-    monkeypatch.setattr("sys.stdin", io.StringIO("soon\n1 min\nsteps of 0.1\n"))
+    monkeypatch.setattr("sys.stdin", io.StringIO("soon\nconverter: steps of 0.1\n1 min\n"))
     code, out, err = run("wizard", SENTENCE, "-o", "mine.yaml")
     assert (code, err.count("error[bad-answer]")) == (0, 1)
     assert "How long must the actuator keep each position? (Enter: no) 1 min" in err

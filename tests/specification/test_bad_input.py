@@ -44,6 +44,14 @@ ROWS: list[Row] = [
     ("empty-value", "plant.F", "no value", {"plant": "{B: [0, 1], §F: null}"}),
     ("empty-value", "accuracy.model_error.45", "decimal point", {
         "accuracy": "{model_error: {relative: 0.01, alpha: 2,§45}}"}),
+    # What states the variance, too, is not missed a second time.
+    ("empty-value", "noise.standard_deviation", "no value", {"noise": "{§standard_deviation: null}"}),
+    ("empty-value", "noise.standard_deviation", "no value", {
+        **STEP, "noise": "{§standard_deviation: null, correlation_time: 60}"}),
+    ("empty-value", "noise.correlation_time", "no value", {
+        "noise": "{standard_deviation: 1, §correlation_time: null}"}),
+    ("empty-value", "simulation.noise.standard_deviation", "no value", {
+        "simulation": "{noise: {§standard_deviation: null}}"}),
     ("duplicate-key", "plant.B", "twice, on line 1", {"plant": "{B: [0, 1], §B: [0, 2]}"}),
     # kinds of values
     ("wrong-shape", "plant", "mapping", {"plant": "§3"}),
