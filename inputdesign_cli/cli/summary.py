@@ -23,7 +23,7 @@ Line = tuple[str, str]
 
 
 def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced: bool = False) -> str:
-    """Return a result in lines: what was asked, its cost, what is proved, the error reached, and the files.
+    """Return a result in lines: what was asked, its cost, what is proved, the error reached, and the folder.
 
     Lines whose numbers the result does not have are left out.
 
@@ -38,7 +38,7 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
         *_named("proved", said("proofs", outcome)),
         *_simulated(outcome),
         *(("note", text) for text in outcome.notes or ()),
-        *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
+        *(("files", str(file.parent)) for file in files[:1]),
         *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
     ]
     title = outcome.title
