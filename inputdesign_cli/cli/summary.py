@@ -23,7 +23,7 @@ Line = tuple[str, str]
 
 
 def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced: bool = False) -> str:
-    """Return a result in lines: what was asked, its cost, what is proved, the error reached, and the files.
+    """Return a result in lines: what was asked, its cost, what is proved, the error reached, and the folder.
 
     Lines whose numbers the result does not have are left out.
 
@@ -32,8 +32,8 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
     """
     lines = [
         *_lines(facts(outcome, part="campaign_stands")),
-        *(_trouble(outcome) if _is_trouble(outcome) else _told(outcome, time_unit)),
-        *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
+        *(_trouble(outcome) if _is_trouble(outcome) else _everything(outcome, time_unit)),
+        *(("files", str(file.parent)) for file in files[:1]),
         *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
     ]
     title = outcome.title
@@ -54,7 +54,7 @@ def _trouble(outcome: Outcome) -> Iterator[Line]:
         yield "note", f"{more} more in report.html and result.json; most follow from this one"
 
 
-def _told(outcome: Outcome, time_unit: str) -> list[Line]:
+def _everything(outcome: Outcome, time_unit: str) -> list[Line]:
     """Return what was found and proved, with all notes."""
     return [
         *_data(outcome, time_unit),

@@ -98,7 +98,7 @@ def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
         if done.first_failure is not None:
             diagnostic = done.first_failure.diagnostics[0]
             lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
-        lines.append(("files", f"{done.directory}: {', '.join(path.name for path in done.files)}"))
+        lines.append(("files", str(done.directory)))
         typer.echo("\n".join(aligned(lines, gap=3, wrap=True)))
     if done.statuses.get("error") or done.statuses.get("lost"):
         raise typer.Exit(EXIT_INTERNAL)

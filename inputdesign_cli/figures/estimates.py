@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures import style
@@ -14,10 +16,11 @@ from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.results import Array
 
 _POINTS = 200  # of an ellipse
-_TICKS = 2  # intervals between numbers: these are wide for three columns
-_LEAST_SHOWN = -20.0  # per cent of fit
+_PANEL, _ROW = 2.3, 0.3  # inches that a panel takes, and the share of a page that each row beyond two adds
+_BEHIND = (0.01, 100.0)  # points of fit below the best that are told apart
 _OPAQUE = 0.8
 _NUMBERED = 8  # rows up to which the entries are written into the cells
+_MOST_NUMBERS = 10  # along a matrix
 _COLOURS = (BLUE, ORANGE, GREEN, GREY)
 # With few runs, fine bins would show each run separately.
 _FEWEST_BINS, _BINS, _RUNS_A_BIN = 6, 40, 4
@@ -27,9 +30,11 @@ _WIDE = 5.0  # costs beyond it are shown over their logarithm
 
 
 def _panels(page: Figure, number: int, columns: int) -> list[Axes]:
-    """Return axes for a number of panels, row by row."""
-    columns = min(columns, number)
-    grid = list(page.subplots(-(-number // columns), columns, squeeze=False).flat)
+    """Return axes for a number of panels, row by row, in at most this many columns."""
+    columns = min(columns, number, int(style.width_for(page) // _PANEL))
+    rows = -(-number // columns)
+    page.set_figheight((1.0 + _ROW * max(rows - 2, 0)) * page.get_figheight())
+    grid = list(page.subplots(rows, columns, squeeze=False).flat)
     for axes in grid[number:]:
         axes.set_axis_off()
     for axes in grid[:number]:
@@ -50,36 +55,25 @@ def boundary(center: Array, covariance: Array, probability: float) -> Array:
 
 
 def draw_ellipses(page: Figure, curves: of.EllipseCurves, time_unit: str) -> None:
-    """Draw for each pair of parameters the ellipse that holds the estimate with the title's probability."""
-    label = f"{100 * curves.probability:g} % of estimates"
-    for axes, pair in zip(_panels(page, len(curves.pairs), 3), curves.pairs, strict=True):
-        axes.locator_params(axis="x", nbins=_TICKS)
+    """Draw for each pair of parameters the ellipse that holds this share of estimates, and those of runs."""
+    runs = any(pair.estimates is not None for pair in curves.pairs)
+    share = f"{100 * curves.probability:g} % {'ellipse of theory' if runs else 'of estimates'}"
+    for axes, pair in zip(_panels(page, len(curves.pairs), 2 if runs else 3), curves.pairs, strict=True):
+        if pair.estimates is not None:
+            (dots,) = axes.plot(*pair.estimates.T, ".", color=BLUE, markersize=2.5, alpha=0.5)
+            dots.set(rasterized=True, label=f"{len(pair.estimates)} estimates")
         outline = boundary(pair.center, pair.covariance, curves.probability)
-        axes.plot(*outline, color=BLUE, linewidth=1.8, label=label)
+        axes.plot(*outline, color=ORANGE if runs else BLUE, linewidth=1.8, label=share)
         if pair.white is not None:
             outline = boundary(pair.center, pair.white, curves.probability)
             axes.plot(*outline, color=GREY, linestyle=DASHED, linewidth=1.2, label="flat input")
-        axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
+        (center,) = axes.plot(*pair.center, "+", color=BLACK, markersize=9, markeredgewidth=1.6)
+        center.set_label("truth" if runs else "nominal")
         axes.set(xlabel=pair.names[0], ylabel=pair.names[1])
+        low, high = axes.get_xlim()
+        inside = [tick for tick in axes.get_xticks() if low <= tick <= high]
+        axes.set_xticks(inside[:: max(len(inside) - 1, 1)])  # numbers are wide for three columns
     style.legend_over_all(page)
-
-
-def draw_cloud(page: Figure, curves: of.CloudCurves, time_unit: str) -> None:
-    """Draw for each pair of parameters the estimates as dots, with the ellipse that theory predicts."""
-    for axes, (i, j) in zip(_panels(page, len(curves.pairs), 2), curves.pairs, strict=True):
-        pair = np.array([i, j])
-        axes.plot(*curves.theta[:, pair].T, ".", color=BLUE, markersize=2.5, alpha=0.5, rasterized=True)
-        outline = boundary(curves.centre[pair], curves.covariance[np.ix_(pair, pair)], curves.probability)
-        axes.plot(*outline, color=ORANGE, linewidth=1.8)
-        axes.plot(*curves.centre[pair], "+", color=BLACK, markersize=9, markeredgewidth=1.6)
-        axes.set(xlabel=curves.names[i], ylabel=curves.names[j])
-    share = f"{100 * curves.probability:g} % ellipse of theory"
-    handles = [
-        Line2D([], [], color=BLUE, marker=".", linestyle="none", label=f"{len(curves.theta)} estimates"),
-        Line2D([], [], color=ORANGE, label=share),
-        Line2D([], [], color=BLACK, marker="+", linestyle="none", label="truth"),
-    ]
-    style.legend_over_all(page, handles)
 
 
 def draw_estimates(page: Figure, curves: of.EstimateCurves, time_unit: str) -> None:
@@ -97,21 +91,25 @@ def draw_estimates(page: Figure, curves: of.EstimateCurves, time_unit: str) -> N
 
 
 def draw_orders(page: Figure, curves: of.OrderCurves, time_unit: str) -> None:
-    """Draw the fit of simulations to validation data over the number of parameters, family by family."""
+    """Draw how far the fit of each structure stays behind the best, in decades, over its parameters."""
     axes = page.subplots()
-    least = 0.0
+    best = max(float(np.max(fit)) for _, fit in curves.fits.values())
     for number, (family, (sizes, fit)) in enumerate(curves.fits.items()):
         color, marker = style.point(number)
-        shown = np.maximum(fit, _LEAST_SHOWN)
-        least = min(least, float(np.min(fit, initial=0.0)))
-        axes.plot(sizes, shown, marker, color=color, markersize=5, alpha=0.8, label=family)
-    label = f"chosen: {curves.family}"
-    axes.plot(*curves.chosen, "o", markersize=12, markerfacecolor="none", color=BLACK, label=label)
+        behind = np.clip(best - fit, *_BEHIND)
+        axes.plot(sizes, behind, marker, color=color, markersize=5, alpha=0.8, label=family)
+    size, chosen = curves.chosen
+    (ring,) = axes.plot(size, np.clip(best - chosen, *_BEHIND), "o", color=BLACK, markersize=12)
+    ring.set(markerfacecolor="none", label=f"chosen: {curves.family}, fit {chosen:.4g} %")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_yscale("log")
+    axes.set_ylim(1.6 * _BEHIND[1], 0.6 * _BEHIND[0])
+    ticks = np.geomspace(*_BEHIND, 5)
+    axes.set_yticks(ticks, ["0.01\nor less", *(f"{tick:g}" for tick in ticks[1:-1]), "100\nor more"])
     name = "y" if curves.output is None else f"y{curves.output + 1}"
-    worse = f"; below {_LEAST_SHOWN:g}: there" if least < _LEAST_SHOWN else ""
     which = "unseen data" if curves.unseen else "the data that estimate"
-    axes.set(xlabel="parameters", ylabel=f"fit of {name} on {which} (%{worse})")
+    axes.set_xlabel("parameters")
+    axes.set_ylabel(f"points of fit below the best ({best:.4g} %),\nof {name} on {which}")
     style.legend_over_all(page)
 
 
@@ -134,8 +132,9 @@ def _draw_matrix(axes: Axes, curves: of.MomentsCurves) -> None:
     largest = float(np.abs(R).max())
     drawn = axes.imshow(R, cmap="RdBu", vmin=-largest, vmax=largest, alpha=_OPAQUE)
     axes.grid(False)
-    axes.set_xticks(range(n), [str(i + 1) for i in range(n)])
-    axes.set_yticks(range(n), [str(i + 1) for i in range(n)])
+    numbered = range(0, n, 1 + n // _MOST_NUMBERS)
+    axes.set_xticks(numbered, [str(i + 1) for i in numbered])
+    axes.set_yticks(numbered, [str(i + 1) for i in numbered])
     axes.set_title(f"R, trace {np.trace(R):.5g}; framed: estimated", loc="left")
     inner, edge = m - 0.5, -0.5
     axes.plot([edge, inner, inner], [inner, inner, edge], color=BLACK, linewidth=1.6)
@@ -189,20 +188,21 @@ def draw_true_ratio(page: Figure, curves: of.RatioCurves, time_unit: str) -> Non
     bins = (1.0 + step * np.arange(np.floor((low - 1.0) / step), np.ceil((top - 1.0) / step) + 1.0)).tolist()
     for (name, ratios), colour in zip(curves.ratios.items(), PALETTE, strict=False):
         filled = name == "campaign"
-        axes.hist(
-            np.minimum(ratios, bins[-1]),
-            bins=bins,
-            weights=np.full(ratios.size, 100.0 / max(ratios.size, 1)),
-            color=colour,
-            alpha=0.45 if filled else 1.0,
-            histtype="stepfilled" if filled else "step",
-            linewidth=1.4,
-            label=name.replace("_", " "),
-        )
+        shown, label = np.minimum(ratios, bins[-1]), name.replace("_", " ")
+        kind = "stepfilled" if filled else "step"
+        _histogram(axes, shown, bins, colour, label, alpha=0.45 if filled else 1.0, histtype=kind)
     axes.axvline(1.0, color=BLACK, linestyle=DASHED)
     axes.set_xlabel("largest r_u / r_adm of the true plant\n(beyond the last bin: in it)")
-    axes.set_ylabel("share of the runs (%)")
     style.legend_over_all(page)
+
+
+def _histogram(
+    axes: Axes, values: Array, bins: Sequence[float], colour: str, label: str, **look: Any
+) -> None:
+    """Draw the shares of the runs by bin, in per cent."""
+    weights = np.full(values.size, 100.0 / max(values.size, 1))
+    axes.hist(values, bins=bins, weights=weights, color=colour, label=label, linewidth=1.4, **look)
+    axes.set_ylabel("share of the runs (%)")
 
 
 def draw_trade(page: Figure, curves: of.TradeCurves, time_unit: str) -> None:
@@ -231,12 +231,11 @@ def draw_loss(page: Figure, curves: of.LossCurves, time_unit: str) -> None:
     bins = np.linspace(0.0, top, _BINS + 1).tolist()
     for index, (name, loss) in enumerate(curves.losses.items()):
         colour = _COLOURS[index % len(_COLOURS)]
-        weights = np.full(loss.size, 100.0 / loss.size)
         label = f"{name}: mean {loss.mean():.4g}, sd {loss.std(ddof=1):.4g}"
-        axes.hist(loss, bins=bins, weights=weights, color=colour, alpha=0.45, label=label)
+        _histogram(axes, loss, bins, colour, label, alpha=0.45)
         axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
         if name in curves.theory:
             axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
     axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
-    axes.set(ylabel="share of the runs (%)", xlim=(0.0, top))
+    axes.set_xlim(0.0, top)
     style.legend_above(axes)

@@ -36,6 +36,7 @@ _FAR = 1e-2
 _MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
 
 
+LIMITING = "limiting frequencies"  # at which a requirement binds: rings mark them
 P = TypeVar("P", bound=of.Panel)
 _DISCS = 36
 # Of the plane, what is shown: so far around -1 and 0 the loop decides on its margins.
@@ -145,7 +146,7 @@ def _plot_error(axes: Axes, curves: of.BoundPanel) -> None:
         gain = np.maximum(curves.G_abs, least)  # one that vanishes would stretch the axis without end
         axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
-    style.marked(axes, curves.active, height, label=style.limiting_label(curves.active.size))
+    style.marked(axes, curves.active, height, label=LIMITING)
 
 
 def _plot_ratios(axes: Axes, panels: Sequence[of.BoundPanel]) -> None:
@@ -241,18 +242,19 @@ def _phase(axes: Axes, panel: of.ResponsePanel, of_data: str, of_model: str) -> 
 
 
 def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
-    """Draw a line for every plant, the binding plants in colour; no ratio may exceed one."""
+    """Draw a line for every plant, the binding plants in colour with their parameters; one is the limit."""
     axes = page.add_subplot()
     style.plain_decades(axes, "y")
-    w, rows = curves.frequency, curves.ratios[:_MOST_LINES]
+    w, rows, number = curves.frequency, curves.ratios[:_MOST_LINES], len(curves.ratios)
     width = 0.5 if len(rows) > 20 else 0.8
-    axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
-    if len(rows):
-        largest = f"largest of {len(curves.ratios)} plants"
-        axes.plot(w, curves.ratios.max(axis=0), color=GREY, linewidth=width, label=largest)
+    if number:
+        each = axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
+        each[0].set_label(f"each of {number} plants")
+        largest, label = curves.ratios.max(axis=0), f"largest of {number} plants"
+        axes.plot(w, largest, color=GREY, linestyle=DOTTED, linewidth=1.4, label=label)
     axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
     for (name, ratio), color in zip(list(curves.active.items())[:MOST_NAMED], OTHERS, strict=False):
-        axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
+        axes.plot(w, ratio, color=color, linewidth=1.4, label=f"binding: {name}")
     shown = rows if len(rows) else curves.nominal
     top = 1.3 * max(float(shown.max()), 1.0)
     style.plot_limit(axes, top)
@@ -332,8 +334,7 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     limiting = np.interp(curves.limiting, curves.frequency, L)
     limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
     if limiting.size:
-        label = style.limiting_label(limiting.size)
-        style.marked(axes, limiting.real, limiting.imag, label=label)
+        style.marked(axes, limiting.real, limiting.imag, label=LIMITING)
     axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)
     axes.annotate("−1", (-1.0, 0.0), (4, 5), textcoords="offset points")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)

@@ -17,7 +17,6 @@ from inputdesign_cli.outcome.results import Results
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.BoundCurves: frequency.draw_bound,
     of.CampaignCurves: estimates.draw_campaign,
-    of.CloudCurves: estimates.draw_cloud,
     of.DeviationCurves: frequency.draw_deviations,
     of.DirectionCurves: spectrum.draw_directions,
     of.EllipseCurves: estimates.draw_ellipses,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -21,10 +20,11 @@ _MARGIN = 0.08  # above and below, as a share of the range shown
 _HIGHER = 0.25  # of the page, for each row beyond the second
 _BAND = 2.0  # standard deviations
 _LIMIT: dict[str, Any] = {"color": ORANGE, "linewidth": 1.2, "linestyle": DASHED, "label": "limits"}
-# A record up to the first length is drawn whole, of a longer one the second number of samples.
+# Of a record beyond the first length, the second number of samples is shown more closely.
 _WHOLE, _PART = 600, 400
 _AS_LIVELY = 0.5
-_LINE = 2e-3  # the width of a curve, as a share of the height drawn
+_POINTS = 3000  # of a curve that a page can show
+_GAP = 1.5  # sample times between two records that follow each other
 
 
 def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
@@ -112,82 +112,95 @@ def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> No
     axes.set_ylim(shown)
 
 
-def _stretch(outputs: Sequence[Array]) -> slice:
-    """Return the first samples of outputs (n,), or the window where they vary most, if that is far more."""
-    size = len(outputs[0])
-    if size <= _WHOLE:
-        return slice(0, size)
-    begins = np.arange(0, size - _PART + 1, _PART // 4)
-    moves = np.zeros(begins.size)
-    for y in outputs:
-        windows = np.lib.stride_tricks.sliding_window_view(y, _PART)[begins]
-        moves += np.nanvar(windows, axis=1) / max(float(np.nanvar(y)), 1e-300)
-    best = int(np.argmax(moves))
-    begin = 0 if moves[0] >= _AS_LIVELY * moves[best] else int(begins[best])
+def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
+    """Draw each output with its simulation and its one-step prediction over the whole record.
+
+    Below a single output are its residuals and, of a long record, the part in which it moves most. No curve
+    goes from one record to the next: gaps are shaded, and other borders are dotted.
+    """
+    single, size = len(curves.panels) == 1, curves.time.size
+    whole = closer = slice(0, size)
+    heights = [2] * len(curves.panels) + [1] * single
+    if single and size > _WHOLE:
+        closer = _liveliest(curves.panels[0].y)
+        heights.append(2)
+        page.set_figheight((1.0 + _HIGHER) * page.get_figheight())
+    axes = page.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+    places = [(place, panel, whole) for place, panel in zip(axes, curves.panels, strict=False)]
+    if closer != whole:
+        places.append((axes[2], curves.panels[0], closer))
+    for place, panel, part in places:
+        _draw_outputs(place, curves, panel, part, single=single)
+    if single:
+        residual = curves.panels[0].y - curves.panels[0].predicted
+        axes[1].plot(*_drawn(curves, residual, whole), color=BLUE, linewidth=0.8)
+        axes[1].set_ylabel("residual")
+    ends = np.concatenate([curves.time[[0, -1]], curves.left_out])
+    over, last = (axes[:2], axes[1]) if single else (axes, axes[-1])
+    for place in axes:
+        _mark_borders(place, curves)
+    for place in over:
+        place.set_xlim(ends.min(), ends.max())
+        place.tick_params(labelbottom=place is last)
+    last.set_xlabel(f"time ({time_unit})")
+    if closer != whole:
+        axes[2].set_xlim(*curves.time[[closer.start, closer.stop - 1]])
+        axes[2].set_xlabel(f"time ({time_unit}); samples {closer.start + 1} to {closer.stop} of {size}")
+    style.legend_over_all(page)
+
+
+def _liveliest(y: Array) -> slice:
+    """Return the window of a long output (n,) in which it varies most; the first one if that is as lively."""
+    begins = np.arange(0, y.size - _PART + 1, _PART // 4)
+    moves = np.nanvar(np.lib.stride_tricks.sliding_window_view(y, _PART)[begins], axis=1)
+    begin = 0 if moves[0] >= _AS_LIVELY * moves.max() else int(begins[np.argmax(moves)])
     return slice(begin, begin + _PART)
 
 
-def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
-    """Draw each output with its simulation and its one-step prediction; below a single output its residuals.
+def _drawn(curves: FitCurves, values: Array, part: slice) -> tuple[Array, Array]:
+    """Return times and values of a part of (n,) as a page can show them, with a gap between two records."""
+    at, begins = np.arange(part.start, part.stop), np.cumsum(curves.lengths, dtype=np.int64)[:-1]
+    if at.size > _POINTS:  # of each column of the page a gap, the least and the largest value
+        gap = np.isnan(values)
+        marked = (gap, np.where(gap, -np.inf, -values), np.where(gap, -np.inf, values))
+        columns = np.array_split(at, _POINTS // 3)
+        at = np.unique([column[np.argmax(mark[column])] for column in columns for mark in marked])
+    gaps = np.searchsorted(at, begins[(begins > part.start) & (begins < part.stop)])
+    return np.insert(curves.time[at], gaps, np.nan), np.insert(values[at], gaps, np.nan)
 
-    Records are parted: no curve goes from one to the next, and their borders are marked.
-    """
-    single = len(curves.panels) == 1
-    rows = 2 if single else len(curves.panels)
-    axes = page.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[2, 1] if single else None)[:, 0]
-    part, size, unit = _stretch([panel.y for panel in curves.panels]), curves.time.size, time_unit
-    begins = np.cumsum(curves.lengths, dtype=np.int64)[:-1]
-    begins = begins[(begins > part.start) & (begins < part.stop)] - part.start
 
-    def shown(values: Array) -> Array:
-        return np.insert(values[part], begins, np.nan)  # no curve goes from one record to the next
-
-    if part.stop - part.start < size:
-        told = f"samples {part.start + 1} to {part.stop}" if part.start else f"first {_PART}"
-        unit = f"{time_unit}; {told} of {size}{'' if part.start else ' samples'}"
-    axes[-1].set_xlabel(f"time ({unit})")
-    axes[-1].set_xlim(curves.time[part][0], curves.time[part][-1])
-    time = shown(curves.time)
-    same = all(_coincide(panel, part) for panel in curves.panels)
-    for panel, place in zip(curves.panels, axes, strict=False):
-        percent = "" if panel.fit is None else f"fit {panel.fit:.1f} %"
-        recorded, simulated = ("y" if single else "recorded"), "simulated from u"
-        if single and percent:
-            simulated += f" ({percent})"
-        place.plot(time, shown(panel.y), color=BLACK, linewidth=1.0, label=recorded)
-        label = "predicted one step ahead" + f", and {simulated}" * same
-        place.plot(time, shown(panel.predicted), color=BLUE, linewidth=1.0, label=label)
-        if panel.simulated is not None and not same:
-            place.plot(time, shown(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated)
-        if panel.label:
-            _name(place, f"y{panel.output + 1}", panel.label, "")
-        else:
-            place.set_ylabel("output")
-        if not single:
-            name = f"y{panel.output + 1}"
-            place.set_title(", ".join(filter(None, (name, percent))), loc="left", color=GREY)
-            place.set_label(name)
-    if single:
-        (panel,) = curves.panels
-        axes[1].plot(time, shown(panel.y - panel.predicted), color=BLUE, linewidth=0.8)
-        axes[1].set_ylabel("residual")
-    drawn = curves.time[part]
-    borders = 0.5 * (drawn[begins - 1] + drawn[begins])
-    for place, at in product(axes, borders.tolist()):
-        place.axvline(at, color=GREY, linestyle=DOTTED, linewidth=1.2, label="another record begins")
-    if single:
-        style.legend_above(axes[0])
+def _draw_outputs(place: Axes, curves: FitCurves, panel: FitPanel, part: slice, *, single: bool) -> None:
+    """Draw an output, its prediction and, in dashes that show what lies below, its simulation."""
+    name, percent = f"y{panel.output + 1}", "" if panel.fit is None else f"fit {panel.fit:.1f} %"
+    simulated = "simulated from u" + (f" ({percent})" if single and percent else "")
+    place.plot(*_drawn(curves, panel.y, part), color=BLACK, linewidth=1.6, label="recorded")
+    place.plot(
+        *_drawn(curves, panel.predicted, part), color=BLUE, linewidth=1.0, label="predicted one step ahead"
+    )
+    if panel.simulated is not None:
+        x, y = _drawn(curves, panel.simulated, part)
+        place.plot(x, y, color=ORANGE, linewidth=1.2, linestyle=DASHED, label=simulated)
+    if panel.left_out is not None and part.stop - part.start == curves.time.size:
+        place.plot(curves.left_out, panel.left_out, ".", color=GREY, markersize=2, label="left out")
+    if panel.label:
+        _name(place, name, panel.label, "")
     else:
-        style.legend_over_all(page)
+        place.set_ylabel("output")
+    if not single:
+        place.set_title(", ".join(filter(None, (name, percent))), loc="left", color=GREY)
+        place.set_label(name)
 
 
-def _coincide(panel: FitPanel, shown: slice) -> bool:
-    """Return whether prediction and simulation are one curve to the eye, as where the noise is white."""
-    if panel.simulated is None:
-        return False
-    y, predicted, simulated = panel.y[shown], panel.predicted[shown], panel.simulated[shown]
-    width = _LINE * float(np.nanmax(y) - np.nanmin(y))
-    return np.allclose(predicted, simulated, rtol=0.0, atol=width, equal_nan=True)
+def _mark_borders(place: Axes, curves: FitCurves) -> None:
+    """Shade the gaps between records, and draw a dotted line where one follows the other at once."""
+    step = float(np.median(np.diff(curves.time))) if curves.time.size > 1 else 0.0
+    for begin in np.cumsum(curves.lengths, dtype=np.int64)[:-1].tolist():
+        before, after = curves.time[begin - 1 : begin + 1].tolist()
+        if after - before > _GAP * step:
+            place.axvspan(before, after, color=GREY, alpha=0.15, linewidth=0, label="not in the estimate")
+        else:
+            at = 0.5 * (before + after)
+            place.axvline(at, color=GREY, linestyle=DOTTED, linewidth=1.2, label="another record begins")
 
 
 def draw_residuals(page: Figure, curves: ResidualCurves, time_unit: str) -> None:

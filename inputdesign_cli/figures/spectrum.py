@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,7 +16,7 @@ LOG_FROM = 100.0  # a density whose peak is further above the white level reads 
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
 # Entries of a nearly singular spectrum lie on each other: the dashes let the lower ones show through.
 DASHES: tuple[LineStyleType, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
-NOTHING = 1e-9  # of the largest entry: below, and closer to another one, there is rounding only
+NOTHING = 1e-9  # of the largest entry: below there is rounding only
 MOST = 6  # curves that stay apart in one panel
 FEW = 60  # lines that are drawn bold
 _BESIDE = 1.1
@@ -62,8 +60,11 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     entries = np.asarray(np.abs(curves.spectrum), dtype=float)
     pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    for number, (label, values) in enumerate(_told_apart(entries, pairs)[:MOST]):
-        _plot_power(above, w, values, lines=curves.lines, number=number, label=label)
+    peaks = np.max(entries, axis=0, initial=0.0)
+    there = [(i, j) for i, j in pairs if peaks[i, j] > NOTHING * peaks.max()]
+    for number, (i, j) in enumerate(there[:MOST]):
+        label = f"|Φ{style.lowered(i + 1, j + 1)}|"
+        _plot_power(above, w, entries[:, i, j], lines=curves.lines, number=number, label=label)
     if curves.record is not None:
         drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
         drawn[0].set_label("record, smoothed")
@@ -87,26 +88,6 @@ def _room(w: Array) -> Array:
     """Return the frequencies of lines with margins on both sides: a line on an axis is not seen."""
     shown = w[w > 0]
     return np.array([*w, shown.min() / _BESIDE, shown.max() * _BESIDE]) if shown.size else w
-
-
-def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Array]]:
-    """Return the moduli (n,) of entries (n, r, r) by label.
-
-    Entries that coincide share one label; entries within rounding of zero are left out.
-    """
-    found: list[tuple[list[str], Array]] = []
-    peak = float(entries.max(initial=0.0))
-    for i, j in pairs:
-        values = entries[:, i, j]
-        if float(values.max(initial=0.0)) <= NOTHING * peak:
-            continue
-        name = f"|Φ{style.lowered(i + 1, j + 1)}|"
-        same = [names for names, other in found if np.abs(values - other).max() <= NOTHING * peak]
-        if same:
-            same[0].append(name)
-        else:
-            found.append(([name], values))
-    return [(" = ".join(names), values) for names, values in found]
 
 
 def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> None:
@@ -143,12 +124,13 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     axes.set_ylim(0.0, 1.08 * top)
     axes.set_ylabel("relative worth of excitation")
     style.frequency_axis(axes, w, time_unit)
-    page.suptitle(
-        "A unit of cost buys nowhere more than where the optimum has its power:\n"
-        "no other spectrum can do better than the proved bound",
-        x=0.01,
-        ha="left",
+    title = (
+        "No frequency gives more accuracy per unit of cost than those that the design excites: "
+        "no other spectrum does better than the proved bound."
     )
+    if curves.record_bound is not None:
+        title += f" Bound over all records within the amplitude: {curves.record_bound:.6g}."
+    style.title_above(page, title)
     style.legend_above(axes)
 
 

@@ -209,6 +209,8 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
         log_axes(axes, "x")
     if positive.size > 1:
         axes.set_xlim(positive.min(), positive.max())
+        if positive.max() < _EVEN * positive.min():
+            plain_decades(axes, "x")
     axes.set_xlabel(frequency_label(time_unit))
 
 
@@ -273,11 +275,6 @@ def plot_limit(axes: Axes, top: float) -> Line2D:
     return axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit")
 
 
-def limiting_label(count: int) -> str:
-    """Return the label of rings, which mark the frequencies where a requirement binds."""
-    return "limiting frequency" if count == 1 else "limiting frequencies"
-
-
 def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
     """Draw the admitted error r_adm as a dashed line with a shade beyond it, alike in all figures.
 
@@ -332,14 +329,22 @@ def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.3, **form)
 
 
+def width_for(page: Figure) -> float:
+    """Return the width of a page in inches, were its text of the usual size."""
+    return page.get_figwidth() * TYPE_SIZE / float(mpl.rcParams["font.size"])
+
+
 def _form(handles: Sequence[Artist], page: Figure) -> dict[str, Any]:
     labels = [str(handle.get_label()) for handle in handles]
-    return {"ncols": _columns(labels, page.get_figwidth()), "handlelength": 2.0, "columnspacing": 1.2}
+    return {
+        "ncols": _columns(labels, _LETTERS_PER_INCH * width_for(page)),
+        "handlelength": 2.0,
+        "columnspacing": 1.2,
+    }
 
 
-def _columns(labels: Sequence[str], inches: float) -> int:
-    """Return the most columns of a legend, filled one after the other, for which the page is wide enough."""
-    room = inches * _LETTERS_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
+def _columns(labels: Sequence[str], room: float) -> int:
+    """Return the most columns of a legend, filled one after the other, that fit into `room` letters."""
     for columns in range(len(labels), 1, -1):
         shared = np.array_split([_width(label) for label in labels], columns)
         widest = [float(max(widths)) for widths in shared]
@@ -360,8 +365,7 @@ def title_above(page: Figure, title: str) -> None:
 
 
 def _wrapped(page: Figure, title: str) -> str:
-    letters = page.get_figwidth() * _TITLE_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
-    return textwrap.fill(title, max(int(letters), 1))
+    return textwrap.fill(title, max(int(_TITLE_PER_INCH * width_for(page)), 1))
 
 
 def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str = "") -> None:

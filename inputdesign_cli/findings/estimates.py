@@ -9,7 +9,6 @@ from inputdesign_cli.findings.refuted_structure import quantities
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.outcome.model_words import blocks_of, predictor_of
-from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 
@@ -174,6 +173,6 @@ def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> 
         f"{letter} of order {max(len(row) for row in (rows if isinstance(rows[0], list) else [rows])) - 1}"
         for letter, rows in noise.items()
     ]
-    fact = f"{' and '.join(orders)}, since the residuals were not white (probability {chance(probability)})"
+    fact = f"{' and '.join(orders)}, since the residuals with that of the spec were not white"
     stated = ", ".join(f"{letter}: {rows}" for letter, rows in noise.items())
     return [kind.found(fact, where="noise", probability=probability, noise=stated)]

@@ -133,13 +133,14 @@ class DeviationCurves(Curves):
 class OptimalityCurves(Curves):
     """Holds the equivalence-theorem ratio over frequency: at most one, and one on the support.
 
-    `within` is that of the bound over all records within an amplitude, where there is one.
+    `within` is that of the bound over all records within an amplitude, `record_bound`, where there is one.
     """
 
     frequency: Array
     ratio: Array
     support: Array
     within: Array | None = None
+    record_bound: float | None = None
 
 
 @dataclass(frozen=True)
@@ -192,12 +193,16 @@ class TradeCurves(Curves):
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Holds the predicted confidence region of a pair of parameters: values and (2, 2) covariances."""
+    """Holds the predicted confidence region of a pair of parameters: values and (2, 2) covariances.
+
+    `estimates` (runs, 2) are those of simulated experiments with the truth at the center.
+    """
 
     names: tuple[str, str]
     center: Array  # (2,)
     covariance: Array
     white: Array | None = None  # of white excitation within the same limits
+    estimates: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -205,18 +210,6 @@ class EllipseCurves(Curves):
     """Holds confidence ellipses of some pairs, all at one `probability`."""
 
     pairs: tuple[Ellipse, ...]
-    probability: float = 0.95
-
-
-@dataclass(frozen=True)
-class CloudCurves(Curves):
-    """Holds estimates of many runs in some planes of the parameters, and the theoretical covariance."""
-
-    names: tuple[str, ...]
-    pairs: tuple[tuple[int, int], ...]
-    theta: Array  # (runs, k)
-    centre: Array  # (k,) the truth
-    covariance: Array  # (k, k) in theory
     probability: float = 0.95
 
 
@@ -240,7 +233,10 @@ class ErrorBandCurves(Curves):
 
 @dataclass(frozen=True)
 class FitPanel:
-    """Holds a recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
+    """Holds a recorded output, its one-step prediction and its simulation from the input; arrays (n,).
+
+    `left_out` are the samples (m,) of the output that the estimate does without.
+    """
 
     y: Array
     predicted: Array
@@ -248,15 +244,20 @@ class FitPanel:
     fit: float | None = None  # per cent
     output: int = 0  # from zero
     label: str = ""  # its name and unit, where there are any
+    left_out: Array | None = None
 
 
 @dataclass(frozen=True)
 class FitCurves(Curves):
-    """Holds the fit of a model to the data of its estimate, output by output, over `time` (n,)."""
+    """Holds the fit of a model to the data of its estimate, output by output, over `time` (n,).
+
+    `left_out` are the times (m,) of samples that the estimate does without.
+    """
 
     time: Array
     panels: tuple[FitPanel, ...]
     lengths: tuple[int, ...] = ()  # samples of each record, one after the other; empty: of one
+    left_out: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

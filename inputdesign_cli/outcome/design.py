@@ -329,7 +329,6 @@ class ObjectiveWords:
 
     name: str  # of the value
     asked: str  # what the summary says was asked
-    answer: str  # a sentence with a place for the value
     label: str = ""  # of the value on an axis, if that is not the name
     maximised: bool = False  # its bounds are from above
     white: str = "value"  # the entry of `baseline.white` to compare with
@@ -342,54 +341,31 @@ class ObjectiveWords:
 
 
 _MOST = "the most information within the limits: "
-_BEST = "The most informative experiment within the limits has "
 
 OBJECTIVES = {
     "least_cost": ObjectiveWords(
-        "cost",
-        "the cheapest experiment that meets the accuracy",
-        "The cheapest experiment that meets the accuracy costs {}",
-        white="cost",
-        spent="cost",
+        "cost", "the cheapest experiment that meets the accuracy", white="cost", spent="cost"
     ),
     "shortest_experiment": ObjectiveWords(
-        "samples",
-        "the shortest experiment that meets the accuracy",
-        "The shortest experiment that meets the accuracy has {} samples",
-        white="samples",
-        spent="length",
+        "samples", "the shortest experiment that meets the accuracy", white="samples", spent="length"
     ),
     "accuracy_factor": ObjectiveWords(
         "factor",
         "the smallest multiple of the admissible error that the limits allow",
-        "Within the limits the error of the model can be kept to {} times the admissible error",
         label="factor on the admissible error",
     ),
-    "D": ObjectiveWords("log det M", f"{_MOST}log det M", f"{_BEST}log det M = {{}}", maximised=True),
-    "A": ObjectiveWords(
-        "-trace M^-1", f"{_MOST}-trace of M^-1", f"{_BEST}-trace M^-1 = {{}}", "-trace M⁻¹", maximised=True
-    ),
-    "E": ObjectiveWords(
-        "smallest eigenvalue of M",
-        f"{_MOST}smallest eigenvalue of M",
-        f"{_BEST}a smallest eigenvalue of M of {{}}",
-        maximised=True,
-    ),
-    "T": ObjectiveWords("trace M", f"{_MOST}trace of M", f"{_BEST}trace M = {{}}", maximised=True),
+    "D": ObjectiveWords("log det M", f"{_MOST}log det M", maximised=True),
+    "A": ObjectiveWords("-trace M^-1", f"{_MOST}-trace M^-1", "-trace M⁻¹", maximised=True),
+    "E": ObjectiveWords("smallest eigenvalue of M", f"{_MOST}smallest eigenvalue of M", maximised=True),
+    "T": ObjectiveWords("trace M", f"{_MOST}trace M", maximised=True),
     "closed_loop_error": ObjectiveWords(
-        "error of the loop",
-        "the least error of the loop with the controller designed on the model",
-        "The loop with the controller designed on the model errs least with this experiment: by {}, "
-        "the number of samples times the excess mean square",
+        "error of the loop", "the least error of the loop with the controller designed on the model"
     ),
     "mean_squared_error": ObjectiveWords(
-        "mean squared error",
-        "the least mean squared error",
-        "The least mean squared error is {}",
-        white="mean_squared_error",
+        "mean squared error", "the least mean squared error", white="mean_squared_error"
     ),
 }
-UNKNOWN = ObjectiveWords("value", "", "The value is {}")
+UNKNOWN = ObjectiveWords("value", "")
 
 
 def objective(kind: str | None) -> ObjectiveWords:

@@ -43,7 +43,7 @@ def sentences(
 
 
 def filled(package: str, file: str, facts: Mapping[str, object]) -> str:
-    """Return the text of a template with its facts; package, file and facts as of `sentences`."""
+    """Return the text of a template with its facts, escaped in HTML; the arguments are as of `sentences`."""
     return _templates(package).get_template(file).render(facts)
 
 
@@ -53,10 +53,14 @@ def _tidy(text: str) -> str:
 
 @cache
 def _templates(package: str) -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
     found = Environment(
-        loader=PackageLoader(package), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader(package),
+        autoescape=select_autoescape(),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     found.filters |= {
         "g": lambda value, digits=4: f"{value:.{digits}g}",

@@ -6,19 +6,15 @@ import base64
 import hashlib
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome import sentences
 from inputdesign_cli.outcome.run_files import RESULT, readable
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.run_page import run_page, run_sources
 from inputdesign_cli.report.sweep_page import sweep_page, sweep_sources
 from inputdesign_cli.version import __version__
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 
 def report_text(directory: Path) -> str:
@@ -73,27 +69,14 @@ def _filled(
 
 def filled(template: str, content: Mapping[str, object]) -> str:
     """Return a template with its content; whatever text comes from a spec or a result is escaped."""
-    return _templates().get_template(template).render(version=__version__, **content)
+    return sentences.filled("inputdesign_cli.report", template, {"version": __version__, **content})
 
 
 def script(name: str) -> str:
     """Return a script of the pages, `hover.js` or `follow.js`."""
-    return _templates().get_template(name).render()
+    return filled(name, {})
 
 
 def script_source() -> str:
     """Return the source by which the policy of a server lets the script inside a page run, and no other."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script('hover.js').encode()).digest()).decode()}'"
-
-
-@cache
-def _templates() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("inputdesign_cli.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )

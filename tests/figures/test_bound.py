@@ -7,6 +7,8 @@ import pytest
 
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.outcome.curves import BoundPanel, ErrorBandCurves, FitCurves, FitPanel, SpectrumCurves
+from inputdesign_cli.questions.assessment.outcome import fit_to_log
+from inputdesign_cli.records import Record
 from tests.support.curves import BANDS, CURVES, DENSITY, G, W, Z, bound, lines_by_label
 
 
@@ -32,23 +34,29 @@ def test_bound_shows_every_error_and_marks_the_limiting_frequencies(page):
     assert below.get_yscale() == "linear"
 
 
-def test_bound_shows_the_range_of_the_errors_not_that_of_the_gain(page):
-    above, _ = page(CURVES["bound beside white"]).axes
+def test_bound_shows_how_far_white_excitation_misses_in_the_range_of_the_errors_not_of_the_gain(page):
+    above, below = page(CURVES["bound beside white"]).axes
+    assert {"r_u, w", "r_u, white, 4 × the cost"} <= set(lines_by_label(above))
+    np.testing.assert_allclose(lines_by_label(below)["w: up to 3"].get_ydata(), 3.0)
     low, high = above.get_ylim()
     assert low > 0.5 * (0.008 * G).min()
     assert high < 2.0 * (0.03 * G).max()
 
 
-def test_bound_tells_how_far_white_excitation_of_the_same_cost_misses(page):
-    above, below = page(CURVES["bound beside white"]).axes
-    assert {"r_u, w", "r_u, white, 4 × the cost"} <= set(lines_by_label(above))
-    np.testing.assert_allclose(lines_by_label(below)["w: up to 3"].get_ydata(), 3.0)
-
-
-def test_a_ratio_far_beyond_the_limit_does_not_squeeze_the_others(page):
-    curves = bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_equal=3.0 * G))
-    _, below = page(curves).axes
-    assert below.get_ylim()[1] < 10.0
+@pytest.mark.parametrize(
+    ("panel", "scale", "lowest", "highest"),
+    [
+        # Ratios far beyond the limit do not squeeze the others.
+        (BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_equal=3.0 * G), "linear", -1e-9, 10.0),
+        # On a linear axis with the limit in it, ratios far below would be one flat line.
+        (BoundPanel(W, 0.0002 * G * (1 + W), G, 0.01 * G), "log", 0.01, 10.0),
+    ],
+)
+def test_ratios_keep_their_shape_far_from_the_limit(page, panel, scale, lowest, highest):
+    _, below = page(bound(panel)).axes
+    low, high = below.get_ylim()
+    assert below.get_yscale() == scale
+    assert lowest < low < 1.0 < high < highest
 
 
 def test_only_what_is_there_is_in_the_legend(page):
@@ -74,15 +82,6 @@ def test_numbers_stand_under_the_lowest_panel_only(page):
     above, below = figure.axes
     assert not any(text.get_visible() and text.get_text() for text in above.get_xticklabels(which="both"))
     assert any(text.get_visible() and text.get_text() for text in below.get_xticklabels(which="both"))
-
-
-def test_ratios_far_below_the_limit_keep_their_shape(page):
-    """On a linear axis with the limit in it they would be one flat line."""
-    _, below = page(bound(BoundPanel(W, 0.0002 * G * (1 + W), G, 0.01 * G))).axes
-    assert below.get_yscale() == "log"
-    low, high = below.get_ylim()
-    assert low > 0.01
-    assert high > 1.0
 
 
 def test_the_spectrum_beside_the_white_level(page):
@@ -113,15 +112,12 @@ def test_a_spectrum_of_no_lines_is_an_empty_page():
     assert draw(nothing).startswith(b"\x89PNG")
 
 
-def test_entries_that_coincide_share_a_curve_and_rounding_has_none(page):
+def test_entries_that_coincide_are_dashed_apart_and_rounding_has_no_curve(page):
     above, _ = page(CURVES["matrix of one direction"]).axes
-    assert list(lines_by_label(above)) == ["|Φ₁₁| = |Φ₂₂|"]
+    drawn = lines_by_label(above)
+    assert list(drawn) == ["|Φ₁₁|", "|Φ₂₂|"]
+    assert len({str(line._dash_pattern) for line in drawn.values()}) == 2
     assert [axes.get_xscale() for axes in page(CURVES["matrix"]).axes] == ["log", "log"]
-
-
-def test_the_certificate_says_what_it_means(page):
-    figure = page(CURVES["optimality"])
-    assert "no other spectrum can do better" in figure.get_suptitle()
 
 
 def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
@@ -132,22 +128,59 @@ def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
     assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
 
 
+def test_the_certificate_says_what_is_proved_of_spectra_and_of_records(page):
+    assert "no other spectrum" in page(CURVES["optimality"]).get_suptitle().replace("\n", " ")
+    bounded = replace(CURVES["optimality"], record_bound=0.25)
+    assert page(bounded).get_suptitle().replace("\n", " ").endswith("within the amplitude: 0.25.")
+
+
+@pytest.mark.parametrize("begin", [0, 2000])
+def test_a_long_fit_is_shown_whole_and_closely_where_the_output_moves(page, begin):
+    y, time = np.zeros(9000), np.arange(9000.0)
+    y[begin : begin + 400] = np.sin(time[:400])
+    y[5000:5002] = 3.0, np.nan  # a spike, and a sample that is not known
+    above, residuals, closer = page(FitCurves(time, (FitPanel(y, y, y),))).axes
+    for axes in (above, residuals):
+        assert axes.get_xlim() == (0.0, 8999.0)
+    x, values = above.lines[0].get_data()
+    assert x.size < 4000
+    assert {5000.0, 5001.0} < set(x)
+    assert np.nanmax(values) == 3.0
+    assert f"samples {begin + 1} to {begin + 400} of 9000" in closer.get_xlabel()
+    np.testing.assert_array_equal(closer.lines[0].get_ydata(), y[begin : begin + 400])
+
+
+def test_gaps_of_a_record_and_samples_that_are_left_out_are_seen(page):
+    time = np.r_[0:100.0, 100:200.0, 400:500.0]
+    y = np.sin(time)
+    panel = FitPanel(y, y + 0.1, y - 0.1, label="level (m)", left_out=np.ones(50))
+    figure = page(FitCurves(time, (panel,), (100, 100, 100), np.r_[200:230.0, 600:620.0]))
+    for axes in figure.axes:
+        (gap,) = axes.patches
+        assert (gap.get_x(), gap.get_width()) == (199.0, 201.0)
+        (border,) = [line for line in axes.lines if line.get_transform() != axes.transData]
+        assert border.get_xdata()[0] == 99.5
+        assert axes.get_xlim() == (0.0, 619.0)
+    dots = lines_by_label(figure.axes[0])["left out"]
+    np.testing.assert_array_equal(dots.get_xdata(), np.r_[200:230.0, 600:620.0])
+    assert "not in the estimate" in legend_of(figure)
+
+
 @pytest.mark.parametrize(
-    ("moves", "label"),
-    [
-        (slice(0, 3000), "(s; first 400 of 3000 samples)"),
-        (slice(2000, 2400), "(s; samples 2001 to 2400 of 3000)"),
-    ],
+    ("column", "files", "label", "left"),
+    [("TIC [°C]", 1, "TIC [°C]", [4, 5, 6]), ("y", 1, "", [4, 5, 6]), ("2", 2, "", [])],
 )
-def test_a_fit_is_shown_where_the_output_moves(page, moves, label):
-    y = np.zeros(3000)
-    y[moves] = np.sin(np.arange(3000.0))[moves]
-    axes = page(FitCurves(np.arange(3000.0), (FitPanel(y, y, y),))).axes
-    assert label in axes[-1].get_xlabel()
-    begin = 2000 if "2001" in label else 0
-    for line in (axes[0].lines[0], axes[1].lines[0]):
-        np.testing.assert_array_equal(line.get_xdata(), np.arange(begin, begin + 400.0))
-    np.testing.assert_array_equal(axes[0].lines[0].get_ydata(), y[begin : begin + 400])
+def test_a_fit_to_a_log_has_its_column_and_what_was_left_out(column, files, label, left):
+    """Of several files the times may be the same: what was left out of them is not told apart."""
+    time = np.arange(10.0)
+    log = Record(time[:, None], -time[:, None], None, time, (10,), (("a", 10),), names={"y1": column})
+    used = log.at(np.r_[0:4, 7:10], (4, 3))
+    log = replace(log, files=(("a", 5), ("b", 5))[:files])
+    y = used.y[:, 0]
+    found = fit_to_log(FitCurves(used.time, (FitPanel(y, y),), used.lengths), log, used)
+    assert found.panels[0].label == label
+    assert found.left_out.tolist() == left
+    assert not left or (-found.panels[0].left_out).tolist() == left
 
 
 @pytest.mark.parametrize(
@@ -176,7 +209,8 @@ def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
 
 def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(page):
     upper, lower = page(CURVES["fit"]).axes
-    assert "simulated from u (fit 83.2 %)" in lines_by_label(upper)
+    # A model with white noise predicts what it simulates: the dashes show the curve below.
+    assert lines_by_label(upper)["simulated from u (fit 83.2 %)"].get_linestyle() == "--"
     np.testing.assert_allclose(lower.lines[0].get_ydata(), -0.1)
     panels = page(CURVES["fit of two outputs"]).axes
     assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
@@ -199,31 +233,6 @@ def test_no_curve_goes_from_one_record_to_the_next(page, lengths, outputs):
         marks = [line.get_xdata()[0] for line in axes.lines if line not in curves]
         np.testing.assert_array_equal(marks, begins - 0.5)
     assert ("another record begins" in legend_of(figure)) == bool(len(begins))
-
-
-def test_records_whose_border_is_not_shown_have_no_mark(page):
-    y = np.sin(np.arange(3000.0))
-    axes = page(FitCurves(np.arange(3000.0), (FitPanel(y, y, y),), (1500, 1500))).axes[0]
-    assert all(line.get_transform() == axes.transData for line in axes.lines)
-
-
-@pytest.mark.parametrize("apart", [0.0, 0.1])
-@pytest.mark.parametrize("outputs", [1, 2])
-def test_a_prediction_that_is_the_simulation_is_one_curve_and_is_said_to_be(page, apart, outputs):
-    """A model with white noise predicts what it simulates, and one curve would hide the other."""
-    y, predicted = np.sin(np.arange(100.0)), np.sin(np.arange(100.0)) + 0.1
-    predicted[40:50] = np.nan  # a gap
-    panel = FitPanel(y, predicted, predicted + apart, 90.0)
-    figure = page(FitCurves(np.arange(100.0), (panel,) * outputs))
-    labels = legend_of(figure)
-    assert len(figure.axes[0].lines) == len(labels) == (3 if apart else 2)
-    assert any("ahead, and simulated from u" in label for label in labels) == (not apart)
-
-
-def test_a_colour_means_the_same_in_all_panels(page):
-    y = np.sin(np.arange(100.0))
-    one, other = FitPanel(y, y + 0.1, y + 0.1, 90.0), FitPanel(y, y + 0.1, y, 90.0, output=1)
-    assert [len(axes.lines) for axes in page(FitCurves(np.arange(100.0), (one, other))).axes] == [3, 3]
 
 
 def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):

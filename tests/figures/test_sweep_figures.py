@@ -1,9 +1,9 @@
 """Which figures a sweep has, and what is on them."""
 
+import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from inputdesign_cli.figures.style import rendered
+from inputdesign_cli.figures.style import painted, rendered
 from inputdesign_cli.figures.sweep import draw_sweep, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepAxis, SweepContent, SweepTable
 
@@ -43,48 +43,38 @@ def test_the_figures_that_suit_a_sweep(given, names, tmp_path):
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in tmp_path.iterdir())
 
 
-@pytest.fixture
-def pages(monkeypatch):
-    kept = []
-    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, file: kept.append(canvas.figure))
-
-    def draw(given, tmp_path):
-        for _, make in sweep_figures(given):
-            rendered(make)
-        return kept
-
-    return draw
+def pages(given):
+    return [painted(make) for _, make in sweep_figures(given)]
 
 
-def test_cost_against_samples_is_sorted_logarithmic_and_has_its_floor(pages, tmp_path):
-    (page,) = pages(table({N: ["1000", "250", "500"]}, [1.0, 40.0, 2.0], floor=[0.5, 20.0, 1.0]), tmp_path)
+def test_cost_against_samples_is_sorted_logarithmic_and_has_its_floor():
+    """The points have the ticks, unless they stand too close, and one without a result has a cross."""
+    given = table({N: ["1000", "250", "500", "800"]}, [1.0, 40.0, 2.0, ""], floor=[0.5, 20.0, 1.0, 0.7])
+    (page,) = pages(given)
     axes = page.axes[0]
-    curve, floor = (line for line in axes.lines if len(line.get_xdata()) == 3)
-    assert list(curve.get_xdata()) == [250.0, 500.0, 1000.0]
-    assert list(curve.get_ydata()) == [40.0, 2.0, 1.0]
-    assert list(floor.get_ydata()) == [20.0, 1.0, 0.5]
+    curve, floor = (line for line in axes.lines if len(line.get_xdata()) == 4)
+    assert list(curve.get_xdata()) == list(axes.get_xticks()) == [250.0, 500.0, 800.0, 1000.0]
+    assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == [[800.0]]
+    assert page.get_suptitle() == f"best: {N} = 1000"
+    np.testing.assert_array_equal(curve.get_ydata(), [40.0, 2.0, np.nan, 1.0])
+    assert list(floor.get_ydata()) == [20.0, 1.0, 0.7, 0.5]
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
 
 
-def test_points_without_a_result_are_marked(pages, tmp_path):
-    (page,) = pages(table({M: ["0", "5", "10"]}, [3.0, "", 2.0]), tmp_path)
-    marked = [list(line.get_xdata()) for line in page.axes[0].lines if line.get_marker() == "x"]
-    assert marked == [[5.0]]
-
-
-def test_the_map_has_a_cell_for_each_point(pages, tmp_path):
+def test_the_map_has_a_cell_for_each_point():
     given = table({N: ["10", "10", "9", "9"], M: ["1", "2", "1", "2"]}, [1.0, 2.0, 3.0, ""])
-    page = pages(given, tmp_path)[-1]
+    page = pages(given)[-1]
     texts = {(t.get_position(), t.get_text()) for t in page.axes[0].texts}
     assert texts == {((0.5, 0.5), "3"), ((1.5, 0.5), "none"), ((0.5, 1.5), "1"), ((1.5, 1.5), "2")}
 
 
-def test_a_criterion_has_a_ceiling_and_its_own_white_value(pages, tmp_path):
+def test_a_criterion_has_a_ceiling_and_its_own_white_value():
     given = table({M: ["0", "4", "8"]}, [3.0, 4.0, 4.5], floor=[4.7] * 3, kind="D")
+    assert given.best == ("objective.value", f"{M} = 8")
     given.columns["objective.upper_bound"] = ["3.0", "4.0", "4.5"]
     given.columns["baseline.white.cost"] = ["1.0"] * 3
     given.columns["baseline.white.value"] = ["3.0"] * 3
-    (page,) = pages(given, tmp_path)
+    (page,) = pages(given)
     axes = page.axes[0]
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["design", "ceiling: any spectrum", "white excitation"]
@@ -95,11 +85,11 @@ def test_a_criterion_has_a_ceiling_and_its_own_white_value(pages, tmp_path):
     assert 2.5 < axes.get_ylim()[0] < 3.0
 
 
-def test_shortest_experiments_are_compared_with_the_samples_that_white_needs(pages, tmp_path):
+def test_shortest_experiments_are_compared_with_the_samples_that_white_needs():
     given = table({M: ["0", "5"]}, [852.7, 194.8], floor=[96.3] * 2, kind="shortest_experiment")
     given.columns["baseline.white.cost"] = ["1.0"] * 2
     given.columns["baseline.white.samples"] = ["853"] * 2
-    (page,) = pages(given, tmp_path)
+    (page,) = pages(given)
     assert [853.0, 853.0] in [list(line.get_ydata()) for line in page.axes[0].lines]
 
 
@@ -116,23 +106,23 @@ TEN = [(f"R_{i}_{j}", [1.0, 2.0]) for i in range(1, 5) for j in range(i, 5)]
         (["0", "1"], TEN, [4.0, 8.0], ["R₁₁", "R₂₂", "R₃₃", "R₄₄"], None, []),
     ],
 )
-def test_moments_are_drawn_over_the_parameter(pages, tmp_path, alphas, entries, trace, labels, scale, marked):
+def test_moments_are_drawn_over_the_parameter(alphas, entries, trace, labels, scale, marked):
     """Infeasible points are marked; of large moments the diagonal is drawn."""
     given = table({"accuracy.mean_squared_error.neglected_norm": alphas}, trace)
     given.columns.update({f"moments.entries.{name}": [str(v) for v in column] for name, column in entries})
     given.columns["moments.trace"] = [str(v) for v in trace]
     assert [name for name, _ in sweep_figures(given)] == ["curves", "moments"]
-    axes = pages(given, tmp_path)[-1].axes[0]
+    axes = pages(given)[-1].axes[0]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [*labels, "trace R"]
     assert scale in (None, axes.get_yscale())
     assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == marked
 
 
-def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_is_named(pages, tmp_path):
+def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_is_named():
     points = [(n, m, x) for n in ("10", "20", "40") for m in ("1", "2") for x in ("a", "b")]
     values = [float(len(points) - i) for i in range(len(points))]
     given = table(dict(zip((N, M, "x"), map(list, zip(*points, strict=True)), strict=True)), values)
-    (page,) = pages(given, tmp_path)
+    (page,) = pages(given)
     titles = [axes.get_title(loc="left") for axes in page.axes]
     assert titles == ["x = a", "x = b"]
     drawn = [line for line in page.axes[0].lines if len(line.get_xdata()) == 3]
@@ -141,17 +131,9 @@ def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_
     assert legend.get_title().get_text() == f"best: {N} = 40, {M} = 2, x = b"
 
 
-def test_the_points_have_the_ticks_unless_they_stand_too_close(pages, tmp_path):
-    (page,) = pages(table({N: ["250", "500", "1000"]}, [3.0, 2.0, 1.0]), tmp_path)
-    assert list(page.axes[0].get_xticks()) == [250.0, 500.0, 1000.0]
-    assert page.get_suptitle() == f"best: {N} = 1000"
-    close = pages(table({M: ["1", "1.01", "40"]}, [3.0, 2.0, 1.0]), tmp_path)[-1]
+def test_points_that_stand_too_close_have_no_tick_each():
+    (close,) = pages(table({M: ["1", "1.01", "40"]}, [3.0, 2.0, 1.0]))
     assert 1.01 not in list(close.axes[0].get_xticks())
-
-
-def test_of_a_criterion_the_largest_is_the_best():
-    given = table({M: ["0", "4", "8"]}, [3.0, 4.5, 4.0], kind="D")
-    assert given.best == ("objective.value", f"{M} = 4")
 
 
 def test_a_long_title_has_several_lines_within_the_page():

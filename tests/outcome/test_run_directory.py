@@ -16,37 +16,27 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome import run_files
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from tests.support.outcomes import typed
 from tests.support.processes import running
 from tests.support.run_directories import a_run, marks, names, write_with_figures
 
+FILES = ["spec.yaml", "signal.csv", "optimality.csv", "signal.png", "optimality.png", "figures.json"]
 
-def test_the_files_of_a_run(tmp_path):
-    paths = write_with_figures(a_run("first", optimality=True), tmp_path / "runs" / "a")
-    assert [path.name for path in paths] == [
-        "spec.yaml",
-        "signal.csv",
-        "optimality.csv",
-        "signal.png",
-        "optimality.png",
-        "figures.json",
-        "result.json",
-    ]
-    assert names(tmp_path / "runs" / "a") == {path.name for path in paths}
+
+def test_a_run_is_read_as_it_was_written_with_its_files_its_software_and_its_spec(tmp_path):
+    target = tmp_path / "runs" / "a"
+    paths = write_with_figures(a_run("first", optimality=True), target)
+    assert [path.name for path in paths] == [*FILES, "result.json"]
+    assert names(target) == {path.name for path in paths}
     assert names(tmp_path / "runs") == {"a"}
-    assert (tmp_path / "runs" / "a" / "signal.png").read_bytes() == b"drawn"
-
-
-def test_read_run_returns_what_was_written_with_its_software_and_its_spec(tmp_path):
-    write_with_figures(a_run("first"), tmp_path / "a")
-    result = read_run(tmp_path / "a")
+    assert (target / "signal.png").read_bytes() == b"drawn"
+    result = read_run(target)
     assert result["title"] == "first"
     assert result["objective"] == {"kind": "least_cost", "value": 5.0}
-    assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png", "figures.json"}
-    assert result["spec_sha256"] == hashlib.sha256((tmp_path / "a" / "spec.yaml").read_bytes()).hexdigest()
+    assert result["files"] == FILES
+    assert result["spec_sha256"] == hashlib.sha256((target / "spec.yaml").read_bytes()).hexdigest()
     assert result["environment"]["python"] == platform.python_version()
     assert result["environment"]["numpy"] == metadata.version("numpy")
     assert set(result["environment"]) >= {"platform", "idesign", "scipy", "cvxpy", "clarabel"}
@@ -81,14 +71,6 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path, there, target, code):
     assert code != "output-not-a-run" or there in caught.value.diagnostics[0].message
     assert names(tmp_path) == {there}
     assert (tmp_path / there).read_text() == "mine"
-
-
-def test_a_link_to_an_empty_directory_stays_a_link(tmp_path):
-    (tmp_path / "disc").mkdir()
-    (tmp_path / "a").symlink_to(tmp_path / "disc")
-    write_run(a_run("first"), tmp_path / "a")
-    assert (tmp_path / "a").is_symlink()
-    assert names(tmp_path / "disc") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
 
 
 def contents(directory) -> dict[str, bytes]:
@@ -233,14 +215,6 @@ def test_links_in_a_run_directory_lead_nowhere(tmp_path):
     assert (tmp_path / "elsewhere" / "new" / "result.json").read_text() == "mine"
 
 
-def test_two_writers_take_turns(tmp_path, monkeypatch):
-    monkeypatch.setattr(run_files, "_PATIENCE", 0.05)
-    with run_files.workplace(tmp_path / "a"), pytest.raises(OutputError) as caught:
-        write_run(a_run("first"), tmp_path / "a")
-    assert caught.value.diagnostics[0].code == "output-busy"
-    write_run(a_run("first"), tmp_path / "a")
-
-
 def test_a_page_about_the_run_before_does_not_stay(tmp_path):
     write_run(a_run("first"), tmp_path / "a")
     page = '<html><head><meta name="generator" content="idesign 0.1.0"></head></html>'
@@ -252,11 +226,15 @@ def test_a_page_about_the_run_before_does_not_stay(tmp_path):
     assert (tmp_path / "a" / "report.html").read_text() == "<html>mine</html>"
 
 
-def test_a_run_into_the_current_folder_leaves_it_the_current_one(tmp_path, monkeypatch):
+def test_a_link_stays_a_link_and_the_current_folder_the_current_one(tmp_path, monkeypatch):
+    (tmp_path / "disc").mkdir()
+    (tmp_path / "a").symlink_to(tmp_path / "disc")
     write_run(a_run("first"), tmp_path / "a")
-    monkeypatch.chdir(tmp_path / "a")
+    assert (tmp_path / "a").is_symlink()
+    assert names(tmp_path / "disc") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
+    monkeypatch.chdir(tmp_path / "disc")
     write_run(a_run("second"), pathlib.Path())
-    assert pathlib.Path.cwd() == tmp_path / "a"
+    assert pathlib.Path.cwd() == tmp_path / "disc"
     assert marks(pathlib.Path()) == {"second"}
 
 

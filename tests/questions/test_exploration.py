@@ -259,11 +259,13 @@ def test_what_is_said_of_the_choice_is_true(run):
     assert "not seen" not in told + page
 
 
-def test_all_files_are_written_and_named(run):
+def test_all_files_are_written_and_their_folder_is_named(run):
     stdout = (run.parent / "stdout").read_text()
-    (named,) = re.findall(r"^files +.*?: (.*(?:\n .*)*)", stdout, re.MULTILINE)
+    (folder,) = re.findall(r"^files +(.*)$", stdout, re.MULTILINE)
+    assert Path(folder).name == run.name
     there = {path.name for path in run.iterdir()}
-    assert set(re.split(r",\s+", named.strip())) == there
+    listed = json.loads((run / "result.json").read_text())["files"]
+    assert {*listed, "result.json", "report.html"} == there
     assert {"model.yaml", "spec.yaml", "report.html", "structures.png", "fit.png"} <= there
     assert {"frequency_response.png", "frequency_response.csv"} <= there
 

@@ -14,6 +14,7 @@ from inputdesign_cli.outcome.curves import (
     FanCurves,
     FitCurves,
     NyquistCurves,
+    OptimalityCurves,
     OrderCurves,
     PredictedPanel,
     SignalCurves,
@@ -60,8 +61,14 @@ def nyquist(**entries):
         (nyquist(circle=0.5, limiting=W), "circle about -1", ""),
         (nyquist(), "leave it.", "circle"),
         (nyquist(), "leave it.", "limiting"),
-        (FitCurves(W, (), (1, 1)), "Dotted lines part the records", ""),
-        (FitCurves(W, (), (2,)), "from the input alone.", "Dotted"),
+        (FitCurves(W, (), (1, 1)), "are shaded, other borders are dotted", "Grey"),
+        (FitCurves(W, (), (2,), W), "from the input alone. Grey dots", "dotted"),
+        (OptimalityCurves(W, ONES, W), "and one where power pays.", "amplitude"),
+        (
+            OptimalityCurves(W, ONES, W, ONES, 0.25),
+            "The bound over all records within the amplitude, 0.25, is nearer; its own worth is dashed.",
+            "",
+        ),
         (OrderCurves({}, (1.0, 2.0), "ARX", 1), "was tried for y2, estimated on one part", ""),
         (OrderCurves({}, (1.0, 2.0), "ARX"), "was tried, estimated on one part", "y1"),
         (
@@ -72,8 +79,8 @@ def nyquist(**entries):
         (FanCurves(W, ONES[None], ONES, dict.fromkeys("abc", ONES)), "the binding plants in colour", "5 of"),
         (
             FanCurves(W, ONES[None], ONES, dict.fromkeys("abcdefg", ONES)),
-            "each, 5 of the 7 binding plants in colour",
-            "each, the binding",
+            "black, 5 of the 7 binding plants in colour",
+            "black, the binding",
         ),
         (SignalCurves(W, {"u1": ONES}), "values are distributed.", "output"),
         (
@@ -115,32 +122,25 @@ def test_figures_of_a_run_are_captioned_by_what_they_show(stem, name, said, tmp_
 
 ROBUST = {"source": "intervals", "scenarios": 31, "discarded": 0, "rejected": 0, "active": [], "r_adm": "own"}
 ROBUST |= {"cost": "worst", "worst_share": 1.0, "worst_scenario": 0, "support": 0}
-SEARCHED = {
-    "proved": False,
-    "parameters": {},
-    "share": 1.0,
-    "region": "the intervals",
-    "added": 1,
-    "tried": 40,
-}
+SEARCHED = {"proved": False, "parameters": {}, "region": "the intervals", "added": 1, "tried": 40}
+KEPT = {"asked": 0.95, "chi_squared_alpha": 2.448, "runs": 4000, "kept": 0.96, "draws": 1000}
+KEPT |= {"exact": 0.95, "exact_limits": (0.94, 0.96), "linear": 0.95}
+DESIGN = {"kind": "least_cost", "value": 2.0, "lower_bound": 2.0}
+
+
+def robust(kind, value, share):
+    """A design whose worst plant that was found takes this share of what the design reaches or may err."""
+    found = ROBUST | {"searched": SEARCHED | {"share": share}}
+    return {"objective": {"kind": kind, "value": value}, "robust": found}
 
 
 @pytest.mark.parametrize(
     ("gap", "told"),
-    [
-        (0.0, "gap below 1e-6"),
-        (7.8e-11, "gap below 1e-6"),
-        (9.99e-7, "gap below 1e-6"),
-        (1e-6, "gap 1.0e-06"),
-        (0.021, "gap 2.1e-02"),
-    ],
+    [*((gap, "below 1e-6") for gap in (0.0, 7.8e-11, 9.99e-7)), (1e-6, "1.0e-06"), (0.021, "2.1e-02")],
 )
 def test_a_gap_that_only_rounding_decides_is_told_as_closed(gap, told):
-    result = {
-        "objective": {"kind": "least_cost", "value": 2.0, "lower_bound": 2.0, "relative_gap": gap},
-        "spectrum": {"type": "fir"},
-    }
-    assert list(said("proofs", typed(result))) == [f"no FIR spectrum gets below 2, {told}"]
+    result = {"objective": DESIGN | {"relative_gap": gap}, "spectrum": {"type": "fir"}}
+    assert list(said("proofs", typed(result))) == [f"no FIR spectrum gets below 2, gap {told}"]
 
 
 @pytest.mark.parametrize(
@@ -148,60 +148,57 @@ def test_a_gap_that_only_rounding_decides_is_told_as_closed(gap, told):
     [((0.9567, 0.9686), True), ((0.9473, 0.9605), False), ((0.9501, 0.9633), False), ((0.93, 0.94), False)],
 )
 def test_an_exact_confidence_that_is_exceeded_is_told(limits, said):
-    told = {"asked": 0.95, "chi_squared_alpha": 2.448, "runs": 4000, "kept": 0.96, "kept_limits": limits}
-    told |= {"draws": 1000, "exact": 0.95, "exact_limits": (0.94, 0.96), "linear": 0.95}
-    result = {"model_error": {"confidence": told, "alpha": 7.7}}
+    result = {"model_error": {"confidence": KEPT | {"kept_limits": limits}, "alpha": 7.7}}
     (line,) = [text for name, text, _ in facts(typed(result), "s") if name == "confidence"]
     assert ("more than asked" in line) is said
 
 
-def test_channels_are_enumerated_and_equal_costs_are_told_as_such():
-    result = {
-        "objective": {"kind": "least_cost", "value": 2.0},
-        "power": {"input": [1.0, 0.5, 0.25], "output": [3.0]},
-        "baseline": {"white": {"cost": 2.0, "ratio": 1.0000001}},
-    }
-    told = {name: (value, note) for name, value, note in facts(typed(result), "s")}
-    assert told["power"][0] == "input 1, 0.5 and 0.25, output 3"
-    assert told["cost"][1] == "white excitation: 2, as much"
-
-
-def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
-    robust = ROBUST | {"searched": SEARCHED}
-    limits = [{"name": "amplitude.input", "binding": True}]
-    result = {"objective": {"kind": "accuracy_factor", "value": 0.5}, "robust": robust, "limits": limits}
-    told = {name: value for name, value, _ in facts(typed(result), "s")}
-    assert told["plants"].endswith("the plant of the spec and 30 drawn and 1 that a search found")
-    assert told["limits"] == "input amplitude exhausted"
+THREE = {"objective": DESIGN, "power": {"input": [1.0, 0.5, 0.25], "output": [3.0]}}
+AS_MUCH = {"objective": DESIGN, "baseline": {"white": {"cost": 2.0, "ratio": 1.0000001}}}
+PEAKS = {"samples": 10, "peak": [3.0], "output_peak": [5.0]}
+EXHAUSTED = {"limits": [{"name": "amplitude.input", "binding": True}]}
 
 
 @pytest.mark.parametrize(
-    ("objective", "share", "words"),
+    ("result", "name", "text"),
     [
+        (THREE, "power", "input 1, 0.5 and 0.25, output 3"),
+        (AS_MUCH, "cost", "2; white excitation: 2, as much"),
         (
-            {"kind": "accuracy_factor", "value": 0.148},
-            1.0 + 1e-9,
+            {"signal": PEAKS | {"input_peak": [2.0]}},
+            "signal",
+            "10 samples, peak of r 3, peak of u 2, peak of y 5",
+        ),
+        ({"signal": PEAKS | {"input_peak": [3.0]}}, "signal", "10 samples, peak 3"),
+        (EXHAUSTED, "limits", "input amplitude exhausted"),
+        (
+            robust("least_cost", 0.5, 1.0),
+            "plants",
+            "what is asked holds at the plant of the spec and 30 drawn and 1 that a search found",
+        ),
+        # The share is one of the ratio that is reached where the best accuracy is sought: times that ratio.
+        (
+            robust("accuracy_factor", 0.148, 1.0 + 1e-9),
+            "worst plant",
             "none was found in the intervals that errs more than the plants that the design is for: 0.148 of "
             "the admissible error",
         ),
         (
-            {"kind": "accuracy_factor", "value": 0.5},
-            1.002,
+            robust("accuracy_factor", 0.5, 1.002),
+            "worst plant",
             "the worst that was found in the intervals errs 0.2 % more than the plants that the design is "
             "for: 0.501 of the admissible error",
         ),
         (
-            {"kind": "least_cost", "value": 3.0},
-            0.9,
+            robust("least_cost", 3.0, 0.9),
+            "worst plant",
             "0.9 of the admissible error is the most that was found in the intervals",
         ),
     ],
 )
-def test_the_worst_plant_is_measured_by_what_is_admitted_whatever_is_sought(objective, share, words):
-    """`share` is one of the ratio that is reached where the best accuracy is sought: times that ratio."""
-    robust = ROBUST | {"searched": SEARCHED | {"share": share}}
-    told = {name: value for name, value, _ in facts(typed({"objective": objective, "robust": robust}), "s")}
-    assert told["worst plant"] == words
+def test_a_fact_says_its_numbers(result, name, text):
+    told = {name: "; ".join(filter(None, rest)) for name, *rest in facts(typed(result), "s")}
+    assert told[name].split("; searched")[0] == text
 
 
 def test_the_terminal_tells_estimates_with_their_deviations():

@@ -87,6 +87,12 @@ CURVES = {
     "fit": c.FitCurves(T, (FIT,)),
     "fit of two outputs": c.FitCurves(T, (FIT, c.FitPanel(T, T + 1, output=1))),
     "fit of two records": c.FitCurves(T, (replace(FIT, label="level (m)"),) * 2, (240, 260)),
+    "long fit with a gap": c.FitCurves(
+        np.r_[0:2000.0, 3000:4000.0],
+        (replace(FIT, y=np.tile(FIT.y, 6), predicted=np.tile(FIT.predicted, 6), simulated=None, left_out=T),),
+        (2000, 1000),
+        2200.0 + T,
+    ),
     "residuals": correlations(1, 1),
     "residuals of two outputs": correlations(2, 1),
     "ellipses": c.EllipseCurves(
@@ -121,7 +127,9 @@ CURVES = {
     "true ratios": c.RatioCurves({"campaign": 0.5 + W / 5, "one shot": 0.8 + W / 5}),
     "costs and shares": c.TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}),
     "costs beside a record": c.TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}, 0.85),
-    "cloud": c.CloudCurves(("b1", "f1"), ((0, 1),), np.stack([W, np.cos(W)], 1), np.ones(2), np.eye(2)),
+    "cloud": c.EllipseCurves(
+        (c.Ellipse(("b1", "f1"), np.ones(2), np.eye(2), estimates=np.stack([W, np.cos(W)], 1)),)
+    ),
     "deviations": c.DeviationCurves((c.DeviationPanel(W, G, 0.05 * G, 0.04 * G, None, "design"),)),
     "named bound": bound(c.BoundPanel(W, 1e-40 * G, G, 0.01 * G, names="heating → temperature")),
     "constant signal": c.SignalCurves(np.arange(5.0), {"r1": np.ones(5)}),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -45,6 +46,9 @@ from inputdesign_cli.specification import is_prior
 
 # Beyond a disc by more than this share of G.
 _FAR = 0.2
+
+# An output whose level is off by more than this share of its range shows deviations.
+_LEVEL = 1e-3
 
 
 def identification_entry(
@@ -141,9 +145,27 @@ def fit_of(
         measured, curve = data.y[:, i], None if fit is None else samples
         if curve is not None:
             columns[f"y{_number(units, i)}_simulated"] = curve
-        panels.append(FitPanel(measured, measured - errors[:, i], curve, fit, i, units.label(f"y{i + 1}")))
-    instants = even if time is None or np.any(np.diff(time) <= 0.0) else time
+        label = units.label(f"y{i + 1}")
+        if data.recorded is not None and label[:1] not in ("", "("):  # a level was taken away
+            level = float(np.nanmedian(data.recorded.values[:, data.u.shape[1] + i] - measured))
+            label = f"Δ {label}" if abs(level) > _LEVEL * np.ptp(measured) else label
+        panels.append(FitPanel(measured, measured - errors[:, i], curve, fit, i, label))
+    instants = even if np.any(np.diff(data.time) <= 0.0) else data.time
     return columns, FitCurves(instants, tuple(panels), tuple(data.lengths))
+
+
+def fit_to_log(fit: FitCurves, log: Record, used: Record) -> FitCurves:
+    """Return the fit with the columns of a log as names, and with its samples that the estimate does without.
+
+    Samples of several files, whose times may be the same, are not told apart.
+    """
+    rest = ~np.isin(log.time, used.time) & (len(log.files) == 1)
+    panels = []
+    for panel in fit.panels:
+        column = log.names.get(f"y{panel.output + 1}", "")
+        label = panel.label or column * (re.fullmatch(r"y?\d*", column) is None)
+        panels.append(replace(panel, label=label, left_out=log.y[rest, panel.output] if rest.any() else None))
+    return replace(fit, panels=tuple(panels), left_out=log.time[rest])
 
 
 def data_curves(units: Units, data: Record, estimate: Estimate) -> tuple[dict[str, Table], dict[str, Curves]]:

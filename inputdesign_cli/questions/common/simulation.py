@@ -64,19 +64,17 @@ def error_bands(units: Units, predicted: PredictedError, errors: Array, name: st
     return plots.ErrorBandCurves(tuple(panels), name.replace("_", " "), len(errors))
 
 
-def cloud(trials: Trials, covariance: Array | None) -> plots.CloudCurves | None:
+def cloud(trials: Trials, covariance: Array | None) -> plots.EllipseCurves | None:
     """Return the estimates in some planes; None without a covariance (k, k), or for a single parameter."""
     size = len(trials.names)
     if covariance is None or size < 2:
         return None
-    pairs = sorted({round(i) for i in np.linspace(0, size - 2, _PAIRS)})
-    return plots.CloudCurves(
-        names=trials.names,
-        pairs=tuple((i, i + 1) for i in pairs),
-        theta=trials.theta[:_CLOUD],
-        centre=trials.truth,
-        covariance=covariance,
-    )
+    pairs = []
+    for i in sorted({round(i) for i in np.linspace(0, size - 2, _PAIRS)}):
+        of = slice(i, i + 2)
+        names, estimates = (trials.names[i], trials.names[i + 1]), trials.theta[:_CLOUD, of]
+        pairs.append(plots.Ellipse(names, trials.truth[of], covariance[of, of], estimates=estimates))
+    return plots.EllipseCurves(tuple(pairs))
 
 
 def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, plots.SignalCurves]:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -26,12 +27,13 @@ from inputdesign_cli.findings.unrelated_inputs import late_inputs
 from inputdesign_cli.identification import cross_correlations, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.outcome.curves import FitCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
-from inputdesign_cli.questions.assessment.outcome import fit_of, response_without_model
+from inputdesign_cli.questions.assessment.outcome import fit_of, fit_to_log, response_without_model
 from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.exploration.build import build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import (
@@ -65,7 +67,7 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
         only: the structure to take; None: the simplest that explains the log as well as any.
     """
     started = time.perf_counter()
-    log = read_logs(paths, preparation)
+    whole_log = log = read_logs(paths, preparation)
     looped = bool(loops := answers_output(log.parts))
     with blaming_columns(paths[0], log):
         try:
@@ -105,7 +107,9 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     findings += () if lines is None else response_note(lines)
     findings += silent_lines_answer(silent)
     results = replace(results, resolved_spec=spec_text(log, found, paths, reasons, loop=looped))
-    results = adding(results, outcome, findings, tables, {**structure_curves(found), **curves})
+    fit = fit_to_log(cast(FitCurves, results.curves["fit"]), whole_log, data)
+    curves = {**structure_curves(found), **curves, "fit": fit}
+    results = adding(results, outcome, findings, tables, curves)
     against = [*shifted_levels(found.estimate, data, log.time_unit)]
     against += refutations(found.model, found.estimate)
     return Exploration(results, reasons, tuple(one.message for one in against))

@@ -7,7 +7,7 @@ design until none is found to be missed; that there is no worse one is not prove
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import cycle, islice
@@ -57,6 +57,7 @@ _NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
 # A plant binds when it is within this share of its limit.
 _BINDS = 1e-5
 _LISTED = 12
+_SAID = 4  # parameters of a plant beside its curve
 # Estimates that are foreseen, and the share of them that counts.
 _ESTIMATES, _MOST_OF_THEM = 100, 0.95
 _GRID_POINTS = 300
@@ -204,7 +205,7 @@ def robust_result(
             before = None if plants.unknowns is None else risk_before(drawn, beta, plants.unknowns)
             risk = parts.Risk(CONFIDENCE, risk_after(drawn, beta, support), before)
             entry = replace(entry, risk=risk)
-    fan = fan_curves(done, numbers, binding) if done.excites else None
+    fan = fan_curves(done, numbers, binding, entry.active) if done.excites else None
     tables, curves = ({}, {}) if fan is None else ({"fan": fan[0]}, {"fan": fan[1]})
     return RobustResult(entry, found.tables | tables, {**curves}, (*found.findings, *fewer))
 
@@ -358,7 +359,7 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.
 
 
 def fan_curves(
-    done: Designed, numbers: Sequence[int], active: Sequence[int]
+    done: Designed, numbers: Sequence[int], active: Sequence[int], listed: Sequence[parts.ActivePlant]
 ) -> tuple[Table, FanCurves] | None:
     """Return fan.csv and its figure, r_u / r_adm over the plants; None if no model error is bounded."""
     problem, units = done.problem, done.header.units
@@ -376,4 +377,12 @@ def fan_curves(
     frequency = w / units.frequency
     columns = {units.frequency_header: frequency, "nominal": ratios[0], "largest": ratios.max(axis=0)}
     columns |= {name.replace(" ", "_"): values for name, values in named.items()}
-    return Table(columns), FanCurves(frequency, ratios[1:], ratios[0], named)
+    stated = {f"plant {one.scenario}": one.parameters or {} for one in listed}
+    drawn = {_with_parameters(name, stated.get(name, {})): values for name, values in named.items()}
+    return Table(columns), FanCurves(frequency, ratios[1:], ratios[0], drawn)
+
+
+def _with_parameters(name: str, parameters: Mapping[str, float]) -> str:
+    """Return the name of a plant with its first parameters, as many as a legend has room for."""
+    said = [f"{label} {value:.3g}" for label, value in list(parameters.items())[:_SAID]]
+    return ", ".join([name, *said, *[".."] * (len(parameters) > _SAID)])

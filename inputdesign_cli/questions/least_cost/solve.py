@@ -173,7 +173,9 @@ class ConvexTask(SpectrumTask):
             tables, curves = tables | more[0], curves | more[1]
             optimality = optimality_curves(units, design)
             if optimality is not None:
-                tables["optimality"], curves["optimality"] = optimality
+                bound = None if outcome.objective is None else outcome.objective.any_record_bound
+                tables["optimality"] = optimality[0]
+                curves["optimality"] = replace(optimality[1], record_bound=bound)
         return results_of(self.header, outcome, tables, curves), informed
 
     def _with_record(self, done: Designed, results: Results, made: Made, known: Array | None) -> Results:
