@@ -1,14 +1,11 @@
 """Plants in s behind a hold: dead times, gradients, integrators, loops."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.identification import identify
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import (
     ContinuousModel,
@@ -21,29 +18,16 @@ from inputdesign_cli.plant import (
     close_loop,
 )
 from inputdesign_cli.plant.held import HeldEntry, Intersample
-from inputdesign_cli.spectrum import FirBasis
-from tests.support.plants import arrays, descending
+from tests.support.plants import descending, known, lag_of, late_entries
+from tests.support.records import check_estimate
 
 W = np.array([0.05, 0.4, 1.3, 2.9])
 STEP = 0.5
 DELAYS = [0.0, 0.1, 0.37, 0.5, 1.0, 2.24]
 
 
-def late(tau, numerator=(2.0, 1.0), denominator=(1.0, 0.7, 1.3)) -> ContinuousModel:
-    entries = (descending([[list(numerator)]]), descending([[list(denominator)]]))
-    return ContinuousModel.monic(*entries, np.eye(1), delay=((np.array([tau]),),))
-
-
-def matrix(common=False) -> ContinuousModel:
-    """Two by two, one entry without dead time, one of higher order, one biproper."""
-    delays = [[[0.8], [0.8]]] * 2 if common else [[[0.8], [1.3]], [[], [1.0]]]
-    return ContinuousModel.monic(
-        descending([[[1.0], [2.0, 0.5]], [[-0.7, 0.2], [1.2]]]),
-        descending([[[1.0, 0.5], [1.0, 0.4]], [[1.0, 0.7, 1.3], [1.0, 0.9]]]),
-        np.eye(2),
-        delay=arrays(delays),
-        common_delay=common,
-    )
+def late(tau):
+    return lag_of([2.0, 1.0], [1.0, 0.7, 1.3], tau)
 
 
 def fine_step(model, u, steps=1000):
@@ -63,7 +47,7 @@ def test_the_sampled_plant_is_that_of_a_fine_step_simulation(tau):
     np.testing.assert_allclose(y[:, 0], fine_step(model, u[:, 0]), atol=1e-8)
 
 
-@pytest.mark.parametrize("model", [late(0.37), late(1.0), matrix(), matrix(common=True)])
+@pytest.mark.parametrize("model", [late(0.37), late(1.0), late_entries(), late_entries(common=True)])
 def test_realisation_and_response_are_one_plant(model):
     sampled, z = SampledModel(model, STEP), np.exp(1j * W)
     A, B, C, D = sampled.realisation
@@ -78,40 +62,14 @@ def test_numerator_and_denominator_in_q_are_those_of_the_response(tau):
     np.testing.assert_allclose(SampledModel(late(tau), STEP).plant_at(W)[:, 0, 0], expected, atol=1e-12)
 
 
-def extrapolated(f, x, step):
-    """f'(x) from values on the right alone, by Richardson's extrapolation to fourth order."""
-    once = [(f(x + step / 2**i) - f(x)) / (step / 2**i) for i in range(4)]
-    for order in range(1, 4):
-        once = [(2**order * b - a) / (2**order - 1) for a, b in pairwise(once)]
-    return once[0]
-
-
-@pytest.mark.parametrize(
-    "model",
-    [*(SampledModel(late(tau), STEP) for tau in DELAYS), SampledModel(matrix(), STEP), late(0.37), matrix()],
-)
-def test_gradients_are_differences(model):
-    """Towards longer dead times, which at the boundary of a sample is the side that is promised."""
-    theta, exact = model.theta, model.plant_gradient(W)
-    for k in range(theta.size):
-        unit = np.eye(theta.size)[k]
-        slope = extrapolated(lambda x, unit=unit: model.at(theta + x * unit).plant_at(W), 0.0, 2e-3)
-        np.testing.assert_allclose(exact[:, k], slope, atol=1e-8 * max(1.0, np.abs(exact[:, k]).max()))
-
-
 def test_the_gradient_has_two_sides_at_a_boundary():
     """Relative degree one: b e^(-at) jumps at t = 0, so that the sides differ by the first sample."""
-    first = lambda tau: SampledModel(late(tau, (2.0,), (1.0, 0.7)), STEP)  # noqa: E731
-    right = first(1.0).plant_gradient(W)[:, -1, 0, 0]
-    left = first(1.0 - 1e-7).plant_gradient(W)[:, -1, 0, 0]
+    right, left = (
+        SampledModel(lag_of([2.0], [1.0, 0.7], tau), STEP).plant_gradient(W)[:, -1, 0, 0]
+        for tau in (1.0, 1.0 - 1e-7)
+    )
     q = np.exp(-1j * W)
     np.testing.assert_allclose(left - right, 2.0 * (q - 1.0) * q**2, atol=1e-6)
-
-
-def test_names_are_those_of_entries():
-    assert matrix().names[-3:] == ("delay[1,1]", "delay[1,2]", "delay[2,2]")
-    assert matrix(common=True).names[-1] == "delay"
-    assert late(0.3).names == ("b0", "b1", "a0", "a1", "delay")
 
 
 @pytest.mark.parametrize("hold", [True, False])
@@ -144,29 +102,25 @@ def test_a_loop_is_that_of_the_plant_in_q(tau):
     )
 
 
-H = 0.5
 DOWN = np.concatenate([np.geomspace(1e-6, 0.1, 30), np.linspace(0.1, np.pi, 40)])
 
 
-def plant_of(numerator, denominator, delay=()):
-    plant = ContinuousModel.monic(
-        descending([[numerator]]), descending([[denominator]]), np.eye(1), delay=delay
-    )
-    return SampledModel(plant, H)
+def held(numerator, denominator, *delay, variance=1.0):
+    return SampledModel(lag_of(numerator, denominator, *delay, variance=variance), STEP)
 
 
 def lagging_tank(b, a, z):
     """b / (s (s + a)) behind a hold, and its derivatives in b and a, from the response to a step."""
-    E, k, T = np.exp(-a * H), b / a, 1.0 / a
-    G = k * (H / (z - 1) - T * (1 - E) / (z - E))
+    E, k, T = np.exp(-a * STEP), b / a, 1.0 / a
+    G = k * (STEP / (z - 1) - T * (1 - E) / (z - E))
     in_k = G / k
-    slope = E * H * a**2  # dE/dT
+    slope = E * STEP * a**2  # dE/dT
     in_T = -k * ((1 - E - slope * T) / (z - E) + T * (1 - E) * slope / (z - E) ** 2)
     return G, in_k / a, -in_k * b / a**2 - in_T / a**2
 
 
 def test_response_and_gradient_are_those_of_the_closed_form_down_to_the_pole():
-    model = plant_of([0.3], [1, 0.8, 0])
+    model = held([0.3], [1, 0.8, 0])
     gradient = model.plant_gradient(DOWN)[:, :, 0, 0]
     G, in_b, in_a1 = lagging_tank(0.3, 0.8, np.exp(1j * DOWN))
     assert model.names == ("b0", "a0", "a1")
@@ -180,14 +134,14 @@ def test_gradient_of_a_free_pole_is_that_of_differences():
     b, a1, step = 0.3, 0.8, 3e-4
     z = np.exp(1j * np.linspace(0.05, 3.0, 20))
 
-    def held(a0):
+    def plant(a0):
         large = (a1 + np.sqrt(a1**2 - 4 * a0)) / 2
         p, q = -a0 / large, -large
-        parts = [np.expm1(x * H) / x / (x - y) / (z - np.exp(x * H)) for x, y in ((p, q), (q, p))]
+        parts = [np.expm1(x * STEP) / x / (x - y) / (z - np.exp(x * STEP)) for x, y in ((p, q), (q, p))]
         return b * sum(parts)
 
-    model = plant_of([b], [1, a1, 0])
-    expected = (8 * (held(step) - held(-step)) - (held(2 * step) - held(-2 * step))) / (12 * step)
+    model = held([b], [1, a1, 0])
+    expected = (8 * (plant(step) - plant(-step)) - (plant(2 * step) - plant(-2 * step))) / (12 * step)
     found = model.plant_gradient(np.angle(z))[:, 1, 0, 0]
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
@@ -195,61 +149,13 @@ def test_gradient_of_a_free_pole_is_that_of_differences():
 def test_double_integrator_and_dead_time():
     z = np.exp(1j * DOWN)
     np.testing.assert_allclose(
-        plant_of([1.0], [1, 0, 0]).plant_at(DOWN)[:, 0, 0], H**2 / 2 * (z + 1) / (z - 1) ** 2, rtol=1e-9
+        held([1.0], [1, 0, 0]).plant_at(DOWN)[:, 0, 0], STEP**2 / 2 * (z + 1) / (z - 1) ** 2, rtol=1e-9
     )
-    late = plant_of([1.0], [1, 0], ((np.array([0.7]),),))  # one sample and 0.2
+    late = held([1.0], [1, 0], 0.7)  # one sample and 0.2
     np.testing.assert_allclose(late.plant_at(DOWN)[:, 0, 0], (0.3 / z + 0.2 / z**2) / (z - 1), rtol=1e-9)
     np.testing.assert_allclose(
         late.plant_gradient(DOWN)[:, -1, 0, 0], (1 / z**2 - 1 / z) / (z - 1), rtol=1e-9
     )
-
-
-def known_pole(model, name):
-    return Reparametrised(model, Parametrisation.identity(model.names, model.theta, [name]))
-
-
-def pair(controller, below):
-    """b / s and b1 q^-1 / (1 - q^-1) with b1 = b H, in one loop; the poles are known."""
-    C = TransferMatrix.build([[controller]], [[below]])
-    models = (
-        known_pole(plant_of([0.4], [1, 0]), "a0"),
-        known_pole(PolynomialModel.single([0, 0.4 * H], F=[1, -1]), "f1"),
-    )
-    return [Experiment(model, 7, loop=close_loop(model, C)) for model in models]
-
-
-@pytest.mark.parametrize("controller", [([1.2, -1.0], [1, -1]), ([0.9], [1])], ids=["PI", "P"])
-def test_the_loop_around_an_integrator_is_that_of_polynomials(controller):
-    held, polynomial = pair(*controller)
-    w = np.array([0.0, 1e-3, 0.3, np.pi])
-    for one, other in zip(held.loop.sensitivity(w), polynomial.loop.sensitivity(w), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-5)
-    basis = FirBasis(1, 4)
-    maps = [basis.integrals(e.information_density, e.singularities) for e in (held, polynomial)]
-    np.testing.assert_allclose(maps[0], H**2 * maps[1], rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(held.noise_information, H**2 * polynomial.noise_information, rtol=1e-9)
-    powers = [
-        basis.integrals(lambda w, e=e: e.power_density("output", w), e.singularities)
-        for e in (held, polynomial)
-    ]
-    np.testing.assert_allclose(powers[0], powers[1], rtol=1e-9, atol=1e-10)
-    rng = np.random.default_rng(0)
-    r, e = rng.standard_normal((2, 3, 200, 1))
-    for one, other in zip(held.loop.signals(r, e), polynomial.loop.signals(r, e), strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-9)
-
-
-def test_information_next_to_the_pole_is_that_of_simulated_impulses():
-    """psi of the gain alone, sample by sample: the integral over frequency is the sum over time."""
-    gain = pair([0.9], [1])[0]
-    samples = 400
-    excitation = FirBasis(1, 0).integrals(gain.information_density, gain.singularities)[0]
-    for source, found in (("r", excitation), ("e", gain.noise_information)):
-        r, e = np.zeros((2, samples, 1))
-        (r if source == "r" else e)[0] = 1.0
-        _, u = gain.loop.signals(r, e)
-        psi = H * np.concatenate([[0.0], np.cumsum(u[:-1, 0])])  # d(y) / db
-        assert found[0, 0] == pytest.approx(7 * psi @ psi, rel=1e-9)
 
 
 def test_integrators_that_inputs_share_are_one():
@@ -257,28 +163,28 @@ def test_integrators_that_inputs_share_are_one():
     rows = [[[0.2], [0.5]]], [[[1, 0], [1, 0]]]
     plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), np.eye(1))
     C = TransferMatrix.build([[[0.8]], [[0.0]]], [[[1]], [[1]]])
-    Loop(SampledModel(plant, H), C).check_stability()
+    Loop(SampledModel(plant, STEP), C).check_stability()
     apart = [[[0.2], [0]], [[0], [0.5]]], [[[1, 0], [1]], [[1], [1, 0]]]
     plant = ContinuousModel.monic(descending(apart[0]), descending(apart[1]), np.eye(2))
     C = TransferMatrix.build([[[0.8], [0.0]], [[0.0], [0.0]]], [[[1], [1]], [[1], [1]]])
     with pytest.raises(SpecError):  # the other tank is left to itself
-        Loop(SampledModel(plant, H), C).check_stability()
+        Loop(SampledModel(plant, STEP), C).check_stability()
 
 
 @pytest.mark.parametrize("hold", [True, False])
 def test_samples_drive_an_integrator_as_a_sum(hold):
     rng = np.random.default_rng(1)
     u = np.convolve(rng.standard_normal(3000), np.hanning(64) / 32, mode="same")
-    entry = HeldEntry.of(np.array([1.0]), np.array([0.0, 1.0]), H)
-    y = Intersample(H, hold=hold).caused(entry, u)
-    expected = H * np.concatenate([[0.0], np.cumsum(u[:-1])])
+    entry = HeldEntry.of(np.array([1.0]), np.array([0.0, 1.0]), STEP)
+    y = Intersample(STEP, hold=hold).caused(entry, u)
+    expected = STEP * np.concatenate([[0.0], np.cumsum(u[:-1])])
     if not hold:  # the trapezoidal rule is nearly exact for a signal that is slow
-        expected = expected + 0.5 * H * u
+        expected = expected + 0.5 * STEP * u
     np.testing.assert_allclose(y, expected, atol=1e-9 if hold else 0.02 * np.abs(expected).max())
 
 
 def test_the_gradient_of_a_record_is_that_of_differences():
-    model, record = plant_of([0.3], [1, 0.8, 0]), np.random.default_rng(2).standard_normal((300, 1))
+    model, record = held([0.3], [1, 0.8, 0]), np.random.default_rng(2).standard_normal((300, 1))
     e = np.zeros((300, 1))
 
     def caused(moved):
@@ -291,23 +197,15 @@ def test_the_gradient_of_a_record_is_that_of_differences():
 
 
 def test_estimates_hold_the_integrator():
-    """Within four standard deviations; the pole stays where it is known to be."""
-    plant = ContinuousModel.monic(descending([[[0.3]]]), descending([[[1, 0.8, 0]]]), 0.01 * np.eye(1))
-    rng = np.random.default_rng(3)
-    for truth in (SampledModel(plant, H), PolynomialModel.single([0, 0.2], F=[1, -1.6, 0.6], variance=0.01)):
-        model = known(truth)
-        u = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
-        y = sum(truth.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
-        found = identify(model, u, y, start=0.8 * model.theta)
-        assert found.search.converged
-        assert np.all(np.abs(found.theta - model.theta) < 4 * np.sqrt(np.diag(found.covariance)))
-
-
-def known(model) -> Reparametrised:
-    """a0 of a plant in s is known, and f1 + f2 = -1 of one in q^-1."""
-    if model.names == ("b0", "a0", "a1"):
-        return known_pole(model, "a0")
+    """Of a plant in s whose pole is known, and of one in q^-1 with f1 + f2 = -1."""
     terms = tuple(map(Expression, ("b", "-1 - p", "p")))
-    return Reparametrised(
-        model, Parametrisation(("b", "p"), ("b", "p"), model.theta[[0, 2]], np.ones(2, dtype=bool), terms)
-    )
+    names, at, free = ("b", "p"), np.array([0.2, 0.6]), np.ones(2, dtype=bool)
+    summed = PolynomialModel.single([0, 0.2], F=[1, -1.6, 0.6], variance=0.01)
+    rng = np.random.default_rng(3)
+    for model in (
+        known(held([0.3], [1, 0.8, 0], variance=0.01), "a0"),
+        Reparametrised(summed, Parametrisation(names, names, at, free, terms)),
+    ):
+        u = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
+        y = sum(model.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
+        check_estimate(model, u, y, 0.8 * model.theta)
