@@ -45,7 +45,7 @@ OTHER = {
     "spectrum": "{type: fir, order: 2}",
     "uncertainty": "{intervals: {b1: [3, 4]}, scenarios: 2, fresh: 0}",
     "campaign": "{block: 40}",
-    "signal": "{type: binary, candidates: 1, seed: 3, offset: 4}",
+    "signal": "{type: binary, candidates: 1, seed: 3, offset: 0.2}",
     "solver": "{any_spectrum: true}",
     "simulation": "{runs: 3, seed: 3}",
     "report": "{ellipses: [[b1, f1]]}",

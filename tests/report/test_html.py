@@ -305,7 +305,7 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
 
 def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):
     found = identify(parse_spec(SPEC % ""), data)
-    write_run(found, tmp_path / "run", draw_all(found))
+    write_run(found, tmp_path / "run")
     page = parse(report_text(tmp_path / "run"))
     assert "The model was estimated from 400 samples" in words(page)
     assert "predicted one step ahead" in words(page)

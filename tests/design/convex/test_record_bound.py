@@ -80,7 +80,7 @@ def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
 
 
 def test_held_values_have_a_bound_of_their_own():
-    hold, values = 3, 7
+    hold, values = 3, 8
     design = designed({"B": [0, 0.4], "F": [1, -0.9]}, hold * values, ERROR)
     bound = bound_over_records(design.problem, design.any_spectrum, hold * values, windows=8, hold=hold)
     best = best_of_all(worst_of(design, hold * values), values, hold)
