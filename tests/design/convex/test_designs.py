@@ -24,8 +24,18 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, zero_order_hold
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.spectrum import LinesBasis
-from tests.support.convex_designs import ORDER, anywhere, check, criterion, optimum, relative, resonant, solve
-from tests.support.on_grid import OnGrid
+from tests.support.convex_designs import (
+    ORDER,
+    OnGrid,
+    anywhere,
+    check,
+    criterion,
+    gram_program,
+    optimum,
+    relative,
+    resonant,
+    solve,
+)
 
 
 @pytest.mark.first(1)
@@ -209,18 +219,6 @@ def test_too_few_lines_are_refused():
     assert solve(experiment, requirements=relative(0.3), basis=line).result.gap <= 1e-6
     with pytest.raises(InfeasibleError):
         solve(experiment, requirements=relative(0.001), basis=line)
-
-
-def gram_program(problem, order, unit=1.0):
-    """A FIR spectrum as a Gram matrix: (c, M as an expression, constraints), unknowns over `unit`."""
-    scaled = cp.Variable(order + 1)
-    c = unit * scaled
-    gram = cp.Variable((order + 1, order + 1), PSD=True)
-    constraints = [cp.trace(gram) == scaled[0]]
-    constraints += [cp.sum(cp.diag(gram, k)) == scaled[k] for k in range(1, order + 1)]
-    maps = problem.information_map
-    M = problem.baseline_information + sum(c[i] * maps[i] for i in range(order + 1))
-    return c, M, constraints
 
 
 @pytest.mark.parametrize("letter", ["D", "A", "E", "T"])

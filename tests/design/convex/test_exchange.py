@@ -17,6 +17,7 @@ from inputdesign_cli.plant import ContinuousModel, PolynomialModel
 from inputdesign_cli.spectrum import PolynomialBasis
 from tests.support.convex_designs import (
     DENSE,
+    OnGrid,
     alternatives,
     around,
     asked,
@@ -26,7 +27,6 @@ from tests.support.convex_designs import (
     relative,
     solve,
 )
-from tests.support.on_grid import OnGrid
 from tests.support.plants import arrays, two_by_two
 from tests.support.random_plants import random_case
 
