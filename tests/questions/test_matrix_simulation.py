@@ -86,7 +86,7 @@ def test_every_entry_has_its_error_bands(studied):
     for band in curves.panels:
         assert np.all(band.quantiles[0.05] <= band.quantiles[0.95])
         assert np.all(band.quantiles[0.95] < band.r_u)
-    assert studied.curves["cloud_design"].theta.shape == (120, 10)
+    assert studied.curves["cloud_design"].theta.shape == (60, 10)
 
 
 def test_the_true_system_may_be_another():

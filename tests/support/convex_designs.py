@@ -29,10 +29,13 @@ def solve(*args, tolerance=1e-7, **more):
     return solve_design(asked(*args, **more), tolerance=tolerance)
 
 
+def alone(*args, **more):
+    """The result without the bound over every spectrum."""
+    return solve_design(asked(*args, **more), tolerance=1e-7, any_spectrum_tolerance=None).result
+
+
 def optimum(*args, **more):
-    """The objective alone, without the bound over every spectrum."""
-    question = asked(*args, **more)
-    return solve_design(question, tolerance=1e-7, any_spectrum_tolerance=None).result.objective
+    return alone(*args, **more).objective
 
 
 def relative(fraction=0.01, alpha=2.45, band=BAND, kind=ModelError, admissible=None):

@@ -27,6 +27,7 @@ from inputdesign_cli.spectrum import LinesBasis
 from tests.support.convex_designs import (
     ORDER,
     OnGrid,
+    alone,
     anywhere,
     check,
     criterion,
@@ -112,7 +113,7 @@ def test_the_shadow_price_is_the_slope():
     quiet = optimum(experiment, requirements=asked, cost={"output": 1.0})
     middle, step = 1.05 * quiet, 1e-3 * quiet
     low, high = (
-        solve(experiment, requirements=asked, limits=[PowerLimit("output", middle + d)]).result
+        alone(experiment, requirements=asked, limits=[PowerLimit("output", middle + d)])
         for d in (-step, step)
     )
     slope = (high.objective - low.objective) / (2 * step)
