@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import unicodedata
 
 import pytest
@@ -16,7 +17,7 @@ ONE = SpecError(
 )
 
 
-def test_one_complaint_in_full():
+def test_one_complaint_in_full_and_without_place_or_hint():
     assert render(ONE) == (
         "s.yaml:12:9: error[a-code] plant.F is wrong\n"
         "12 | plant: {F: 1}\n"
@@ -25,11 +26,11 @@ def test_one_complaint_in_full():
         "\n"
         "`idesign explain a-code` says more."
     )
-
-
-def test_a_complaint_without_place_or_hint():
-    error = InfeasibleError(Diagnostic("infeasible", "too strict"))
-    assert render(error) == "error[infeasible] too strict\n\n`idesign explain infeasible` says more."
+    bare = InfeasibleError(Diagnostic("infeasible", "too strict"))
+    assert render(bare) == "error[infeasible] too strict\n\n`idesign explain infeasible` says more."
+    coloured = render(ONE, color=True)
+    assert "\x1b[" in coloured
+    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == render(ONE)
 
 
 def test_several_complaints_are_counted():
@@ -49,38 +50,31 @@ def test_overrides_have_no_line_number():
     assert "| noise.variance=-1\n|                ^\n" in text
 
 
+def shown(text, column, **fields):
+    """The lines of a complaint about a column of this text."""
+    place = Location(fields.pop("file", "f"), 1, column, text)
+    return render(SpecError(Diagnostic("c-d", **{"message": "m", **fields}, location=place))).splitlines()
+
+
 @pytest.mark.parametrize("column", [1, 2, 60, 150, 299, 300, 301])
 def test_long_lines_are_clipped_around_the_column(column):
     text = "".join(chr(ord("a") + i % 26) for i in range(300))
-    lines = render(SpecError(Diagnostic("c-d", "m", location=Location("f", 1, column, text)))).splitlines()
-    shown, caret = lines[1][4:], lines[2][4:]
-    assert len(shown) <= 106
+    _, line, caret, *_ = shown(text, column)
+    assert len(line) <= 4 + 106
     if column <= 300:
-        assert shown[len(caret) - 1] == text[column - 1]
+        assert line[len(caret) - 1] == text[column - 1]
 
 
 def test_the_caret_stands_below_wide_characters():
     line = "title: 温度 x"
     column = line.index("x") + 1
-    lines = render(SpecError(Diagnostic("c-d", "m", location=Location("f", 1, column, line)))).splitlines()
     cells = sum(2 if unicodedata.east_asian_width(c) == "W" else 1 for c in line[: column - 1])
-    assert lines[2] == "  | " + " " * cells + "^"
+    assert shown(line, column)[2] == "  | " + " " * cells + "^"
 
 
 def test_tabs_and_control_characters_do_not_reach_the_terminal():
-    place = Location("f\x1b[2J", 1, 3, "\ta\x1b[31m")
-    text = render(SpecError(Diagnostic("c-d", "m\x1b[0m", "h\x07", location=place)))
-    assert "\x1b" not in text
-    assert "\x07" not in text
-    assert "\t" not in text
-
-
-def test_colour_changes_nothing_but_colour():
-    import re
-
-    coloured = render(ONE, color=True)
-    assert "\x1b[" in coloured
-    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == render(ONE)
+    lines = shown("\ta\x1b[31m", 3, file="f\x1b[2J", message="m\x1b[0m", hint="h\x07")
+    assert not set("".join(lines)) & set("\x1b\x07\t")
 
 
 def test_as_data():

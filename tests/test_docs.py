@@ -1,5 +1,7 @@
-"""Links lead somewhere, sources that are cited have an entry, and the spec that the README shows is valid."""
+"""Pages lead somewhere, cite what has an entry, and show specs and code that run; and so do benchmarks."""
 
+import ast
+import importlib
 import re
 from pathlib import Path
 
@@ -11,6 +13,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 REFERENCES = ROOT / "docs" / "references.md"
 FILES = sorted((ROOT / "inputdesign_cli").rglob("*.py"))
+SCRIPTS = sorted((ROOT / "benchmarks").glob("*.py"))
 CITATION = re.compile(r"(?<!ignore)\[([a-z]{3,}(?:-[a-z]+)*-(?:[0-9]{4}|[a-z]{3,}))\]")
 
 
@@ -21,25 +24,16 @@ def anchors(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page):
-    links = re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8"))
-    missing = [link for link in links if "://" not in link and not (page.parent / link).exists()]
-    assert missing == []
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_to_headings_lead_to_one(page):
-    links = re.findall(r"\]\(([^)#:]*\.md)?#([^)]+)\)", page.read_text(encoding="utf-8"))
+def test_links_lead_to_a_file_and_a_heading_and_every_table_has_a_header(page):
+    text = page.read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#]+)\)", text)
+    assert [link for link in links if "://" not in link and not (page.parent / link).exists()] == []
+    links = re.findall(r"\]\(([^)#:]*\.md)?#([^)]+)\)", text)
     missing = [
         (file, anchor) for file, anchor in links if anchor not in anchors(page.parent / (file or page.name))
     ]
     assert missing == []
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_table_has_a_header(page):
-    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    tables = re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE)
+    tables = re.findall(r"(?:^\|.*\n)+", re.sub(r"```.*?```", "", text, flags=re.DOTALL), flags=re.MULTILINE)
     assert [table for table in tables if not re.match(r".*\n\|[-|]+\n", table)] == []
 
 
@@ -62,3 +56,31 @@ def test_the_spec_of_the_readme_is_the_shipped_one():
     spec = parse_spec(block)
     validate(spec)
     assert spec.sha256 == load_spec(ROOT / "specs" / "first_order.yaml").sha256
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_what_a_benchmark_takes_from_the_package_is_there(script):
+    taken = [
+        (node.module, alias.name)
+        for node in ast.walk(ast.parse(script.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("inputdesign_cli", "tests."))
+        for alias in node.names
+    ]
+    assert taken
+    for module, name in taken:
+        assert hasattr(importlib.import_module(module), name), f"{module} has no {name}"
+
+
+@pytest.mark.slow
+def test_the_code_of_the_page_about_python_runs(tmp_path, monkeypatch):
+    """Of docs/python.md, in its order."""
+    page = ROOT / "docs" / "python.md"
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert len(blocks) == 6
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, str(page), "exec"), names)
+    cost = list(names["lengths"]["cost"])
+    assert cost[1] / cost[0] == pytest.approx(0.5, rel=1e-3)  # all information comes from the input
+    assert names["outcome"].parameters == ("K", "T", "L")

@@ -32,7 +32,7 @@ TWO = BASE % (
     "absolute: 0.2",
     "spectrum: {type: white}",
 )
-FEW = "{exact: 0.95, draws: 1000, runs: 0}"
+FEW = "{exact: 0.9, draws: 500, runs: 0}"
 
 
 def spec(text, confidence, *overrides):
@@ -73,23 +73,23 @@ def test_of_a_finite_response_it_is_that_of_a_plain_simulation(draws, close):
 
 
 def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
-    usual, exact = solve(spec(FIR, "0.95")).result, solve(spec(FIR, FEW)).result
+    usual, exact = solve(spec(FIR, "0.9")).result, solve(spec(FIR, FEW)).result
     share = (exact["model_error"]["alpha"] / usual["model_error"]["alpha"]) ** 2
     assert exact["cost"] / usual["cost"] == pytest.approx(share, rel=1e-6)
     told = exact["model_error"]["confidence"]
     assert told["chi_squared_alpha"] == pytest.approx(usual["model_error"]["alpha"], rel=1e-12)
     assert told["linear"] == told["exact"]
     low, high = told["exact_limits"]
-    assert low - 0.01 < 0.95 < high + 0.01
+    assert low - 0.01 < 0.9 < high + 0.01
     assert "confidence" not in usual["model_error"]
-    assert exact["signal"]["confidence"]["exact"] > 0.93
+    assert exact["signal"]["confidence"]["exact"] > 0.86
 
 
 def test_several_entries_keep_their_bounds_together():
     design = solve(spec(TWO, FEW)).result
     # Two outputs without common noise: with white inputs of power p the four gains are independent, each of
     # variance 1 / (N p), and all four keep to 0.2 with the fourth power of what one does.
-    one = scipy.stats.norm.ppf(0.5 + 0.5 * 0.95**0.25)
+    one = scipy.stats.norm.ppf(0.5 + 0.5 * 0.9**0.25)
     assert design["model_error"]["alpha"] == pytest.approx(one, rel=0.05)
 
 
@@ -202,7 +202,7 @@ def test_runs_keep_the_bound_with_the_probability(name):
 
 @pytest.mark.slow
 def test_a_limit_that_leaves_just_enough_is_no_conflict():
-    few = FEW.replace("1000", "200")
+    few = FEW.replace("500", "200")
     free = solve(spec(FIR, few)).result["power"]["input"][0]
     within = solve(spec(FIR, few, f"limits={{input_power: {1.002 * free!r}}}")).result
     assert within["power"]["input"][0] == pytest.approx(free, rel=2e-3)
@@ -215,5 +215,5 @@ def test_of_the_best_accuracy_it_tells_what_is_kept_there():
     best = ["objective=best_accuracy", "limits={input_power: 0.01}"]
     told = solve(spec(FIR, FEW, *best)).result
     assert told["objective"]["value"] > 1.1
-    assert told["model_error"]["confidence"]["exact"] == pytest.approx(0.95, abs=0.03)
-    assert told["signal"]["confidence"]["exact"] == pytest.approx(0.95, abs=0.03)
+    assert told["model_error"]["confidence"]["exact"] == pytest.approx(0.9, abs=0.04)
+    assert told["signal"]["confidence"]["exact"] == pytest.approx(0.9, abs=0.04)

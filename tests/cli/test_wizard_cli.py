@@ -139,6 +139,7 @@ SENTENCE = (
 )
 
 
+@pytest.mark.slow
 def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
     """A line that is not understood is asked for again; the rest has its default where the lines end."""
     monkeypatch.setattr("sys.stdin", io.StringIO("soon\nconverter: steps of 0.1\n1 min\n"))

@@ -10,7 +10,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("users", ["plain", "folder"])
+@pytest.mark.first(1)
+@pytest.mark.parametrize("users", ["folder", "plain"])
 def test_whenever_the_writer_is_killed_the_next_call_finds_a_whole_run(tmp_path, users):
     command = [sys.executable, "-m", "tests.support.killed_writer", str(tmp_path), users]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)

@@ -124,7 +124,7 @@ def moves(u):
 )
 def test_a_record_has_no_more_moves_than_allowed(limit, most):
     """60 samples of a second are a minute."""
-    results = solve(asked(limits=f"{{amplitude: 1, moves: {limit}}}"))
+    results = solve(asked(limits=f"{{amplitude: 1, moves: {limit}}}", solver="{windows: 4}"))
     u, signal = results.signal[:, 0], results.result["signal"]
     assert moves(u) <= most
     assert signal["moves"]["count"] == moves(u)
@@ -151,14 +151,15 @@ def test_the_cheapest_record_of_few_moves_is_as_high_as_it_must_be():
 
 @pytest.mark.parametrize("returns", [False, True])
 def test_the_best_record_of_few_moves_is_found(returns):
-    """Of 14 samples all records of two levels with at most four moves are looked through."""
+    """Of 12 samples all records of two levels with at most four moves are looked through."""
     spec = asked(
-        experiment="{samples: 14}",
+        experiment="{samples: 12}",
         limits="{amplitude: 1, moves: 4}",
-        signal=f"{{type: binary, seconds: 5, return: {str(returns).lower()}}}",
+        solver="{windows: 4}",
+        signal=f"{{type: binary, seconds: 1, return: {str(returns).lower()}}}",
     )
     found = solve(spec).signal[:, 0]
-    free = 14 - returns
+    free = 12 - returns
     every = (np.array([1.0, *rest, *[0.0] * returns]) for rest in product((-1.0, 1.0), repeat=free - 1))
     best = min(ratio(u) for u in every if moves(u) <= 4)
     assert moves(found) <= 4
@@ -196,12 +197,17 @@ def test_no_move_at_all_is_no_experiment():
         assert refused.value.diagnostics[0].code == "out-of-range"
 
 
-@pytest.mark.parametrize("kind", ["filtered_noise", "multisine", "binary", "ternary", "prbs", "slewed"])
-@pytest.mark.parametrize("rate", ["", ", rate: 0.5"])
+RETURNING = [(kind, "") for kind in ("binary", "prbs", "filtered_noise", "multisine", "ternary")]
+RETURNING += [(kind, ", rate: 0.5") for kind in ("slewed", "multisine", "ternary", "filtered_noise")]
+RETURNING += [(kind, ", rate: 0.5") for kind in ("binary", "prbs")]
+
+
+@pytest.mark.first(8)
+@pytest.mark.parametrize(("kind", "rate"), RETURNING)
 def test_a_record_that_returns_ends_at_the_operating_point(kind, rate):
-    if kind == "slewed" and not rate:
-        pytest.skip("ramps need a rate")
     spec = asked(
+        experiment="{samples: 40}",
+        solver="{windows: 4}",
         limits=f"{{amplitude: 1{rate}}}",
         signal=f"{{type: {kind}, return: true, offset: 45, seconds: 0.2, candidates: 1}}",
     )

@@ -46,7 +46,7 @@ def test_names_and_units_are_shown(tmp_path):
     data = tmp_path / "log.csv"
     rows = [f"{a!r},{b!r}" for a, b in zip(u.tolist(), y.tolist(), strict=True)]
     data.write_text("\n".join(["u1 heating (%),y1 (degC)", *rows]))
-    fitted = identify(spec, data)
+    fitted = identify(spec.with_(**{"plant.known": ["time_constant", "dead_time"]}), data)
     assert fitted.curves["fit"].panels[0].label == "(degC)"
 
 

@@ -28,7 +28,7 @@ PLANT = "plant: {B: [0, 1], F: [1, -0.7]}\n"
 def run(tmp_path_factory):
     """What the command writes, of a log whose columns it finds by itself."""
     folder = tmp_path_factory.mktemp("log")
-    log = lag_log(folder / "log.csv", samples=300)
+    log = lag_log(folder / "log.csv", samples=200)
     done = CliRunner().invoke(app, ["explore", str(log), "-o", str(folder / "run")])
     assert done.exit_code == 0, done.output
     (folder / "stdout").write_text(done.stdout)

@@ -65,9 +65,9 @@ def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
     assert "plant.known: [L]" in note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("spectrum", "undecided"),
-    [("{type: multisine, lines: 120}", True), pytest.param(RICHER, False, marks=pytest.mark.slow)],
+    ("spectrum", "undecided"), [("{type: multisine, lines: 120}", True), (RICHER, False)]
 )
 def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undecided, tmp_path):
     _, u = solved(f"spectrum={spectrum}")

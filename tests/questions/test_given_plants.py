@@ -92,19 +92,19 @@ def test_the_worst_plants_are_left_out():
 
 
 def test_a_risk_takes_as_many_plants_as_a_series_of_trials():
-    robust = analysed(FIRST, f"uncertainty={{covariance: {COVARIANCE}, risk: 0.1, fresh: 0}}").result[
+    robust = analysed(FIRST, f"uncertainty={{covariance: {COVARIANCE}, risk: 0.2, fresh: 0}}").result[
         "robust"
     ]
-    assert 0.9 ** robust["scenarios"] <= 1e-3 < 0.9 ** (robust["scenarios"] - 1)
+    assert 0.8 ** robust["scenarios"] <= 1e-3 < 0.8 ** (robust["scenarios"] - 1)
 
 
 def test_fresh_plants_are_counted():
     ratio = analysed(FIRST).result["model_error"]["worst_ratio"]
     asked = f"accuracy.model_error.relative={0.02 * ratio}"  # that of the spec is just served
-    found = analysed(FIRST, asked, "uncertainty={intervals: {b1: [3.0, 4.2]}, scenarios: 2, fresh: 100}")
+    found = analysed(FIRST, asked, "uncertainty={intervals: {b1: [3.0, 4.2]}, scenarios: 2, fresh: 60}")
     fresh = found.result["robust"]["fresh"]
-    assert fresh["draws"] == 100
-    assert 30 < fresh["missed"] < 70  # half of the gains are smaller, and r_u does not depend on them
+    assert fresh["draws"] == 60
+    assert 17 < fresh["missed"] < 43  # half of the gains are smaller, and r_u does not depend on them
 
 
 @pytest.mark.parametrize("verb", [analyse, solve, simulate])

@@ -40,6 +40,7 @@ def changed(*overrides):
     return parse_spec(SPEC, overrides=list(overrides))
 
 
+@pytest.mark.slow
 def test_single_samples_of_u_are_limited():
     """What r causes at u, by the recursion of the loop, obeys the limits; the accuracy is met still."""
     free = solve(changed("signal.candidates=2")).result["signal"]

@@ -38,7 +38,7 @@ TRUE = "[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]"
 
 @pytest.fixture(scope="module")
 def studied():
-    overrides = ["spectrum.order=2", "simulation={runs: 120, compare: [white, prbs]}"]
+    overrides = ["spectrum.order=2", "simulation={runs: 60, compare: [white, prbs]}"]
     return simulate(load_spec(SPEC, overrides))
 
 
@@ -86,7 +86,7 @@ def test_every_entry_has_its_error_bands(studied):
     for band in curves.panels:
         assert np.all(band.quantiles[0.05] <= band.quantiles[0.95])
         assert np.all(band.quantiles[0.95] < band.r_u)
-    assert studied.curves["cloud_design"].pairs[0].estimates.shape == (120, 2)
+    assert studied.curves["cloud_design"].pairs[0].estimates.shape == (60, 2)
 
 
 def test_the_true_system_may_be_another():
@@ -112,7 +112,7 @@ def test_a_true_system_of_another_structure_has_no_theory():
 
 
 def test_a_loop_keeps_its_promise():
-    outcome = simulate(load_spec(LOOP, ["simulation={runs: 100, compare: [white]}"]))
+    outcome = simulate(load_spec(LOOP, ["simulation={runs: 50, compare: [white]}"]))
     result, simulation = outcome.result, outcome.result["simulation"]
     within_wishart(simulation)
     design = simulation["inputs"]["design"]

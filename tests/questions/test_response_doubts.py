@@ -162,7 +162,7 @@ def test_slow_noise_that_the_spec_knows_is_neither_drift_nor_spikes(write, past)
     """Down to a memory of a period, far below the lowest line."""
     spec = parse_spec(TEXT.replace("-0.9", f"-{past}"))
     u, found = 1.6 * solve(spec).signal[:, 0], []
-    for seed in range(8):
+    for seed in range(4):
         e = 0.1 * np.random.default_rng(seed).standard_normal(len(u) + 3000)
         y = answer(u, 0, size=0.0) + scipy.signal.lfilter([1.0], [1.0, -past], e)[3000:]
         found += causes(judged(write, spec, u, y))

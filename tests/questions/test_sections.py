@@ -45,7 +45,7 @@ OTHER = {
     "spectrum": "{type: fir, order: 2}",
     "uncertainty": "{intervals: {b1: [3, 4]}, scenarios: 2, fresh: 0}",
     "campaign": "{block: 40}",
-    "signal": "{type: binary, candidates: 1, seed: 3, offset: 4}",
+    "signal": "{type: binary, candidates: 1, seed: 3, offset: 0.2}",
     "solver": "{any_spectrum: true}",
     "simulation": "{runs: 3, seed: 3}",
     "report": "{ellipses: [[b1, f1]]}",
@@ -64,6 +64,8 @@ SPECIAL = {
 }
 # What then has no time left.
 OUT_OF_TIME = {("campaign", "solver")}
+# What `assess` does as well, within a few seconds each.
+ALIKE = {("identify", "signal")}
 # Commands that a spec need not ask a design of.
 OF_DATA = ("identify", "explore --validate")
 
@@ -155,7 +157,14 @@ def test_the_page_has_every_section_of_the_schema():
     assert {cell for _, _, cell in CELLS} == {"used", "refused", "-"}
 
 
-@pytest.mark.parametrize(("verb", "section"), [(v, s) for v, s, cell in CELLS if cell == "used"])
+@pytest.mark.parametrize(
+    ("verb", "section"),
+    [
+        pytest.param(v, s, marks=pytest.mark.slow if (v, s) in ALIKE else ())
+        for v, s, cell in CELLS
+        if cell == "used"
+    ],
+)
 def test_what_is_used_changes_the_answer(verb, section, base, data):
     spec = stated(verb, [other(verb, section)])
     if (verb, section) == ("identify", "uncertainty"):  # counts where the data leave several minima

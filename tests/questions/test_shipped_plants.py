@@ -40,6 +40,7 @@ def gradient(theta, w, h):
     return np.stack(columns, axis=1)
 
 
+@pytest.mark.slow
 def test_the_heater_is_designed_as_by_a_plain_program():
     h, samples, variance, most = 4.76, 720, 0.04, np.array([0.05, 6.0, 0.5])
     F = gradient(HEATER, np.arange(1, 121) * np.pi / 120, h) * most

@@ -169,7 +169,7 @@ def test_a_missed_accuracy_is_noted():
     assert any("misses the accuracy" in note for note in outcome.result["notes"])
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.37, 0.3, -0.1])
 def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(offset):
     """Steps of 0.25: the record swings about the nearest value, within the limit from the offset."""

@@ -35,7 +35,7 @@ def test_powers_are_those_of_the_loop(flexible):
 
 
 def test_covariances_lie_in_the_range_of_the_wishart_distribution():
-    overrides = ["simulation={runs: 300, seed: 2, compare: [white]}", "spectrum.order=5"]
+    overrides = ["simulation={runs: 150, seed: 2, compare: [white]}", "spectrum.order=5"]
     result = simulate(load_spec(FIRST, overrides)).result
     low, high = result["simulation"]["wishart_range"]
     # Output power 1e3 times that of the noise: the linear theory holds, up to a few per cent of transients.

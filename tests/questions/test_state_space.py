@@ -32,6 +32,7 @@ def spec_of(plant, rest=REST, **kwargs):
     return parse_spec(f"plant: {plant}\n{rest}", **kwargs)
 
 
+@pytest.mark.slow
 def test_one_plant_in_three_words_is_one_design():
     results = [solve(spec_of(plant)) for plant in WORDS]
     costs = [found.result["cost"] for found in results]

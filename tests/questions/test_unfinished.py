@@ -102,7 +102,7 @@ spectrum: {type: moments, structure: toeplitz}
 def test_moments_are_delivered_with_the_bound_so_far(slow_solver):
     best = solve(parse_spec(MOMENTS)).result["objective"]
     gaps = []
-    for seconds in (1, 31, 91, 301, 601):
+    for seconds in (1, 91, 601):
         result = solve(parse_spec(f"{MOMENTS}solver: {{time_limit: {seconds}}}")).result
         found = result["objective"]
         assert result["mean_squared_error"]["value"] <= 1.2 * (1.0 + 1e-6)

@@ -62,7 +62,7 @@ words = st.sampled_from(
 )
 
 
-@settings(quick, max_examples=60)
+@settings(quick, max_examples=30)
 @given(st.lists(words, max_size=60).map(" ".join) | st.text(max_size=80))
 def test_words_of_the_language_in_any_order_and_any_text(text):
     read_or_complain(text)
@@ -133,7 +133,7 @@ def mutated(draw):
     return data
 
 
-@settings(quick, max_examples=60)
+@settings(quick, max_examples=30)
 @given(mutated())
 def test_examples_with_parts_replaced(data):
     read_or_complain(yaml.safe_dump(data, allow_unicode=True, default_flow_style=None))

@@ -2,9 +2,10 @@
 
 import dataclasses
 
+import cvxpy as cp
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, ModelError, Relative
+from inputdesign_cli.accuracy import Criterion, Cut, ModelError, Relative, Requirement, Violation
 from inputdesign_cli.design.convex.demands import Alternative, Question
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.information import Experiment
@@ -26,6 +27,15 @@ def asked(experiment, goal="cost", requirements=(), order=ORDER, **more):
 
 def solve(*args, tolerance=1e-7, **more):
     return solve_design(asked(*args, **more), tolerance=tolerance)
+
+
+def alone(*args, **more):
+    """The result without the bound over every spectrum."""
+    return solve_design(asked(*args, **more), tolerance=1e-7, any_spectrum_tolerance=None).result
+
+
+def optimum(*args, **more):
+    return alone(*args, **more).objective
 
 
 def relative(fraction=0.01, alpha=2.45, band=BAND, kind=ModelError, admissible=None):
@@ -114,3 +124,37 @@ def resonant():
     """A lightly damped OE system, where cheap inputs and quiet outputs are different things."""
     model = PolynomialModel.single([0, 1.0, 0.3], F=[1, -1.4, 0.81], variance=0.2)
     return Experiment(model, 300)
+
+
+class OnGrid(Requirement):
+    """`whole` at these frequencies alone, as programs of the literature do, the worst `most` at a time."""
+
+    def __init__(self, whole: Requirement, grid: np.ndarray, most: int | None = None):
+        self.whole, self.grid, self.most = whole, grid, most
+
+    @property
+    def name(self) -> str:
+        return "on a grid"
+
+    def violations(self, information, *, above: float = -np.inf) -> list[Violation]:
+        found = self.ratios(information, self.grid)
+        worst = np.argsort(-found)[: self.most]
+        return [Violation(float(found[i]), float(self.grid[i])) for i in worst if found[i] > above]
+
+    def ratios(self, information, frequencies) -> np.ndarray:
+        return self.whole.ratios(information, frequencies)
+
+    def cut(self, frequency: float | None) -> Cut:
+        return self.whole.cut(frequency)
+
+
+def gram_program(problem, order, unit=1.0):
+    """A FIR spectrum as a Gram matrix: (c, M as an expression, constraints), unknowns over `unit`."""
+    scaled = cp.Variable(order + 1)
+    c = unit * scaled
+    gram = cp.Variable((order + 1, order + 1), PSD=True)
+    constraints = [cp.trace(gram) == scaled[0]]
+    constraints += [cp.sum(cp.diag(gram, k)) == scaled[k] for k in range(1, order + 1)]
+    maps = problem.information_map
+    M = problem.baseline_information + sum(c[i] * maps[i] for i in range(order + 1))
+    return c, M, constraints

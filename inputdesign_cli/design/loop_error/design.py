@@ -10,8 +10,8 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import time_is_over
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
-from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.loop_error.closed_form import adjoint, error_of
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion, WeightedCovariance
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem

@@ -255,7 +255,7 @@ def _assessment(
             no_top_up = remedy if periods is None else f"repeat the record: {remedy}"
         else:
             doubts = [*doubts, responses.within_chance(units, ratio, judged.limits, at, remedy)]
-    answer, why, first = verdict(doubts, met=met), reasons(doubts), leading(doubts, None, counted.data)
+    answer, why, first = verdict(doubts, met=met), reasons(doubts), leading(doubts, None, judged.counted.data)
     return Assessment(
         verdict=answer,
         met=answer == "met",

@@ -25,14 +25,19 @@ def question(experiment, others=(), *, goal="cost", order=8, fraction=0.1, **mor
     return asked(experiment, goal, relative(fraction), order, others=others, **more)
 
 
-@pytest.mark.parametrize("paid", ["nominal", "mean", "worst"])
+@pytest.mark.first(6)
 @pytest.mark.parametrize(
-    ("goal", "limited"), [("cost", False), ("cost", True), ("factor", True), ("samples", True)]
+    ("goal", "paid"),
+    [
+        *(("cost", "mean"), ("cost", "worst"), ("capped", "nominal"), ("capped", "mean")),
+        *(("factor", "worst"), ("samples", "mean"), ("cost", "nominal"), ("capped", "worst")),
+        *(("factor", "nominal"), ("factor", "mean"), ("samples", "nominal"), ("samples", "worst")),
+    ],
 )
-def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, limited, paid):
+def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, paid):
     """Paid for by the power of the output too, which is that of each plant."""
     experiment = dataclasses.replace(first_order, samples=1) if goal == "samples" else first_order
-    limits = [PowerLimit("output", 1.0)] if limited else []
+    limits, goal = [] if goal == "cost" else [PowerLimit("output", 1.0)], goal.replace("capped", "cost")
     stated = question(experiment, cost={"input": 1.0, "output": 1.0}, goal=goal, limits=limits)
     once = solve_design(stated, tolerance=1e-8)
     same = Alternative(stated.experiment, stated.requirements)
@@ -45,7 +50,7 @@ def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, limited, 
 def test_more_scenarios_never_cost_less(first_order):
     others = alternatives(first_order, around(first_order, 8, 0.03), 0.1)
     costs = []
-    for number in (0, 1, 2, 4, 8):
+    for number in (0, 2, 8):
         design = solve_design(question(first_order, others[:number]), tolerance=1e-7)
         costs.append(design.result.objective)
         check(design)
@@ -136,8 +141,8 @@ def test_the_certificate_of_the_worst_cost_holds_for_random_spectra():
     model = build_model(parse_spec(text + "accuracy: {criterion: A}\nlimits: {input_power: 1}\n"))
     nominal = Experiment(model, 500)
     others = alternatives(nominal, [np.array([1.0, -1.6 + d, 0.94]) for d in (-0.1, 0.1)], 0.1)
-    stated = question(nominal, others, order=12, cost={"output": 1.0}, paid="worst")
-    design = solve_design(stated, tolerance=1e-7)
+    stated = question(nominal, others, order=8, cost={"output": 1.0}, paid="worst")
+    design = solve_design(stated, tolerance=1e-7, any_spectrum_tolerance=None)
     certificate, problem = design.result.certificate, design.problem
     assert certificate.bound == pytest.approx(design.result.objective, rel=1e-7)
     assert np.sum(certificate.costs > 1e-3) >= 2
@@ -145,11 +150,12 @@ def test_the_certificate_of_the_worst_cost_holds_for_random_spectra():
     paid = [problem.power("output", None, s).at(design.result.x) for s in range(3)]
     assert max(paid) == pytest.approx(design.result.objective, rel=1e-12)
     assert np.all(np.array(paid)[certificate.costs > 1e-3] > (1 - 1e-5) * max(paid))
-    other = solve_design(dataclasses.replace(stated, paid="mean"), tolerance=1e-7).result
+    stated = dataclasses.replace(stated, paid="mean")
+    other = solve_design(stated, tolerance=1e-7, any_spectrum_tolerance=None).result
     powers = np.array([problem.power("output", None, s).at(other.x) for s in range(3)])
     assert powers.mean() <= np.mean(paid) * (1 + 1e-7)
     assert powers.max() >= max(paid) * (1 - 1e-7)
-    for x in random_spectra(np.random.default_rng(3), 12, 100):
+    for x in random_spectra(np.random.default_rng(3), 8, 100):
         worth = np.sum(certificate.weights * (problem.informations(x) - problem.baselines))
         assert max(cost.at(x) for cost in problem.costs) >= worth * (1 - 1e-9)
 

@@ -10,7 +10,6 @@ import pytest
 
 from inputdesign_cli import load_spec, simulate, solve
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
 
 CONTROL = "accuracy.closed_loop_error.control"
@@ -42,7 +41,7 @@ def test_the_design_of_the_column(tmp_path):
     assert structure["white"]["value"] == pytest.approx(1.02222e-5, rel=5e-6)
     assert result["information"]["parameters"] == ["a1", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]"]
     assert set(outcome.curves) == {"spectrum", "directions", "signal"}
-    write_run(outcome, tmp_path / "run", draw_all(outcome))
+    write_run(outcome, tmp_path / "run", {})
     with (tmp_path / "run" / "spectrum.csv").open(encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     assert header == ["frequency_rad_per_min", "phi_11", "phi_12_re", "phi_12_im", "phi_22"]
@@ -55,8 +54,6 @@ def test_the_design_of_the_column(tmp_path):
     assert (values[:, 1] + values[:, 4]) @ weights == pytest.approx(2.0, rel=2e-3)
     saved = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     assert saved["spectrum"]["peak"]["frequency"] == pytest.approx(0.02667 / 2, abs=1e-5)
-    for picture in ("spectrum.png", "directions.png", "signal.png"):
-        assert (tmp_path / "run" / picture).stat().st_size > 10_000
 
 
 def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed():
@@ -74,16 +71,11 @@ def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed():
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize(
-    ("overrides", "kind"),
-    [
-        (["signal={type: filtered_noise}"], "taps"),
-        (["signal={type: filtered_noise, order: 2}"], "filter"),
-        (["signal={type: filtered_noise, order: 4}"], "filter"),
-    ],
-)
-def test_filtered_noise_reports_its_factor(overrides, kind):
-    signal = solve(spec("experiment.samples=1000", *overrides, "signal.candidates=2")).result["signal"]
+@pytest.mark.parametrize("order", [{}, {"order": 2}, {"order": 4}])
+def test_filtered_noise_reports_its_factor(order):
+    noise = {"type": "filtered_noise", "candidates": 2, **order}
+    signal = solve(spec("experiment.samples=1000").with_(signal=noise)).result["signal"]
+    kind = "filter" if order else "taps"
     assert signal["type"] == "filtered_noise"
     assert kind in signal
     assert signal["spectral_factor_residual"] < 0.01
@@ -168,7 +160,7 @@ def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm():
 
 
 def test_simulate_adds_the_study():
-    outcome = simulate(spec("experiment.samples=1500", "signal.candidates=2", "simulation.runs=40"))
+    outcome = simulate(spec("experiment.samples=1000", "signal.candidates=1", "simulation.runs=40"))
     study = outcome.result["simulation"]
     assert study["runs"] == 40
     assert set(study["inputs"]) == {"design", "white"}
@@ -184,8 +176,8 @@ def test_simulate_on_a_true_system_of_its_own():
     """The S1 design of the paper: H without its pole in the design, with it in the true system."""
     outcome = simulate(
         spec(
-            "experiment.samples=1500",
-            "signal.candidates=2",
+            "experiment.samples=1000",
+            "signal.candidates=1",
             "simulation.runs=20",
             "noise.C=[1, -0.9736857494]",
             "simulation.noise={variance: 1.0e-10}",

@@ -123,7 +123,7 @@ def test_no_shape_in_a_box_beats_its_bound(m, n):
             largest_v = 50.0
             found = lift.bound(box, kappa, box_limits(problem, box, largest_v))
             shapes = [problem.evaluate(centre)]
-            for _ in range(200):
+            for _ in range(100):
                 rho = autocorrelations(rng.uniform(-1, 1, n - 1))
                 rho = centre + rng.random() * (rho - centre)
                 inside = np.all(rho[1:m] >= box[0]) and np.all(rho[1:m] <= box[1])
