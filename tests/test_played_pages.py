@@ -7,14 +7,12 @@ import pytest
 
 import make_mechatronics
 import make_records_page
-import make_research
 import make_tutorial
 from pages import DOCS
 
 PAGES = {
     "mechatronics": (make_mechatronics.TEXT, make_mechatronics.mechatronics),
     "records": (make_records_page.TEXT, make_records_page.records),
-    "research": (make_research.TEXT, make_research.research),
     "tutorial": (make_tutorial.TEXT, make_tutorial.tutorial),
 }
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")

@@ -68,6 +68,11 @@ class Requirement(ABC):
         return False
 
     @property
+    def grid(self) -> Array:
+        """Return frequencies (n,) that see every peak of the ratio; one if it does not depend on frequency."""
+        return np.zeros(1)
+
+    @property
     def definite(self) -> bool:
         """Return whether the requirement excludes a singular M."""
         return True

@@ -56,9 +56,10 @@ class PlantGoal:
             for r, some in found
         ]
 
-    def everywhere(self, information: Array) -> list[tuple[Requirement, Array]]:
+    @cached_property
+    def everywhere(self) -> list[tuple[Requirement, Array]]:
         """Return each requirement with frequencies over all of its band."""
-        return [(r, getattr(r, "grid", np.zeros(1))) for r in self.requirements]
+        return [(r, r.grid) for r in self.requirements]
 
 
 def _squares(places: list[tuple[Requirement, Array]], information: Array) -> Array:
@@ -303,11 +304,11 @@ class FlipSearch:
         best = point = start
         if not np.isfinite(start.ratio):
             return start
+        places = [held.goal.everywhere for held in self._held]
         for step in range(_CLIMBS):
             if over():
                 break
             sharpness = _SOFT + (_SHARP - _SOFT) * step / _CLIMBS
-            places = [h.goal.everywhere(M) for h, M in zip(self._held, point.informations, strict=True)]
             gradient = self._gradient(point, self._weights(point, places, sharpness))
             wanted = self._letters[
                 np.argmax(gradient[:, None] * self._letters, axis=1), range(gradient.shape[1])
