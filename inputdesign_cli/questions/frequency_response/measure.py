@@ -235,10 +235,11 @@ def _compared(
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
     """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
-    return {
-        kind: SilentLine(one.lines, *(tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms)))
-        for kind, one in silent.items()
-    }
+    found = {}
+    for kind, one in silent.items():
+        over, chance, rms = (tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms))
+        found[kind] = SilentLine(one.lines, over, chance, rms)
+    return found
 
 
 def _assessment(
