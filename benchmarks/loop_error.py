@@ -23,20 +23,15 @@ import scipy.signal
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.loop_error import (
-    LimitedDesign,
-    LoopErrorDesign,
-    LoopErrorProblem,
-    ModelReference,
-    design_loop_error,
-    design_within,
-)
 from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of, weight
-from inputdesign_cli.design.loop_error.laws import sensitivity
+from inputdesign_cli.design.loop_error.design import LoopErrorDesign, design_loop_error
+from inputdesign_cli.design.loop_error.laws import ModelReference, sensitivity
+from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.questions.loop_error.build import build_loop_error_task
-from inputdesign_cli.questions.loop_error.solve import design_lines, white_lines
+from inputdesign_cli.questions.loop_error.solve import design_lines
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "distillation_column.yaml"
@@ -149,7 +144,7 @@ def bare_passes(repetitions: int = 4) -> list[float]:
 
 def monte_carlo(design: LoopErrorDesign) -> dict[str, float]:
     """2 x 1000 runs of 10000 samples over one lfilter pass through as many samples."""
-    inputs = {"design": design_lines(design, SAMPLES), "white": white_lines(design, SAMPLES)}
+    inputs = {"design": design_lines(design, SAMPLES), "white": design_lines(design, SAMPLES, white=True)}
     before = bare_passes()
     studies, seconds = timed(lambda: study_losses(design.problem, inputs, samples=SAMPLES, runs=RUNS, seed=1))
     passes = [*before, *bare_passes()]

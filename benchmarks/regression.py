@@ -16,7 +16,8 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz
+from inputdesign_cli.design.regression.model import Regression
+from inputdesign_cli.design.regression.structured import OutOfReachError, design_toeplitz
 
 CASES = {(2, 4): 15, (2, 5): 15, (3, 6): 5, (3, 7): 5, (4, 8): 5}
 STARTS = 20

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.regression import Regression
+from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.signal.moments import delayed_regressors
 

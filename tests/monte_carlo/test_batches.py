@@ -10,8 +10,8 @@ import scipy.stats
 from inputdesign_cli.compute.executor import InProcess
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, ModelReference
-from inputdesign_cli.design.loop_error.laws import DesiredLoop
+from inputdesign_cli.design.loop_error.laws import DesiredLoop, InternalModel, ModelReference
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification.polynomial_rows import estimated_polynomials, least_squares
 from inputdesign_cli.information import Experiment, FiniteRecord

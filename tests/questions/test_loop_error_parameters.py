@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, simulate, solve, validate
-from inputdesign_cli.errors import Diagnostic, SpecError
+from inputdesign_cli import parse_spec, simulate, solve
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.report.facts import simulation_table
 from tests.support.outcomes import typed
 
@@ -122,19 +122,6 @@ def test_a_gain_is_coloured_noise(law):
     assert_same([losses(states, EXACT, rest=rest), losses("{A: [1, -0.8], B: [0, 0.5]}", EXACT, rest=armax)])
 
 
-def refused(plant: str, *overrides: str, task=validate) -> Diagnostic:
-    with pytest.raises(SpecError) as caught:
-        task(parse_spec(f"plant: {plant}\n{REST}", overrides=list(overrides)))
-    (found,) = caught.value.diagnostics
-    return found
-
-
-def test_least_squares_estimates_no_named_parameters():
-    found = refused("{parameters: {b: 0.5}, A: [1, -0.3], B: [0, 0, 0, b]}", task=simulate)
-    assert found.code == "not-supported"
-    assert "least squares" in found.message
-
-
 ZEROS = """
 plant: {A: [1, -0.8], B: [0, 1, -1.5]}
 noise: {variance: 0.01}
@@ -174,14 +161,20 @@ def test_unstable_loops_are_said():
         assert f"{entry['unstable']} of 100" in note
 
 
-def test_a_true_plant_that_the_law_cannot_control_is_refused():
-    law = (
-        "accuracy.closed_loop_error.control={model_reference: {numerator: [0, 0.4], denominator: [1, -0.6]}}"
-    )
+LAW = "accuracy.closed_loop_error.control={model_reference: {numerator: [0, 0.4], denominator: [1, -0.6]}}"
+UNSTABLE = (LAW, "plant.B=[0, 1]", "simulation.plant={A: [1, -0.8], B: [0, 1, -1.5]}")
+NAMED = ("plant={parameters: {b: 0.5}, A: [1, -0.8], B: [0, b, -0.75]}",)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "code", "key"),
+    [(UNSTABLE, "non-minimum-phase", "simulation.plant"), (NAMED, "not-supported", "plant")],
+)
+def test_what_cannot_be_simulated_is_refused(overrides, code, key):
     with pytest.raises(SpecError) as caught:
-        simulated(law, "plant.B=[0, 1]", "simulation.plant={A: [1, -0.8], B: [0, 1, -1.5]}")
+        simulated(*overrides)
     (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == ("non-minimum-phase", "simulation.plant")
+    assert (found.code, found.key) == (code, key)
 
 
 def test_records_are_as_long_as_the_signal():

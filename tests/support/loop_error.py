@@ -3,7 +3,9 @@
 import numpy as np
 
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.loop_error import LoopErrorProblem, MatrixPlant, ModelReference
+from inputdesign_cli.design.loop_error.laws import ModelReference
+from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.plant import TransferMatrix, zero_order_hold
 
 POLE = np.exp(-2 / 75)

@@ -12,18 +12,16 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import time_is_over
 from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
-from inputdesign_cli.design.loop_error.closed_form import adjoint, error_of
+from inputdesign_cli.design.loop_error.closed_form import error_of
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion, WeightedCovariance
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
-from inputdesign_cli.errors import InaccurateError, bad_spec
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.information import PowerKind
 from inputdesign_cli.information.quadrature import Quadrature
 from inputdesign_cli.spectrum import LinesBasis
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
-# Eigenvalue of the scaled information matrix below which parameters are not identifiable.
-_SINGULAR = 1e-13
 # Means over frequency that halving the panels moves by more than this are not trusted.
 _UNSETTLED = 1e-8
 # Beyond what is asked: the bound is compared with a value that is computed anew.
@@ -31,28 +29,43 @@ _MARGIN = 0.1
 
 
 @dataclass(frozen=True)
-class WhiteInput:
-    """White noise of the same total power, in the band of the design.
+class LoopInput:
+    """An input: a density at the nodes of a rule, or lines with their power matrices.
 
     Attributes:
-        level: of its flat spectrum.
-        value: N E||y - y0||^2 of the requested covariance.
-        information: (k, k) for one sample.
+        frequencies: (K,) in rad/sample.
+        spectrum: (K, n, n) there.
+        weights: (K,) with which a sum over them is a mean over frequency; one for lines.
     """
 
-    level: float
-    value: float
-    information: Array
+    problem: LoopErrorProblem
+    criterion: ParametricCriterion
+    frequencies: Array
+    spectrum: ComplexArray
+    weights: Array
+
+    @cached_property
+    def information(self) -> Array:
+        """Return the information matrix (k, k) for one sample."""
+        return self.criterion.information(self.frequencies, self.spectrum, self.weights)
+
+    @cached_property
+    def powers(self) -> Array:
+        """Return the mean tr(M_i Phi) (p,) of the limits."""
+        metrics = self.problem.metrics(self.frequencies)
+        return np.asarray(np.einsum("pkab,kba,k->p", metrics, self.spectrum, self.weights).real)
+
+    def power(self, kind: PowerKind) -> Array:
+        """Return the powers (n,) of the channels of a kind, due to the input."""
+        R = self.problem.experiment.response(kind, self.frequencies)
+        return np.asarray(np.einsum("kab,kbc,kac,k->a", R, self.spectrum, np.conj(R), self.weights).real)
 
 
 @dataclass(frozen=True)
-class LoopErrorDesign:
-    """A spectrum: a density at the nodes of a rule (asymptotic covariance) or lines (parametric).
+class LoopErrorDesign(LoopInput):
+    """The best input, a density (asymptotic covariance) or lines (parametric), with its proof.
 
     Attributes:
-        frequencies: (K,) nodes of the rule, or lines, in rad/sample.
-        spectrum: (K, n, n) density there, or power matrices of the lines.
-        weights: (K,) with which a sum over them is a mean over frequency; one for lines.
         value, lower_bound: N E||y - y0||^2 of the requested covariance, J_o included.
         rule: of means over the band.
         steps: of the dual, or rounds of the exchange.
@@ -62,11 +75,6 @@ class LoopErrorDesign:
         settled: relative change of the mean over frequency on halving the panels.
     """
 
-    problem: LoopErrorProblem
-    criterion: ParametricCriterion
-    frequencies: Array
-    spectrum: ComplexArray
-    weights: Array
     value: float
     lower_bound: float
     rule: Quadrature
@@ -91,45 +99,30 @@ class LoopErrorDesign:
         assert self.multipliers is not None
         return self.problem.spectrum_at(w, self.multipliers, self.scale)
 
+    @cached_property
+    def white_level(self) -> float:
+        """Return the level of white noise of the same total power, in the band of the design."""
+        return float(self.power("input").mean() / self.rule.weights.sum())
+
+    @cached_property
+    def white(self) -> LoopInput:
+        """Return this white noise."""
+        density = flat(self.white_level, self.rule.nodes.size, self.problem.plant.inputs)
+        return LoopInput(self.problem, self.criterion, self.rule.nodes, density, self.rule.weights)
+
+    @property
+    def white_value(self) -> float:
+        """Return N E||y - y0||^2 of the requested covariance for white noise."""
+        if self.of_lines:
+            return self.criterion.value(self.white.information)
+        error = error_of(self.problem.target(self.rule.nodes), self.white.spectrum)
+        return float(error @ self.rule.weights) + self.noise_part
+
     def white_density(self, w: Array) -> ComplexArray:
         """Return the spectrum (K, n, n) of `white`, zero outside the band."""
         lo, hi = self.problem.band
         inside = ((w >= lo) & (w <= hi))[:, None, None]
-        return np.where(inside, flat(self.white.level, w.size, self.problem.plant.inputs), 0.0)
-
-    @cached_property
-    def information(self) -> Array:
-        """Return the information matrix (k, k) for one sample."""
-        return self.criterion.information(self.frequencies, self.spectrum, self.weights)
-
-    @cached_property
-    def powers(self) -> Array:
-        """Return the mean tr(M_i Phi) (p,) of the limits."""
-        metrics = self.problem.metrics(self.frequencies)
-        return np.asarray(np.einsum("pkab,kba,k->p", metrics, self.spectrum, self.weights).real)
-
-    @cached_property
-    def white(self) -> WhiteInput:
-        """Return white noise of the same total power."""
-        rule, inputs = self.rule, self.problem.plant.inputs
-        level = float(np.trace(self.input_covariance)) / (inputs * float(rule.weights.sum()))
-        density = flat(level, rule.nodes.size, inputs)
-        information = self.criterion.information(rule.nodes, density, rule.weights)
-        if self.of_lines:
-            return WhiteInput(level, self.criterion.value(information), information)
-        error = float(error_of(self.problem.target(rule.nodes), density) @ rule.weights)
-        return WhiteInput(level, error + self.noise_part, information)
-
-    @property
-    def input_covariance(self) -> Array:
-        """Return the covariance (n, n) of the input."""
-        return np.asarray(np.einsum("kab,k->ab", self.spectrum, self.weights).real)
-
-    @property
-    def output_covariance(self) -> Array:
-        """Return the covariance (n, n) of the output due to the input."""
-        G = self.problem.plant.plant_at(self.frequencies)
-        return np.asarray(np.einsum("kab,k->ab", G @ self.spectrum @ adjoint(G), self.weights).real)
+        return np.where(inside, flat(self.white_level, w.size, self.problem.plant.inputs), 0.0)
 
 
 def design_loop_error(
@@ -146,26 +139,17 @@ def design_loop_error(
         InaccurateError: `gap-not-closed` or `integral-inaccurate`.
         OutOfTimeError: not even a first design was found in time.
     """
-    criterion, rule = problem.parametric(), problem.rule(1)
-    # White input must identify all parameters, in coordinates where each alone has information one.
-    M = criterion.information(rule.nodes, flat(1.0, rule.nodes.size, problem.plant.inputs), rule.weights)
-    size = np.sqrt(np.diag(M))
-    if np.any(size == 0) or np.linalg.eigvalsh(M / np.outer(size, size))[0] < _SINGULAR:
-        message = "white input leaves some parameters of the model indistinguishable"
-        hint = "lower an order, or cancel the common factor of two polynomials"
-        raise bad_spec("not-identifiable", message, hint=hint, key="plant")
+    problem.experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
+    criterion = problem.parametric()
     if covariance == "parametric":
         found = _parametric(problem, criterion, tolerance)
     else:
         found = _asymptotic(problem, criterion)
     if found.gap > _ALMOST * tolerance and not time_is_over():
-        raise InaccurateError.because(
-            "gap-not-closed",
-            f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance asks "
-            f"for {tolerance:.1e}",
-            hint="loosen solver.tolerance, or leave out limits that hardly matter",
-            key="solver.tolerance",
-        )
+        key = "solver.tolerance"
+        message = f"the design is proved only to within {found.gap:.1e} of the optimum; {key} asks for "
+        hint = f"loosen {key}, or leave out limits that hardly matter"
+        raise InaccurateError.because("gap-not-closed", f"{message}{tolerance:.1e}", hint=hint, key=key)
     return found
 
 
@@ -177,12 +161,9 @@ def flat(level: float, frequencies: int, inputs: int) -> ComplexArray:
 def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> LoopErrorDesign:
     design, rule, settled = problem.asymptotic()
     if settled > _UNSETTLED:
-        raise InaccurateError.because(
-            "integral-inaccurate",
-            f"the mean over frequency moves by {settled:.1e} when its grid is halved",
-            hint="look for poles or zeros next to the unit circle",
-            key="plant",
-        )
+        message = f"the mean over frequency moves by {settled:.1e} when its grid is halved"
+        hint = "look for poles or zeros next to the unit circle"
+        raise InaccurateError.because("integral-inaccurate", message, hint=hint, key="plant")
     part = problem.model_of_noise_part()
     # The nodes carry the spectrum already scaled into its limits; the same factor serves elsewhere.
     bare = problem.spectrum_at(rule.nodes[:1], design.multipliers)
@@ -196,10 +177,10 @@ def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> Lo
         min(design.lower_bound, design.value) + part,
         rule,
         design.steps,
-        noise_part=part,
-        multipliers=design.multipliers,
-        scale=float(np.trace(design.spectrum[0]).real / np.trace(bare[0]).real),
-        settled=settled,
+        part,
+        design.multipliers,
+        float(np.trace(design.spectrum[0]).real / np.trace(bare[0]).real),
+        settled,
     )
 
 
@@ -207,7 +188,7 @@ def _parametric(
     problem: LoopErrorProblem, criterion: ParametricCriterion, tolerance: float
 ) -> LoopErrorDesign:
     """Return the sinusoids of the least tr(W P), with a bound for every spectrum within the limits."""
-    experiment, root = Experiment(problem.structure, 1, problem.band), criterion.root
+    experiment, root = problem.experiment, criterion.root
     question = Question(
         experiment=experiment,
         basis=LinesBasis.anywhere(*experiment.band, experiment.inputs),
@@ -220,7 +201,7 @@ def _parametric(
     except UnfinishedDesignError as ended:
         found = ended.design.result
     frequencies, Phi = found.basis.lines(found.x)
-    weights = np.ones(frequencies.size)
+    weights, rule = np.ones(frequencies.size), problem.rule(1)
     value = criterion.value(criterion.information(frequencies, Phi, weights))
-    bound, rule = min(found.certificate.bound, value), problem.rule(1)
+    bound = min(found.certificate.bound, value)
     return LoopErrorDesign(problem, criterion, frequencies, Phi, weights, value, bound, rule, found.rounds)

@@ -11,7 +11,6 @@ an information matrix that is affine in the input spectrum: a convex design like
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +19,7 @@ from inputdesign_cli.accuracy import Cut, inverse_factor
 from inputdesign_cli.accuracy.cuts import VarianceCut
 from inputdesign_cli.accuracy.requirement import OneCondition
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.information import Experiment
 
 _HELD = 1e-14  # shares of W below this are rounding
 _REACH = 90.0
@@ -28,21 +28,16 @@ _STEP = 0.02
 
 @dataclass(frozen=True)
 class ParametricCriterion:
-    """The criterion tr(W (M0 + M(Phi))^-1) for one sample; W and M0 (k, k) real and symmetric.
-
-    `sources(w)` gives X (K, k, n, m) = Phi_v^-1/2 dG_l, so that
-    M_lm(Phi) = mean Re tr(X_l Phi X_m^*).
-    """
+    """The criterion tr(W (M0 + M(Phi))^-1) for one sample of the experiment; W (k, k) real and symmetric."""
 
     W: Array
-    noise_information: Array
-    sources: Callable[[Array], ComplexArray]
+    experiment: Experiment
 
     def information(self, w: Array, Phi: ComplexArray, weights: Array) -> Array:
         """Return M (k, k) of the spectrum Phi (K, n, n) at `w`, for a mean with `weights` (K,)."""
-        X = self.sources(w)
-        excited = X @ Phi[:, None]
-        return self.noise_information + np.einsum("klab,kmab,k->lm", excited, np.conj(X), weights).real
+        X = self.experiment.excitation_gradient(w)
+        excited = np.einsum("klab,kmab,k->lm", X @ Phi[:, None], np.conj(X), weights).real
+        return self.experiment.noise_information + excited
 
     def value(self, information: Array) -> float:
         """Return the criterion tr(W M^-1)."""

@@ -23,10 +23,6 @@ class MatrixPlant(PolynomialModel):
             channels.B, channels.A, channels.F, channels.C, channels.D, channels.covariance, channels.first
         )
 
-    def at(self, theta: ArrayLike, covariance: Array | None = None) -> MatrixPlant:
-        """See `Model`."""
-        return self.of(super().at(theta, covariance))
-
     def disturbance_at(self, w: ArrayLike) -> ComplexArray:
         """Return Phi_v (K, n, n), the spectrum of the noise at the outputs."""
         H = self.noise_at(w)

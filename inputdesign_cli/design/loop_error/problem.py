@@ -15,6 +15,8 @@ from inputdesign_cli.design.loop_error.laws import ControlLaw, sensitivity
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.information.experiment import of_channel
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Model
@@ -23,16 +25,6 @@ from inputdesign_cli.plant.transfer import Rational
 _SETTLED = 1e-11
 _HALVINGS = 4
 _WHITE = Rational(np.ones(1))
-
-
-def metric(limit: PowerLimit, w: ArrayLike, G: ComplexArray) -> ComplexArray:
-    """Return M (K, n, n) with mean tr(M Phi) the limited power; G is the plant at `w`."""
-    size = G.shape[1] if limit.kind == "output" else G.shape[2]
-    picked = np.eye(size) if limit.channel is None else np.diag(np.eye(size)[limit.channel])
-    if limit.kind == "output":
-        return np.asarray(adjoint(G) @ picked @ G)
-    share = np.abs(1.0 - np.exp(-1j * np.atleast_1d(w))) ** 2 if limit.kind == "moves" else np.ones(len(G))
-    return np.asarray(share[:, None, None] * picked.astype(complex))
 
 
 @dataclass(frozen=True)
@@ -73,10 +65,15 @@ class LoopErrorProblem:
         Z = weight(self.law.complementary(w), plant.plant_at(w), self.entering(w), plant.disturbance_at(w))
         return np.swapaxes(Z, 1, 2)
 
+    @cached_property
+    def experiment(self) -> Experiment:
+        """Return one sample of the model structure, in open loop and within the band."""
+        return Experiment(self.structure, 1, self.band)
+
     def metrics(self, w: ArrayLike) -> ComplexArray:
-        """Return the weights M_i (p, K, n, n) of the limits."""
-        G = self.plant.plant_at(w)
-        return np.array([metric(limit, w, G) for limit in self.limits])
+        """Return the weights M_i (p, K, n, n) of the limits: mean tr(M_i Phi) is the limited power."""
+        each = (of_channel(self.experiment.response(one.kind, w), one.channel) for one in self.limits)
+        return np.array([adjoint(R) @ R for R in each])
 
     @cached_property
     def most(self) -> Array:
@@ -144,21 +141,11 @@ class LoopErrorProblem:
     def parametric(self) -> ParametricCriterion:
         """Return the criterion tr(W P) of the model structure."""
         plant, model, rule = self.plant, self.structure, self.rule(1, band=False)
-        X, relative = self._parameter_errors(rule)
-        inverse = np.linalg.inv(plant.covariance)
-        W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(rule.nodes), np.conj(X), rule.weights).real
-        M0 = np.einsum(
-            "klab,bc,kmdc,da,k->lm", relative, plant.covariance, np.conj(relative), inverse, rule.weights
-        ).real
-        whitener = np.linalg.inv(np.linalg.cholesky(plant.covariance))
-        return ParametricCriterion(W, M0, lambda w: np.asarray(whitener @ model.input_gradient(w)))
-
-    def _parameter_errors(self, rule: Quadrature) -> tuple[ComplexArray, ComplexArray]:
-        """Return X_l (K, k, n, n) of the loop at the nodes, see `parametric`, and H^-1 dH_l."""
-        plant, model, w = self.plant, self.structure, rule.nodes
-        dG, relative = model.plant_gradient(w), model.noise_gradient(w)
-        G, T = plant.plant_at(w), self.law.complementary(w)
-        inverse = np.linalg.inv(G)
+        w = rule.nodes
+        dG, relative = model.plant_gradient(w), model.noise_gradient(w)  # H^-1 dH of the noise
+        T, inverse = self.law.complementary(w), np.linalg.inv(plant.plant_at(w))
         X = -sensitivity(T)[:, None] @ dG @ (inverse @ T)[:, None]
         moved = self.law.loop_gradient(np.einsum("kab,klba->kl", inverse, dG), relative, rule)
-        return (X if moved is None else X + moved), relative
+        X = X if moved is None else X + moved
+        W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(w), np.conj(X), rule.weights).real
+        return ParametricCriterion(W, self.experiment)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from itertools import count
 
 import numpy as np
@@ -18,21 +17,15 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound, box_limits
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
-
-@dataclass(order=True)
-class Node:
-    """Holds a box and its bound."""
-
-    bound: float
-    number: int
-    box: Box = field(compare=False)
-    found: NodeBound | None = field(compare=False, default=None)
+# Boxes that take seconds; those of m >= 4 are many and dear, and more of them close little.
+_NODES, _NODES_BEYOND = 400, 100
 
 
 class BranchAndBound:
     """Holds the state of a proof: boxes that are open, and the least bound of the closed ones.
 
     Attributes:
+        open: the heap of bounds with a number, the box, and its relaxation if that was solved.
         nodes: relaxations solved so far.
         assumed: whether the bound of some box rests on `lift.SMALLEST_EIGENVALUE`.
     """
@@ -41,36 +34,36 @@ class BranchAndBound:
         """Begin with all shapes in one box, and nothing known."""
         self.problem, self.lift, self._order = problem, Lift(problem), count()
         edge = np.ones(problem.m - 1)
-        self.open = [Node(-np.inf, next(self._order), np.array([-edge, edge]))]
+        self.open: list[tuple[float, int, Box, NodeBound | None]]
+        self.open = [(-np.inf, next(self._order), np.array([-edge, edge]), None)]
         self.closed, self.nodes, self.assumed = np.inf, 0, False
 
     @property
     def bound(self) -> float:
         """Return the least error over all boxes, at the largest energy considered so far."""
-        return min(self.closed, self.open[0].bound if self.open else np.inf)
+        return min(self.closed, self.open[0][0] if self.open else np.inf)
 
     def prove(
         self,
         kappa: Callable[[], float],
         level: Callable[[], float],
-        *,
-        most_nodes: int,
         suggest: Callable[[Array], None] = lambda _: None,
     ) -> bool:
-        """Split boxes until |b|^2 + kappa v >= level on all of them, or until the time is over.
+        """Split boxes until |b|^2 + kappa v >= level on all of them, or until the time or the boxes are over.
 
         kappa must not fall and may rise: a bound at one energy holds for every smaller one. `suggest` is
         given the autocorrelations of each relaxed optimum below the level; it may improve the incumbent,
         and thereby kappa and level. A better shape has v <= level / kappa.
         """
-        while self.open and self.nodes < most_nodes:
+        while self.open and self.nodes < (_NODES if self.problem.m <= 3 else _NODES_BEYOND):
             node = heapq.heappop(self.open)
-            if node.bound >= level():
-                self.closed = min(self.closed, node.bound)
+            bound, _, whole, found = node
+            if bound >= level():
+                self.closed = min(self.closed, bound)
                 continue
             try:
-                for box in (node.box,) if node.found is None else self._halves(node.box, node.found):
-                    self._examine(node.bound, box, kappa(), level, suggest)
+                for box in (whole,) if found is None else self._halves(whole, found):
+                    self._examine(bound, box, kappa(), level, suggest)
             except OutOfTimeError:
                 heapq.heappush(self.open, node)  # with its halves not all examined, its own bound counts
                 break
@@ -96,7 +89,7 @@ class BranchAndBound:
         bound = max(min(found.bound, level()), least)
         if bound < level() and found.rho.size:
             suggest(found.rho)
-        heapq.heappush(self.open, Node(bound, next(self._order), box, found))
+        heapq.heappush(self.open, (bound, next(self._order), box, found))
 
     def _halves(self, box: Box, found: NodeBound) -> tuple[Box, ...]:
         """Return the two halves of a box across the coordinate that its relaxation knows least of."""

@@ -16,7 +16,7 @@ becomes exact; for m = 1 it is exact at once. Lifts of this kind are due to [las
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -68,14 +68,18 @@ def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimit
     C = scipy.linalg.toeplitz(np.append(1.0, box.mean(axis=0)))
     change = scipy.linalg.toeplitz(np.append(0.0, 0.5 * (box[1] - box[0])))
     D, limit, least_v, assumed = np.zeros_like(C), 0.0, 0.0, False
-    for basis in ToeplitzProblem(problem.first, np.zeros(0)).halves:
-        weight = float(np.sum((basis.T @ problem.first) ** 2))
+    for basis in replace(problem, neglected=np.zeros(0)).halves:
+        weight = float(np.sum((basis.T @ problem.estimated) ** 2))
         radius = float(np.linalg.eigvalsh(np.abs(basis).T @ change @ np.abs(basis))[-1])
         values, vectors = np.linalg.eigh(basis.T @ C @ basis)
         frame = basis @ vectors
         lowest = float(values[0]) - radius
-        square, unproved = _largest_square(weight, lowest, largest_v, single=len(values) == 1)
-        assumed |= unproved
+        # |u|^2 is at most v / (smallest eigenvalue), and (v / |L1|)^2 where the part is one-dimensional.
+        floor, single = largest_v / SMALLEST_EIGENVALUE, len(values) == 1
+        bounds = [largest_v**2 / max(weight, _NOTHING) if single else floor]
+        bounds += [weight / lowest**2, largest_v / lowest] if lowest > 0.0 else []
+        square = min(bounds) if weight > _NOTHING else 0.0
+        assumed |= not single and square == floor
         least_v += weight / max(float(values[-1]) + radius, 1e-300)
         if values[0] + np.abs(frame[:, 0]) @ change @ np.abs(frame[:, 0]) < 0.0:
             least_v = np.inf  # nowhere in the box P11 is positive semidefinite
@@ -86,23 +90,6 @@ def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimit
         D += np.sqrt(s) * (frame / np.sqrt(kept)) @ frame.T
         limit += min(v + 2.0 * (radius + max(0.0, -float(values[0])) + _ROUNDING) * square, most) / s
     return BoxLimits(D, max(limit, 1.0), least_v, assumed)
-
-
-def _largest_square(weight: float, lowest: float, largest_v: float, *, single: bool) -> tuple[float, bool]:
-    """Return an upper bound on |u|^2 of a part, and whether it rests on `SMALLEST_EIGENVALUE`.
-
-    It is v / (smallest eigenvalue) at most, and (v / |L1|)^2 where the part is one-dimensional.
-
-    Args:
-        weight: |L1|^2 of the part; `lowest` bounds its eigenvalues from below, `single`: it has one.
-    """
-    if weight <= _NOTHING:
-        return 0.0, False
-    bounds = [largest_v**2 / weight] if single else []
-    if lowest > 0.0:
-        bounds += [weight / lowest**2, largest_v / lowest]
-    square, floor = min(bounds, default=np.inf), largest_v / SMALLEST_EIGENVALUE
-    return (square, False) if single or square <= floor else (floor, True)
 
 
 @dataclass(frozen=True)
@@ -132,7 +119,7 @@ class Lift:
     @property
     def biases(self) -> int:
         """Return the number of entries of b, which is 0 if bias does not count."""
-        return self.problem.n - self.problem.m if self.problem.biased else 0
+        return self.problem.n - self.problem.m if self.problem.neglected_norm else 0
 
     @cached_property
     def _unknowns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -162,7 +149,7 @@ class Lift:
         (Y, B), scale = self._unknowns, max(1.0, kappa)
         blocks, undecided = self._blocks(box, allowed), (np.zeros(0), box[1] - box[0])
         # The cost is |b|^2 + kappa L1^T D w over a scale.
-        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ allowed.D))
+        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.estimated @ allowed.D))
         q = (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale
         answer = solve_conic(q, blocks, tolerance=_TOLERANCE)
         if not all(np.all(np.isfinite(z)) for z in answer.multipliers):
@@ -184,7 +171,7 @@ class Lift:
         excited = np.einsum(
             "tijk,kra,aj->tir", Y[:, :, 1:], self.problem.lags[..., :m], allowed.D, optimize=True
         )
-        errors = excited - Y[:, :, 0, 0, None] * np.append(self.problem.first, self.problem.second)
+        errors = excited - Y[:, :, 0, 0, None] * np.append(self.problem.estimated, self.problem.neglected)
         gram = np.zeros((size, m + 1 + self.biases, m + 1 + self.biases))
         gram[:, : m + 1, : m + 1], gram[:, m + 1 :, m + 1 :] = Y[..., 0], B
         gram[:, : m + 1, m + 1 :] = errors[:, :, m : m + self.biases]

@@ -14,9 +14,9 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 
 # Below this fraction of the largest eigenvalue a direction of R11 counts as not excited.
-_RANK = 1e-12
+RANK = 1e-12
 # The part of L1 outside the range of R11, relative to L1, from which on the quantity is not estimable.
-_OUTSIDE = 1e-6
+_OUTSIDE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -58,21 +58,25 @@ class Regression:
         """Return the number of all parameters."""
         return self.estimated.size + self.neglected.size
 
+    def weights(self, R: Array) -> Array | None:
+        """Return u with R11 u = L1, of least norm, (m,); None if R11 does not excite all of L1."""
+        values, vectors = np.linalg.eigh(R[: self.m, : self.m])
+        parts = vectors.T @ self.estimated
+        kept = values > RANK * values[-1]
+        if np.linalg.norm(parts[~kept]) > _OUTSIDE * np.linalg.norm(parts):
+            return None
+        return vectors[:, kept] @ (parts[kept] / values[kept])
+
     def error(self, R: Array) -> ErrorSplit:
         """Return the worst mean-squared error with the moments R (n, n), [eckhard-mse] (6), (33), (34).
 
         Infinite when R11 does not excite all of L1.
         """
-        R11 = R[: self.m, : self.m]
-        weights = np.linalg.pinv(R11, rcond=_RANK, hermitian=True) @ self.estimated
-        outside = np.linalg.norm(R11 @ weights - self.estimated)
-        if outside > _OUTSIDE * np.linalg.norm(self.estimated):
+        u = self.weights(R)
+        if u is None:
             return ErrorSplit(np.inf, np.inf)
-        bias = R[self.m :, : self.m] @ weights - self.neglected
-        return ErrorSplit(
-            bias_squared=float(self.neglected_norm**2 * (bias @ bias)),
-            variance=float(self.variance * (weights @ R11 @ weights)),
-        )
+        bias = self.neglected_norm * (R[self.m :, : self.m] @ u - self.neglected)
+        return ErrorSplit(float(bias @ bias), float(self.variance * (self.estimated @ u)))
 
 
 @dataclass(frozen=True)
@@ -110,57 +114,24 @@ def least_error(regression: Regression, energy: float) -> Array:
 def error_bound(regression: Regression, energy: float) -> float:
     """Return a lower bound on the error of any R >= 0 of trace `energy`, whatever its structure.
 
-    The error is at least alpha^2 |d|^2 + sigma^2 (|L1|^2 + |L2 + d|^2) / E for some d. Further, alpha^2 |d|^2
-    >= 2 p^T d - |p|^2 / alpha^2 for every p. The p of the optimum is taken.
+    The error is at least alpha^2 |d|^2 + sigma^2 (|L1|^2 + |L2 + d|^2) / E for some d, and this is least as
+    stated in `least_error`.
     """
     a2, variance = regression.neglected_norm**2, regression.variance
-    fixed = variance * float(regression.estimated @ regression.estimated) / energy
-    if a2 == 0.0:
-        return fixed
-    p = -a2 * variance / (a2 * energy + variance) * regression.neglected
-    size = float(p @ p)
-    return fixed - size / a2 - 2.0 * float(p @ regression.neglected) - size * energy / variance
+    first, second = (float(L @ L) for L in (regression.estimated, regression.neglected))
+    return variance * first / energy + a2 * variance * second / (a2 * energy + variance)
 
 
 def energy_bound(regression: Regression, target: float) -> float:
     """Return the energy below which no R >= 0, whatever its structure, has the error `target`.
 
-    `error_bound` is sigma^2 |L1|^2 / E + alpha^2 sigma^2 |L2|^2 / (alpha^2 E + sigma^2), which falls in E. It
-    is gamma at the positive root of gamma alpha^2 E^2 + (gamma - alpha^2 |L1|^2 - alpha^2 |L2|^2) sigma^2 E =
-    sigma^4 |L1|^2, written so that nothing cancels ([eckhard-mse], Theorem 2).
+    `error_bound` falls in E. It is gamma at the positive root of a quadratic, written so that nothing
+    cancels ([eckhard-mse], Theorem 2):
+    gamma alpha^2 E^2 + (gamma - alpha^2 |L1|^2 - alpha^2 |L2|^2) sigma^2 E = sigma^4 |L1|^2.
     """
     a2, variance = regression.neglected_norm**2, regression.variance
-    first = float(regression.estimated @ regression.estimated)
-    second = float(regression.neglected @ regression.neglected)
+    first, second = (float(L @ L) for L in (regression.estimated, regression.neglected))
     linear = target - a2 * (first + second)
     root = np.sqrt(linear**2 + 4.0 * target * a2 * first)
     scaled = 2.0 * first / (linear + root) if linear >= 0.0 else (root - linear) / (2.0 * target * a2)
     return float(variance * scaled)
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Holds the derivatives of the optimal value (envelope theorem: at the optimum only the data move).
-
-    `goal` is with respect to the target error for a least-energy design and to the energy for a
-    least-error design.
-    """
-
-    neglected_norm: float
-    goal: float
-    noise_deviation: float
-
-
-def sensitivity(regression: Regression, energy: float, split: ErrorSplit, *, of_energy: bool) -> Sensitivity:
-    """Return the sensitivity of the least error alpha^2 |b|^2 + sigma^2 c / E, or of the least energy.
-
-    As the error falls with the energy by its variance over the energy, the least energy rises by a change
-    over this.
-    """
-    alpha, falls = regression.neglected_norm, split.variance / energy
-    unit = falls if of_energy else 1.0
-    return Sensitivity(
-        neglected_norm=2.0 * split.bias_squared / alpha / unit if alpha > 0 else 0.0,
-        goal=-1.0 / falls if of_energy else -falls,
-        noise_deviation=2.0 * split.variance / np.sqrt(regression.variance) / unit,
-    )

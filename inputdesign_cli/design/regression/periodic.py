@@ -6,8 +6,6 @@ Optimal R are singular, made of few lines anywhere between 0 and pi; a period on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -25,22 +23,13 @@ _NEIGHBOURS = 3
 _HEAVY = 1e3  # weight of the equation that the powers add up to one
 
 
-@dataclass(frozen=True)
-class PeriodicDesign:
-    """Holds the shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
-
-    `exact` says whether the Gram matrix is the requested one.
-    """
-
-    shares: Array
-    energy: float
-    exact: bool
-
-
 def design_periodic(
     regression: Regression, rho: Array, energy: float, period: int, *, target: float | None
-) -> PeriodicDesign:
+) -> tuple[Array, float, bool]:
     """Return the shape rho on the lines of a period, or the nearest good design on them.
+
+    These are shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, the energy, and whether
+    the Gram matrix is the requested one.
 
     Args:
         target: the error to be met with the least energy; None: the energy stays, the error follows.
@@ -53,14 +42,14 @@ def design_periodic(
     start = problem.evaluate(fitted)
     exact = bool(np.abs(fitted - rho).max() < _EXACT)
     if exact or start is None:
-        return PeriodicDesign(shares, energy, exact)
+        return shares, energy, exact
     chosen = _candidates(shares)
     shape = Search(problem, goal, Region.of_lines(lines[chosen], problem.n)).descend(start)
     full = np.zeros(lines.size)
     full[chosen] = _fit(shape.rho, lines[chosen])
     value = goal.value(shape)
     met = target is not None and np.isfinite(value)
-    return PeriodicDesign(full, goal.stated(value) if met else energy, False)
+    return full, goal.stated(value) if met else energy, False
 
 
 def _fit(rho: Array, lines: Array) -> Array:

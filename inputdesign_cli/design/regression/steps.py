@@ -59,8 +59,8 @@ def extend(problem: ToeplitzProblem, head: Array) -> Shape | None:
         return None
     region = Region.beginning_with(head, problem.n)
     bias = (problem.lags[:, m:, :m] @ u).T @ region.affine
-    bias[:, 0] -= problem.second
-    found = _solve(problem, region, 1.0, problem.biased * bias)
+    bias[:, 0] -= problem.neglected
+    found = _solve(problem, region, 1.0, problem.neglected_norm * bias)
     return None if found is None else problem.evaluate(found[0])
 
 
@@ -105,7 +105,7 @@ def _solve(
         blocks.append(Block.of("nonnegative", inside))
         variance = matrices(m + 1, m + 1)
         variance[known, :m, :m] = np.einsum("kx,kab->xab", affine, problem.lags[:, :m, :m])
-        variance[0, :m, m] = variance[0, m, :m] = problem.first
+        variance[0, :m, m] = variance[0, m, :m] = problem.estimated
     variance[size + 1, -1, -1] = 1.0
     error = matrices(count + 1, count + 1)
     error[0, :count, :count] = np.eye(count)

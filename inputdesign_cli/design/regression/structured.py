@@ -17,7 +17,6 @@ from inputdesign_cli.design.regression.search import Search
 from inputdesign_cli.design.regression.steps import Region, extend
 from inputdesign_cli.design.regression.toeplitz import Goal, Shape, ToeplitzProblem
 
-_NODES, _NODES_BEYOND = 400, 100  # the boxes of m >= 4 are many and dear, and more of them close little
 _STARTS = 8  # beside white
 # A target is out of reach if no energy up to this many n sigma^2 |L1|^2 / gamma is enough; the largest
 # of these for which the proof closes counts.
@@ -73,68 +72,52 @@ def design_toeplitz(
     shape = min(found, key=lambda one: (goal.value(one), one.bias_squared))
     if not np.isfinite(goal.value(shape)):
         raise _out_of_reach(problem, goal, shape)
-    proof = _Proof(search, shape)
-    bound = proof.run(tolerance)
+    bound, better, tree = _proved(search, shape, tolerance)
     if not alternating:
         with finishing():
-            shape = search.tidied(_least_biased(problem, proof.shape))
+            shape = search.tidied(_least_biased(problem, better))
     spent = energy if energy is not None else goal.stated(goal.value(shape))
     R = scipy.linalg.toeplitz(shape.rho) * (spent / problem.n)
-    counts = {"starts": len(found), "solves": search.solves, "nodes": proof.tree.nodes}
-    assumed = {"assumed_smallest_eigenvalue": SMALLEST_EIGENVALUE} if proof.tree.assumed else {}
+    counts = {"starts": len(found), "solves": search.solves, "nodes": tree.nodes}
+    assumed = {"assumed_smallest_eigenvalue": SMALLEST_EIGENVALUE} if tree.assumed else {}
     return MomentsDesign(R, regression.error(R), goal.stated(bound), shape.rho, {**counts, **assumed})
 
 
 def _least_biased(problem: ToeplitzProblem, shape: Shape) -> Shape:
     """Return the least biased shape with this R11, the limit alpha -> 0 where the bias is free."""
-    if problem.biased or problem.n == problem.m:
+    if problem.neglected_norm or problem.n == problem.m:
         return shape
-    found = extend(replace(problem, biased=True), shape.rho[: problem.m])
+    found = extend(replace(problem, neglected_norm=1.0), shape.rho[: problem.m])
     return shape if found is None else problem.evaluate(found.rho) or shape
 
 
-class _Proof:
-    """Bounds the goal from below while the best `shape` may still improve."""
+def _proved(search: Search, best: Shape, tolerance: float) -> tuple[float, Shape, BranchAndBound]:
+    """Return a lower bound on the goal's value, the best shape, which the proof may improve, and its tree."""
+    problem, goal, tree = search.problem, search.goal, BranchAndBound(search.problem)
 
-    def __init__(self, search: Search, shape: Shape) -> None:
-        self.search, self.shape, self.tree = search, shape, BranchAndBound(search.problem)
+    def level() -> float:
+        return (1.0 - tolerance) * goal.value(best)
 
-    def run(self, tolerance: float) -> float:
-        """Return the lower bound on the goal's value."""
-        goal, first = self.search.goal, self.search.problem.first
-
-        def level() -> float:
-            return (1.0 - tolerance) * goal.value(self.shape)
-
-        nodes = _most_nodes(self.search.problem)
-        if goal.kappa is not None:
-            kappa = goal.kappa
-            self.tree.prove(lambda: kappa, level, most_nodes=nodes, suggest=self._suggest)
-            return max(self.tree.bound, 0.0)
-        assert goal.target is not None
-        target = goal.target
-        # Nothing beats the level if at that energy all errors exceed the target.
-        if self.tree.prove(lambda: 1.0 / level(), lambda: target, most_nodes=nodes, suggest=self._suggest):
-            return level()
-        # At any smaller energy the error has grown by the variance at least, and v >= L1_i^2 for all i.
-        missing = target - max(self.tree.bound, 0.0)
-        return 1.0 / (1.0 / level() + missing / float(np.max(first**2)))
-
-    def _suggest(self, rho: Array) -> None:
-        """Search from the autocorrelations of a relaxed optimum, if that looks better than the best."""
-        problem, goal = self.search.problem, self.search.goal
-        kappa, start = goal.kappa_at(goal.value(self.shape)), problem.evaluate(rho)
+    def suggest(rho: Array) -> None:
+        nonlocal best
+        kappa, start = goal.kappa_at(goal.value(best)), problem.evaluate(rho)
         if start is None:
             return
-        self.search.solves += 1
+        search.solves += 1
         trial = extend(problem, start.rho[: problem.m])
-        if trial is not None and trial.error(kappa) < self.shape.error(kappa) * (1.0 - 1e-12):
-            self.shape = self.search.descend(trial)
+        if trial is not None and trial.error(kappa) < best.error(kappa) * (1.0 - 1e-12):
+            best = search.descend(trial)
 
-
-def _most_nodes(problem: ToeplitzProblem) -> int:
-    """Return the number of boxes that a proof may bound, a number that takes seconds."""
-    return _NODES if problem.m <= 3 else _NODES_BEYOND
+    if goal.kappa is not None:
+        tree.prove(partial(float, goal.kappa), level, suggest)
+        return max(tree.bound, 0.0), best, tree
+    assert goal.target is not None
+    # Nothing beats the level if at that energy all errors exceed the target.
+    if tree.prove(lambda: 1.0 / level(), partial(float, goal.target), suggest):
+        return level(), best, tree
+    # At any smaller energy the error has grown by the variance at least, and v >= L1_i^2 for all i.
+    missing = (goal.target - max(tree.bound, 0.0)) / float(np.max(problem.estimated**2))
+    return 1.0 / (1.0 / level() + missing), best, tree
 
 
 def _out_of_reach(problem: ToeplitzProblem, goal: Goal, shape: Shape) -> OutOfReachError:
@@ -144,6 +127,6 @@ def _out_of_reach(problem: ToeplitzProblem, goal: Goal, shape: Shape) -> OutOfRe
     for multiple in _PROVED_MULTIPLES:
         seconds_left()
         tree, kappa = BranchAndBound(problem), partial(float, target / multiple)
-        if tree.prove(kappa, partial(float, target), most_nodes=_most_nodes(problem)):
+        if tree.prove(kappa, partial(float, target)):
             return OutOfReachError(bias, multiple, tree.assumed)
     return OutOfReachError(bias, 0.0, False)

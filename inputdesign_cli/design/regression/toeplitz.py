@@ -18,11 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.regression.model import Regression
-
-# As in `Regression.error`: directions of P11 that count as not excited, and how much of L1 may lie there.
-_RANK = 1e-12
-_OUTSIDE = 1e-7
+from inputdesign_cli.design.regression.model import RANK, Regression
 
 
 @dataclass(frozen=True)
@@ -44,36 +40,18 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class ToeplitzProblem:
-    """The regression in units where |L1| = 1 and alpha = 1 or 0, so that all blocks are of order one.
+class ToeplitzProblem(Regression):
+    """The regression in units where |L1|, sigma and alpha are 1, so that all blocks are of order one.
 
-    Attributes:
-        first: (m,) L1 / |L1|.
-        second: (n - m,) L2 / |L1|.
-        biased: whether bias counts (alpha > 0); else it is zero.
+    Where alpha is 0, it stays 0, and so does the bias of a shape.
     """
 
-    first: Array
-    second: Array
-    biased: bool = True
-
-    @staticmethod
-    def of(regression: Regression) -> ToeplitzProblem:
+    @classmethod
+    def of(cls, regression: Regression) -> ToeplitzProblem:
         """Return the problem of a regression; `Goal` has the units that are left out here."""
         scale = float(np.linalg.norm(regression.estimated))
-        return ToeplitzProblem(
-            regression.estimated / scale, regression.neglected / scale, regression.neglected_norm > 0.0
-        )
-
-    @property
-    def m(self) -> int:
-        """Return the number of estimated parameters."""
-        return self.first.size
-
-    @property
-    def n(self) -> int:
-        """Return the number of all parameters."""
-        return self.first.size + self.second.size
+        alpha = float(regression.neglected_norm > 0.0)
+        return cls(regression.estimated / scale, regression.neglected / scale, alpha, 1.0)
 
     @cached_property
     def lags(self) -> NDArray[np.float64]:
@@ -107,26 +85,17 @@ class ToeplitzProblem:
         u = self.weights(P)
         if u is None:
             return None
-        bias = self.biased * (P[self.m :, : self.m] @ u - self.second)
-        return Shape(rho, bias, float(self.first @ u))
-
-    def weights(self, P: Array) -> Array | None:
-        """Return u with P11 u = L1, of least norm, (m,); None if there is none, to rounding."""
-        values, vectors = np.linalg.eigh(P[: self.m, : self.m])
-        parts = vectors.T @ self.first
-        kept = values > _RANK * values[-1]
-        if np.any(np.abs(parts[~kept]) > _OUTSIDE):
-            return None
-        return vectors[:, kept] @ (parts[kept] / values[kept])
+        bias = self.neglected_norm * (P[self.m :, : self.m] @ u - self.neglected)
+        return Shape(rho, bias, float(self.estimated @ u))
 
     def bias_jacobian(self, rho: Array) -> NDArray[np.float64]:
         """Return the derivatives (n - m, n - 1) of b with respect to rho_1 .. rho_{n-1}."""
         m = self.m
         P = scipy.linalg.toeplitz(rho)
-        inverse = np.linalg.pinv(P[:m, :m], rcond=_RANK, hermitian=True)
-        u, predictor = inverse @ self.first, P[m:, :m] @ inverse
+        inverse = np.linalg.pinv(P[:m, :m], rcond=RANK, hermitian=True)
+        u, predictor = inverse @ self.estimated, P[m:, :m] @ inverse
         moved = self.lags[1:, :, :m] @ u  # (n - 1, n)
-        return self.biased * (moved[:, m:] - moved[:, :m] @ predictor.T).T
+        return self.neglected_norm * (moved[:, m:] - moved[:, :m] @ predictor.T).T
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,16 +26,13 @@ from inputdesign_cli.questions.building.spectra import build_power_limits, impli
 from inputdesign_cli.questions.building.system import build_cost, build_model
 from inputdesign_cli.questions.building.uncertainty import build_simulation
 from inputdesign_cli.questions.frequency_response.measure import Measurement
-from inputdesign_cli.questions.frequency_response.outcome import KEY, ResponseTerms
-from inputdesign_cli.questions.frequency_response.solve import ResponseTask
+from inputdesign_cli.questions.frequency_response.solve import KEY, ResponseTask
 from inputdesign_cli.signal import harmonic_grid
 from inputdesign_cli.specification import FrequencyResponse, Spec
 from inputdesign_cli.specification.models.sizes import most
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
-# Periods that are tried for a hint, up to that many times as long.
-_LONGEST, _TRIED = 1e3, 400
 # Periods of a block after the transient, if none are stated: their scatter shows the noise.
 _COUNTED = 4
 _SIGNAL = (
@@ -76,7 +71,9 @@ def build_response_task(spec: Spec) -> ResponseTask:
     # The counted length is found where the shortest is asked for; all else is per sample of it.
     counted = periods.blocks * periods.kept(spec.experiment.samples) * periods.period
     experiment = Experiment(model, 1 if goal == "samples" else counted)
-    terms = ResponseTerms(
+    simulation = build_simulation(spec, experiment)
+    check_compared(simulation.compare, "white")
+    return ResponseTask(
         header=build_header(spec),
         experiment=experiment,
         grid=grid,
@@ -87,12 +84,11 @@ def build_response_task(spec: Spec) -> ResponseTask:
         limits=(*build_power_limits(spec), *implied_limits(spec)),
         tolerance=spec.solver.tolerance,
         asked=spec.experiment.samples,
-        most_samples=spec.limits.samples,
         tabulated=stated.noise is not None,
+        record=build_record_request(spec, experiment.size),
+        given=_given(spec, grid),
+        simulation=simulation,
     )
-    record, simulation = build_record_request(spec, experiment.size), build_simulation(spec, experiment)
-    check_compared(simulation.compare, "white")
-    return ResponseTask(terms, _given(spec, grid), record, simulation)
 
 
 def build_measurement(spec: Spec) -> Measurement:
@@ -101,7 +97,7 @@ def build_measurement(spec: Spec) -> Measurement:
     return Measurement(
         header=build_header(spec),
         model=build_model(spec),
-        terms=build_response_task(spec).terms if asked else None,
+        terms=build_response_task(spec) if asked else None,
         operating_point=operating_point(spec),
     )
 
@@ -181,42 +177,30 @@ def _grid(spec: Spec, stated: FrequencyResponse, period: int) -> harmonic_grid.H
 
 def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.int_]:
     """Return the lines that are asked for, or all harmonics but the silent ones; raise `too-few-lines`."""
-    (lo, hi), step, group, lines = (
-        spec.clip_band(stated.band),
-        spec.sample_time,
-        stated.detection,
-        stated.lines,
-    )
+    lo, hi = (edge * spec.sample_time for edge in spec.clip_band(stated.band))
+    group, lines, odd = stated.detection, stated.lines, stated.detection is not None
     if group is not None and lines is not None:
         lines += (lines - 1) // (group - 1)  # with the silent ones
     try:
-        found = harmonic_grid.harmonics_between(period, (lo * step, hi * step), lines, odd=group is not None)
+        found = harmonic_grid.harmonics_between(period, (lo, hi), lines, odd=odd)
     except harmonic_grid.TooFewHarmonicsError as error:
-        there = (
-            f"{error.there} {'odd ' if group is not None else ''}harmonics of a period of {period} samples"
-        )
+        there = f"{error.there} {'odd ' if odd else ''}harmonics of a period of {period} samples"
         asked = "at least one is" if lines is None else f"{lines} are"
         silent = ", with the silent lines that show a nonlinearity" if lines != stated.lines else ""
         message = f"the band holds {there}, and {asked} asked for{silent}"
-        enough = _longer(spec, period, (lo * step, hi * step), lines, odd=group is not None)
-        longer = f"a longer period (more samples, or fewer periods{enough})"
-        hint = f"take {longer}, fewer lines, or a higher end of the band"
+        # So many steps between harmonics, and one that the Nyquist frequency may take.
+        longer = int(np.ceil(2.0 * np.pi * (1 + odd) * ((lines or 1) + 1) / (hi - lo)))
+        whole = longer * max(spec.experiment.samples // period, 1)
+        enough = f"{whole} samples or {whole * spec.sample_time:.6g} {spec.time_unit} in all"
+        hint = (
+            f"take a longer period (more samples, or fewer periods: {longer} samples hold them, {enough}), "
+        )
         key = f"{KEY}.band" if lines is None else f"{KEY}.lines"
+        hint += ", fewer lines, or a higher end of the band"
         raise bad_spec("too-few-lines", message, hint=hint, key=key) from None
     if group is None:
         return found
     return harmonic_grid.thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
-
-
-def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
-    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
-    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
-        with suppress(harmonic_grid.TooFewHarmonicsError):
-            harmonic_grid.harmonics_between(longer, band, lines, odd=odd)
-            whole = longer * max(spec.experiment.samples // period, 1)
-            lasts = whole * spec.sample_time
-            return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
-    return ""
 
 
 def _admitted(

@@ -39,7 +39,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.common.delivery import adding, results_of
-from inputdesign_cli.questions.frequency_response.outcome import ResponseTerms, deviation_curves
+from inputdesign_cli.questions.frequency_response.solve import ResponseTask, deviation_curves
 from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.specification.models.sizes import most
 
@@ -77,7 +77,7 @@ class Counted:
 class Judged:
     """Holds the deviations (L, p, r) of data by the noise of the spec (`expected`) and of the data (`found`).
 
-    The true ratios are between `least` and `largest` (L,) with 95 %. Of the `asked` lines these are excited.
+    The true ratios are between `least` and `largest` (L,) with 95 %.
     Of the power of the inputs the share `differing` differs from period to period; `noise` (L, p) is averaged
     along the lines. With `times` the periods a verdict would be met. The response is `moved` (L,) by a drift,
     over what is admitted, and `distorted` by a nonlinearity. Spikes and drifts are `scattered`.
@@ -90,7 +90,6 @@ class Judged:
     found: NDArray[np.float64]
     least: Array
     largest: Array
-    asked: int
     differing: float
     times: float
     noise: NDArray[np.float64]
@@ -151,7 +150,7 @@ class Measurement:
 
     header: Header
     model: Model
-    terms: ResponseTerms | None
+    terms: ResponseTask | None
     operating_point: Mapping[str, float]
 
 
@@ -192,14 +191,17 @@ def measure(
     )
     drawn = {"frequency_response": table}, {"frequency_response": curve}
     results = results_of(question.header, outcome, *drawn)
-    return results if judged is None else _compared(units, results, judged, seen, assess=assess)
+    if terms is None or judged is None:
+        return results
+    return _compared(terms, results, judged, seen, assess=assess)
 
 
 def _compared(
-    units: Units, results: Results, judged: Judged, found: list[Finding], *, assess: bool
+    terms: ResponseTask, results: Results, judged: Judged, found: list[Finding], *, assess: bool
 ) -> Results:
     """Return the results with the comparison with r_adm and the figure of the deviations."""
-    outcome, w, counted = results.outcome, judged.frequencies / units.frequency, judged.counted
+    units, outcome, counted = terms.header.units, results.outcome, judged.counted
+    w = judged.frequencies / units.frequency
     silent, bent, periods = silent_entry(judged.silent), judged.distorted, counted.periods
     if bent is not None:
         at, cubed = float(w[bent.line]), bent.cubed or None
@@ -209,7 +211,7 @@ def _compared(
         outcome.frequency_response,
         blocks=periods.blocks,
         lines=int(w.size),
-        asked=judged.asked,
+        asked=len(terms.grid.excited),
         period=periods.period,
         periods=periods.each(counted.data.lengths[0]),
         records=len(counted.data.lengths),
@@ -234,10 +236,11 @@ def _compared(
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
     """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
-    return {
-        kind: SilentLine(one.lines, *(tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms)))
-        for kind, one in silent.items()
-    }
+    found = {}
+    for kind, one in silent.items():
+        over, chance, rms = (tuple(x.tolist()) for x in (one.over_noise, one.probability, one.rms))
+        found[kind] = SilentLine(one.lines, over, chance, rms)
+    return found
 
 
 def _assessment(
@@ -310,7 +313,7 @@ def _longest_phase(stated: Periods, data: Record, step: float) -> NDArray[np.int
 
 
 def _at_lines(
-    terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
+    terms: ResponseTask, counted: Counted, name: str, *, assess: bool
 ) -> tuple[Judged, list[Finding]]:
     """Return the comparison at the lines of the spec that the data excite, and findings."""
     data, periods = counted.data, counted.periods
@@ -325,7 +328,7 @@ def _at_lines(
     return judged, [*missing, *counted.findings, *unlike]
 
 
-def _doubted(terms: ResponseTerms, judged: Judged) -> Judged:
+def _doubted(terms: ResponseTask, judged: Judged) -> Judged:
     """Return the comparison with spikes, drifts, and, without spikes, a nonlinearity by the silent lines."""
     units, counted, found = terms.header.units, judged.counted, judged.response
     data, periods, repeats, model = counted.data, counted.periods, counted.repeats, terms.experiment.model
@@ -368,7 +371,7 @@ def _doubted(terms: ResponseTerms, judged: Judged) -> Judged:
 
 
 def judge_lines(
-    terms: ResponseTerms, found: PeriodicResponse, counted: Counted, excited: NDArray[np.bool_]
+    terms: ResponseTask, found: PeriodicResponse, counted: Counted, excited: NDArray[np.bool_]
 ) -> Judged:
     """Return the deviations of the data against r_adm at the measured G, at the `excited` lines (L,).
 
@@ -404,7 +407,6 @@ def judge_lines(
         found=smooth,
         least=low * at_most.ratios(smooth),
         largest=high * at_least.ratios(smooth),
-        asked=excited.size,
         differing=differing(counted.data.u, counted.periods, repeats=counted.repeats),
         times=float(needed) ** 2,
         noise=lines.noise * excess,
@@ -412,7 +414,7 @@ def judge_lines(
     )
 
 
-def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
+def silent_of(terms: ResponseTask, counted: Counted) -> dict[str, SilentLines]:
     """Return the outputs at lines of the design that are not excited, by kind: odd and even."""
     transforms = counted.periods.transforms(counted.data.y, counted.repeats)
     silent = {"odd": terms.grid.odd, "even": terms.grid.even}
@@ -420,7 +422,7 @@ def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
     return {kind: lines for kind, lines in found.items() if lines is not None}
 
 
-def _noise(terms: ResponseTerms, harmonics: NDArray[np.int_]) -> Array:
+def _noise(terms: ResponseTask, harmonics: NDArray[np.int_]) -> Array:
     """Return the noise (n, p) at harmonics (n,) between the lines, linear in both logarithms."""
     w, lines = np.log(terms.grid.at(harmonics)), np.log(terms.grid.frequencies)
     return np.exp(np.stack([np.interp(w, lines, np.log(one)) for one in terms.lines.noise.T], axis=1))

@@ -42,7 +42,14 @@ def build_given(spec: Spec) -> GivenTask:
         raise bad_spec("nothing-given", message, hint=hint, key="spectrum")
     check_supported(spec, "the analysis of a given excitation")
     refuse_unhandled(spec, "the analysis of a given excitation", dict.fromkeys(_OF_DESIGNS, "remove it"))
-    _check_signal_is_open(spec, spec.spectrum)
+    # Settings of the signal mean nothing for a record, nor for sinusoids in phase over several inputs.
+    kind, settings = spec.spectrum.given.type, spec.signal
+    harmless = {"type": settings.type == "multisine", "phases": settings.phases == "random"}
+    fixed = kind == "signal" or (kind == "multisine" and spec.plant.inputs > 1)
+    for name in settings.stated(*_MADE) if fixed else ():
+        if not harmless.get(name):
+            what = "apply it to a given excitation whose samples are settled"
+            raise refuse(f"signal.{name}", what, "remove it")
     check_signal(spec)
     experiment = build_experiment(spec)
     requirements = build_requirements(spec, experiment)
@@ -83,17 +90,6 @@ def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
         return None if plants is None else replace(plants, paid="nominal")
     hint = "remove it, or uncertainty; a design holds for all plants: remove spectrum.given"
     raise refuse(key, what, hint)
-
-
-def _check_signal_is_open(spec: Spec, stated: stated_spectrum.GivenSpectrum) -> None:
-    """Refuse settings of the signal of a record, and of sinusoids in phase over several inputs."""
-    kind, settings = stated.given.type, spec.signal
-    fixed = kind == "signal" or (kind == "multisine" and spec.plant.inputs > 1)
-    harmless = {"type": settings.type == "multisine", "phases": settings.phases == "random"}
-    for name in settings.stated(*_MADE) if fixed else ():
-        if not harmless.get(name):
-            what = "apply it to a given excitation whose samples are settled"
-            raise refuse(f"signal.{name}", what, "remove it")
 
 
 def _excitation(spec: Spec, stated: stated_spectrum.GivenSpectrum, experiment: Experiment) -> GivenExcitation:

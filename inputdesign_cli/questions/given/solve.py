@@ -79,20 +79,19 @@ class GivenExcitation:
     @cached_property
     def power(self) -> dict[PowerKind, list[float]]:
         """Return the mean squares by kind and channel."""
-        experiment, model, found = self.experiment, self.experiment.model, dict[PowerKind, list[float]]()
-        for kind in POWER_KINDS:
-            if self.samples is not None:
+        experiment, model = self.experiment, self.experiment.model
+
+        def of(kind: PowerKind) -> list[float]:
+            if self.spectrum is None:
+                assert self.samples is not None
                 plant = FiniteRecord(experiment, len(self.samples), self.step)
-                found[kind] = plant.mean_squares(kind, self.samples).tolist()
-            elif self.spectrum is not None:
-                basis, x = self.spectrum
-                densities = [
-                    partial(experiment.power_density, kind, channel=channel)
-                    for channel in range(model.outputs if kind == "output" else model.inputs)
-                ]
-                each = [basis.integrals(density, experiment.singularities) for density in densities]
-                found[kind] = [float(x @ unit) for unit in each]
-        return found
+                return list(plant.mean_squares(kind, self.samples).tolist())
+            basis, x = self.spectrum
+            channels = range(model.outputs if kind == "output" else model.inputs)
+            each = (partial(experiment.power_density, kind, channel=channel) for channel in channels)
+            return [float(x @ basis.integrals(density, experiment.singularities)) for density in each]
+
+        return {kind: of(kind) for kind in POWER_KINDS}
 
     @property
     def scale(self) -> float:
@@ -152,13 +151,10 @@ class GivenTask(SpectrumTask):
         information = excitation.information(experiment)
         eigenvalues, vectors = np.linalg.eigh(information)
         if eigenvalues[0] <= _TOO_FAINT * eigenvalues[-1]:
-            raise bad_spec(
-                "not-exciting",
-                f"this excitation has no information on {experiment.unexcited(vectors[:, 0])}: infinite "
-                "variance",
-                hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
-                key="spectrum.given",
-            )
+            lacking = experiment.unexcited(vectors[:, 0])
+            message = f"this excitation has no information on {lacking}: infinite variance"
+            hint = "each sinusoid determines at most two parameters: add frequencies, or drop parameters"
+            raise bad_spec("not-exciting", message, hint=hint, key="spectrum.given")
         requirements = [make(experiment) for make in self.requirements]
         simulated = self._simulated(experiment)
         confidence = self.confidence.of(requirements, information, simulated)
@@ -195,15 +191,14 @@ class GivenTask(SpectrumTask):
             criterion = self.criterion(experiment)
             objective = Objective(criterion.letter, criterion.value(criterion.level(information)))
         errors, stated = self.errors(experiment, requirements)
+        kind = None if objective is None else objective.kind
         informed = Informed(
             units,
             errors,
             information,
             stated,
             white=GivenExcitation.even(self.experiment, level).information(experiment),
-            white_labels=white_labels(
-                None if objective is None else objective.kind, white, experiment.samples
-            ),
+            white_labels=white_labels(kind, white, experiment.samples),
             label="given",
         )
         beyond, of_table = self._beyond(experiment, requirements, information)

@@ -10,15 +10,15 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.loop_error import (
+from inputdesign_cli.design.loop_error.laws import (
     ControlLaw,
     InternalModel,
-    LoopErrorProblem,
-    MatrixPlant,
     MinimumVariance,
     ModelReference,
+    check_invertible,
 )
-from inputdesign_cli.design.loop_error.laws import check_invertible
+from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries

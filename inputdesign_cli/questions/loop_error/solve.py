@@ -14,13 +14,14 @@ from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.limits import Weight, weighted_sum
-from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of
+from inputdesign_cli.design.loop_error.design import LoopErrorDesign, design_loop_error
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion, root_moments
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.simulated_runs import unstable_runs
 from inputdesign_cli.identification.polynomial_rows import is_arx
-from inputdesign_cli.information import PowerKind
+from inputdesign_cli.information import POWER_KINDS, PowerKind
 from inputdesign_cli.monte_carlo.loop_error import LossStudy, study_losses
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.outcome import Signal, Simulation
@@ -86,7 +87,7 @@ class LoopErrorTask:
         begun, samples = time.perf_counter(), self.record_samples
         inputs = {"design": design_lines(design, samples)}
         if self.white:
-            inputs["white"] = white_lines(design, samples)
+            inputs["white"] = design_lines(design, samples, white=True)
         studies = study_losses(
             self.true, inputs, samples=samples, runs=self.runs, seed=self.seed, executor=executor
         )
@@ -110,14 +111,15 @@ class LoopErrorTask:
 
     def _outcome(self, design: LoopErrorDesign, signal: out.Signal, seconds: dict[str, float]) -> out.Outcome:
         """Return the content of result.json; raise `internal-disagreement` of value and bound."""
-        samples, white = self.samples, design.white
-        lo, hi = (edge / self.header.units.sample_time for edge in design.problem.band)
-        informations = {"design": design.information, "white": white.information}
-        powers = _powers(np.diag(design.input_covariance), np.diag(design.output_covariance))
-        # White noise of the same total power.
-        G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
-        even = np.full(design.problem.plant.inputs, white.level * weights.sum())
-        of_white = _powers(even, white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real)
+        samples, unit, problem = self.samples, self.header.units.sample_time, design.problem
+        inputs = {"design": design, "white": design.white}
+        powers, of_white = (
+            {kind: one.power(kind).tolist() for kind in POWER_KINDS} for one in inputs.values()
+        )
+        prices = [None] * len(design.powers) if design.multipliers is None else design.multipliers.tolist()
+        each = zip(problem.limits, design.powers.tolist(), prices, strict=True)
+        value = design.white_value
+        white = out.White(value=value, ratio=value / design.value, power=out.Powers.of(of_white))
         details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
         objective = out.Objective(
             "closed_loop_error",
@@ -139,20 +141,23 @@ class LoopErrorTask:
                 law=self.law,
                 covariance=self.covariance,
                 expected=design.value / samples,
-                band=(lo, hi),
+                band=(problem.band[0] / unit, problem.band[1] / unit),
                 noise_model_part=design.noise_part,
-                parametric={name: theory_of(design.criterion, M) for name, M in informations.items()},
-                limits=_limits(design),
+                parametric={name: theory_of(one.criterion, one.information) for name, one in inputs.items()},
+                limits=tuple(
+                    ActivePower(
+                        one.kind, one.bound, power, None if one.channel is None else one.channel + 1, price
+                    )
+                    for one, power, price in each
+                ),
             ),
             information=out.Information(
-                design.problem.structure.names,
+                problem.structure.names,
                 samples * design.information,
                 np.linalg.inv(design.information) / samples,
             ),
             spectrum=self._spectrum(design),
-            baseline=out.Baseline(
-                out.White(value=white.value, ratio=white.value / design.value, power=out.Powers.of(of_white))
-            ),
+            baseline=out.Baseline(white),
             signal=signal,
             solver=out.Solver("exchange" if design.of_lines else "dual", self.tolerance, details=details),
             timing_s=seconds,
@@ -165,7 +170,7 @@ class LoopErrorTask:
             w, Phi, white = design.frequencies, design.spectrum, None
             shown, drawn = w, Phi
         else:
-            w, white = np.linspace(lo, hi, self.grid), design.white.level
+            w, white = np.linspace(lo, hi, self.grid), design.white_level
             Phi = design.density(w)
             shown = np.geomspace(max(lo, _LOWEST * hi), hi, _POINTS)
             drawn = design.density(shown)
@@ -255,7 +260,7 @@ class LoopErrorTask:
             details: dict[str, object] = {"floor": factor.floor, "taps": int(factor.taps.shape[0])}
             return lambda rng: factor.filtered(samples, rng), factor.residual, details
         filter_ = rational_filter(factor.taps, self.order)
-        wanted = float(np.trace(design.input_covariance))
+        wanted = float(design.power("input").sum())
         filter_ = filter_.scaled(float(np.sqrt(wanted / filter_.power().sum())))
         w, weights = design.frequencies, design.weights
         found: dict[str, object] = {
@@ -268,25 +273,6 @@ class LoopErrorTask:
             "filter": {"A": filter_.A, "B": filter_.B, "C": filter_.C, "D": filter_.D},
         }
         return lambda rng: filter_.filtered(samples, rng), factor.residual, found
-
-
-def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
-    multipliers = [None] * len(design.powers) if design.multipliers is None else design.multipliers.tolist()
-    return tuple(
-        ActivePower(
-            limit.kind,
-            limit.bound,
-            float(power),
-            channel=None if limit.channel is None else limit.channel + 1,
-            multiplier=multiplier,
-        )
-        for limit, power, multiplier in zip(design.problem.limits, design.powers, multipliers, strict=True)
-    )
-
-
-def _powers(inputs: Array, outputs: Array) -> dict[PowerKind, list[float]]:
-    """Return powers by kind and channel; in open loop the excitation is the input."""
-    return {"input": inputs.tolist(), "output": outputs.tolist(), "excitation": inputs.tolist()}
 
 
 def theory_of(criterion: ParametricCriterion, information: Array) -> TheoreticalLoss:
@@ -341,17 +327,12 @@ def _moments(values: Array) -> LossMoments:
     return LossMoments(float(values.mean()), sd, sd / float(np.sqrt(values.size)))
 
 
-def design_lines(design: LoopErrorDesign, samples: int) -> Lines:
-    """Return the design on the harmonics of a record."""
-    if design.of_lines:
-        lines = Lines(design.frequencies, design.spectrum)
-        return Lines.of_period(lines.dense(samples), samples)
-    return grid_lines(design.density(harmonics(samples)), samples, 1.0)
-
-
-def white_lines(design: LoopErrorDesign, samples: int) -> Lines:
-    """Return white noise of the same total power, in the band of the design."""
-    return grid_lines(design.white_density(harmonics(samples)), samples, 1.0)
+def design_lines(design: LoopErrorDesign, samples: int, *, white: bool = False) -> Lines:
+    """Return the design, or white noise of its power in its band, on the harmonics of a record."""
+    w = harmonics(samples)
+    if design.of_lines and not white:
+        return Lines.of_period(Lines(design.frequencies, design.spectrum).dense(samples), samples)
+    return grid_lines(design.white_density(w) if white else design.density(w), samples, 1.0)
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:

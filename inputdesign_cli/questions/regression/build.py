@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from inputdesign_cli.design.regression import Regression
+from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record

@@ -12,10 +12,17 @@ from numpy.typing import NDArray
 from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design import regression as theory
-from inputdesign_cli.design.regression import MomentsDesign, OutOfReachError, Regression, design_toeplitz
 from inputdesign_cli.design.regression.lift import SMALLEST_EIGENVALUE
+from inputdesign_cli.design.regression.model import (
+    ErrorSplit,
+    MomentsDesign,
+    Regression,
+    energy_bound,
+    error_bound,
+    least_error,
+)
 from inputdesign_cli.design.regression.periodic import design_periodic
+from inputdesign_cli.design.regression.structured import OutOfReachError, design_toeplitz
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
 from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
@@ -115,12 +122,12 @@ class RegressionTask:
     def _free(self) -> MomentsDesign:
         """Return the best moments R (n, n) of any structure, and the bound that proves them."""
         if self.target is not None:
-            bound = theory.energy_bound(self.regression, self.target)
-            R = theory.least_error(self.regression, bound)
+            bound = energy_bound(self.regression, self.target)
+            R = least_error(self.regression, bound)
         else:
             assert self.energy is not None
-            bound = theory.error_bound(self.regression, self.energy)
-            R = theory.least_error(self.regression, self.energy)
+            bound = error_bound(self.regression, self.energy)
+            R = least_error(self.regression, self.energy)
         return MomentsDesign(R, self.regression.error(R), bound)
 
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
@@ -177,7 +184,6 @@ class RegressionTask:
         if self.toeplitz:
             method = "alternating" if self.alternating else "sequential_convex"
             solver = out.Solver(method, self.tolerance, details=dict(design.counts))
-        changes = theory.sensitivity(regression, design.energy, split, of_energy=target is not None)
         if target is not None:
             kind, value = "least_cost", design.energy
             slack = target - unit.bias_squared
@@ -213,13 +219,7 @@ class RegressionTask:
                 entries={f"R_{i + 1}_{j + 1}": float(design.R[i, j]) for i in range(n) for j in range(i, n)},
                 autocorrelations=design.rho,
             ),
-            sensitivity=out.Sensitivity(
-                "mean_squared_error" if target is None else "energy",
-                changes.neglected_norm,
-                changes.noise_deviation,
-                target=None if target is None else changes.goal,
-                energy=changes.goal if target is None else None,
-            ),
+            sensitivity=sensitivity(regression, design.energy, split, target=target is not None),
             baseline=out.Baseline(white),
             signal=signal,
             solver=solver,
@@ -245,19 +245,38 @@ class RegressionTask:
             Phi = channels = free_regressors(R, samples, period)
         else:
             period = period or samples
-            found = design_periodic(regression, rho, float(np.trace(R)), period, target=self.target)
-            power = found.energy / (least * samples)
-            u = periodic_input(found.shares, power, samples, period, np.random.default_rng(self.seed))
+            shares, energy, exact = design_periodic(
+                regression, rho, float(np.trace(R)), period, target=self.target
+            )
+            power = energy / (least * samples)
+            u = periodic_input(shares, power, samples, period, np.random.default_rng(self.seed))
             Phi, channels = delayed_regressors(u, least, self.start), u[:, None]
             at_rest = _attained(regression, delayed_regressors(u, least, "zero"), R)
-            details = {"start": self.start, "on_grid": found.exact, "from_rest": at_rest}
-            used = np.flatnonzero(found.shares > 0.0)
-            lines = 2.0 * np.pi * used / period, found.shares[used] * power
+            details = {"start": self.start, "on_grid": exact, "from_rest": at_rest}
+            used = np.flatnonzero(shares > 0.0)
+            lines = 2.0 * np.pi * used / period, shares[used] * power
         attained = _attained(regression, Phi, R)
         error = attained.pop("mean_squared_error", None)
         details = {**attained, "period": period, **details}
         signal = replace(plain_signal(channels), details=details, mean_squared_error=error)
         return RegressorRecord(Phi, channels, signal, lines)
+
+
+def sensitivity(regression: Regression, energy: float, split: ErrorSplit, *, target: bool) -> out.Sensitivity:
+    """Return the derivatives of the least error alpha^2 |b|^2 + sigma^2 c / E, or of the energy for a target.
+
+    At the optimum only the data move (envelope theorem). As the error falls with the energy by its variance
+    over the energy, the least energy rises by a change over this.
+    """
+    alpha, falls = regression.neglected_norm, split.variance / energy
+    unit = falls if target else 1.0
+    return out.Sensitivity(
+        "energy" if target else "mean_squared_error",
+        2.0 * split.bias_squared / alpha / unit if alpha > 0 else 0.0,
+        float(2.0 * split.variance / np.sqrt(regression.variance) / unit),
+        target=-1.0 / falls if target else None,
+        energy=None if target else -falls,
+    )
 
 
 def tried_regressors(

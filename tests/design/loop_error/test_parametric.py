@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.loop_error import (
-    InternalModel,
-    LoopErrorProblem,
-    MinimumVariance,
-    ModelReference,
-    design_loop_error,
-)
+from inputdesign_cli.design.loop_error.design import design_loop_error
+from inputdesign_cli.design.loop_error.laws import InternalModel, MinimumVariance, ModelReference
 from inputdesign_cli.design.loop_error.parametric import root_moments
+from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.plant import Rational, TransferMatrix
 from tests.support.loop_error import column, matrix_plant, random_hermitian, random_plant
 

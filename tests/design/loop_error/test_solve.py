@@ -58,7 +58,7 @@ def test_the_design_of_the_column(tmp_path):
 
 def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed():
     limits = "limits={input_power: [1.2, 0.5], output_power: [0.001, 0.001]}"
-    outcome = solve(spec("experiment.samples=4000", "signal.candidates=3", limits))
+    outcome = solve(spec("experiment.samples=2000", "signal.candidates=2", limits))
     u = np.array([outcome.tables["signal"].columns[f"u{i}"] for i in (1, 2)])
     assert np.all(np.mean(u**2, axis=1) <= np.array([1.2, 0.5]) * (1 + 1e-9))
     result = outcome.result
@@ -66,16 +66,16 @@ def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed():
         [result["power"]["input"][0], 0.5, result["power"]["output"][0], 0.001], rel=1e-6
     )
     designed = result["closed_loop_error"]["parametric"]["design"]["value"]
-    assert result["signal"]["parametric_value"] == pytest.approx(designed, rel=0.05)
+    assert result["signal"]["parametric_value"] == pytest.approx(designed, rel=0.08)
     assert result["objective"]["relative_gap"] < 1e-10
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize("order", [{}, {"order": 2}, {"order": 4}])
-def test_filtered_noise_reports_its_factor(order):
-    noise = {"type": "filtered_noise", "candidates": 2, **order}
-    signal = solve(spec("experiment.samples=1000").with_(signal=noise)).result["signal"]
-    kind = "filter" if order else "taps"
+@pytest.mark.parametrize(
+    ("settings", "kind"), [("", "taps"), (", order: 2", "filter"), (", order: 4", "filter")]
+)
+def test_filtered_noise_reports_its_factor(settings, kind):
+    signal = solved(f"signal={{type: filtered_noise, candidates: 2{settings}}}").result["signal"]
     assert signal["type"] == "filtered_noise"
     assert kind in signal
     assert signal["spectral_factor_residual"] < 0.01
@@ -86,8 +86,7 @@ def test_filtered_noise_reports_its_factor(order):
 
 
 def test_the_exact_covariance_gives_lines_and_a_better_input():
-    outcome = solved("accuracy.closed_loop_error.covariance=parametric")
-    result = outcome.result
+    result = solved("accuracy.closed_loop_error.covariance=parametric").result
     assert result["objective"]["value"] == pytest.approx(5.204e-6, rel=1e-4)
     assert result["objective"]["relative_gap"] < 1e-6
     assert result["spectrum"]["type"] == "multisine"
@@ -98,33 +97,30 @@ def test_the_exact_covariance_gives_lines_and_a_better_input():
 
 
 def test_a_band_counts_the_error_inside_it_only():
-    inside = solved("limits.band=[0.005, 0.5]").result
-    whole = solved().result
+    inside, whole = solved("limits.band=[0.005, 0.5]").result, solved().result
     assert inside["objective"]["value"] < whole["objective"]["value"]
     assert inside["closed_loop_error"]["band"] == pytest.approx([0.005, 0.5])
     assert sum(inside["power"]["input"]) == pytest.approx(2.0, rel=1e-9)
 
 
-def test_internal_model_with_its_filter_is_model_reference_on_a_plant_without_zeros():
-    reference = "{numerator: [0, 0.3], denominator: [1, -0.7]}"
-    by_reference = solved(f"{CONTROL}={{model_reference: {reference}}}").result
-    internal = f"{CONTROL}={{internal_model: {{numerator: [0.3], denominator: [1, -0.7]}}}}"
-    by_filter = solved(internal).result
-    assert by_filter["objective"]["value"] == pytest.approx(by_reference["objective"]["value"], rel=1e-10)
-    assert by_filter["closed_loop_error"]["law"] == "internal_model"
+T = "[0, 0.3]"
+WAYS = {
+    "scalar": f"{{model_reference: {{numerator: {T}, denominator: [1, -0.7]}}}}",
+    "matrix": f"{{model_reference: {{numerator: [[{T}, [0]], [[0], {T}]], denominator: [1, -0.7]}}}}",
+    "internal model": "{internal_model: {numerator: [0.3], denominator: [1, -0.7]}}",
+    "in s": "{model_reference: {continuous: {numerator: [[[1], [0]], [[0], [1]]], denominator: [75, 1]}}}",
+}
 
 
-def test_a_target_matrix_and_its_scalar_agree():
-    t = "[0, 0.3]"
-    scalar = f"{CONTROL}={{model_reference: {{numerator: {t}, denominator: [1, -0.7]}}}}"
-    matrix = f"{CONTROL}={{model_reference: {{numerator: [[{t}, [0]], [[0], {t}]], denominator: [1, -0.7]}}}}"
-    continuous = (
-        f"{CONTROL}={{model_reference: {{continuous: {{numerator: [[[1], [0]], [[0], [1]]], "
-        "denominator: [75, 1]}}}"
-    )
-    values = [solved(*o).result["objective"]["value"] for o in ([scalar], [matrix], [continuous], [])]
-    assert values[0] == pytest.approx(values[1], rel=1e-10)
-    assert values[2] == pytest.approx(values[3], rel=1e-10)
+@pytest.mark.parametrize(
+    ("one", "other"), [("scalar", "matrix"), ("scalar", "internal model"), ("in s", None)]
+)
+def test_one_loop_in_other_words_is_one_design(one, other):
+    """Without zeros outside internal model control is model reference; the spec states the scalar in s."""
+    first, second = (solved(*([f"{CONTROL}={WAYS[way]}"] if way else [])).result for way in (one, other))
+    assert first["objective"]["value"] == pytest.approx(second["objective"]["value"], rel=1e-10)
+    if other == "internal model":
+        assert second["closed_loop_error"]["law"] == "internal_model"
 
 
 def test_minimum_variance_reports_what_no_input_changes():
@@ -149,12 +145,9 @@ def test_a_continuous_time_plant_is_sampled():
 
 def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm():
     """S = 1 - T vanishes at pi/2 rad/sample, where C is infinite: the criterion stays finite and settles."""
-    z0 = "{numerator: [0, 0.2, -0.5, 0.2, 0.5], denominator: [1]}"
-    numerator = np.array([0, 0.2, -0.5, 0.2, 0.5])
-    sensitivity = np.concatenate([[1.0], np.zeros(4)]) - numerator
-    value = abs(np.polynomial.polynomial.polyval(np.exp(-0.5j * np.pi), sensitivity))
-    assert value < 1e-12
-    result = solved(f"{CONTROL}={{model_reference: {z0}}}").result
+    T = [0, 0.2, -0.5, 0.2, 0.5]
+    assert abs(1 - np.polynomial.polynomial.polyval(-1j, T)) < 1e-12
+    result = solved(f"{CONTROL}={{model_reference: {{numerator: {T}, denominator: [1]}}}}").result
     assert np.isfinite(result["objective"]["value"])
     assert result["solver"]["settled"] < 1e-10
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from inputdesign_cli.design.regression import Regression, energy_bound, error_bound, least_error, sensitivity
+from inputdesign_cli.design.regression.model import Regression, energy_bound, error_bound, least_error
+from inputdesign_cli.questions.regression.solve import sensitivity
 from tests.support.regression import mse
 
 ONE = Regression(np.array([1.0]), np.array([1.0]), 1.0, 1.0)
@@ -124,9 +125,11 @@ def test_sensitivities_are_derivatives(of_energy):
 
     energy = least() if of_energy else value
     split = regression.error(least_error(regression, energy))
-    found = sensitivity(regression, energy, split, of_energy=of_energy)
+    found = sensitivity(regression, energy, split, target=of_energy)
     for name, slope in zip(
-        ("alpha", "goes", "sigma"), (found.neglected_norm, found.goal, found.noise_deviation), strict=True
+        ("alpha", "goes", "sigma"),
+        (found.neglected_norm, found.target or found.energy, found.noise_deviation),
+        strict=True,
     ):
         differences = (least(**{name: step}) - least(**{name: -step})) / (2 * step)
         assert slope == pytest.approx(differences, rel=1e-7)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz, energy_bound
 from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.lift import box_limits
+from inputdesign_cli.design.regression.model import Regression, energy_bound
+from inputdesign_cli.design.regression.structured import OutOfReachError, design_toeplitz
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from tests.support.regression import autocorrelations, general_search, mse, one_estimated_by_cvxpy
 
@@ -26,16 +27,21 @@ def gap(found, value):
 
 
 @pytest.mark.parametrize(
-    ("second", "alpha"),
-    [*((1, alpha) for alpha in (0.1, 1, 10)), *((2, alpha) for alpha in (0.1, 0.5, 0.9, 0.99))],
+    ("first", "second", "alpha", "variance", "target"),
+    [
+        *((1, 1, alpha, 1, 1) for alpha in (0.1, 1, 10)),
+        *((1, 2, alpha, 1, 1) for alpha in (0.1, 0.5, 0.9, 0.99)),
+        *((*taps, 0.4, 0.7, 1.5) for taps in ((1.0, 0.3), (0.5, -2.0), (-1.0, 1.0))),
+    ],
 )
-def test_examples_3_and_4_and_figure_2(second, alpha):
-    """Example 3 is the same for every alpha."""
-    found = design(regression([1], [second], alpha), target=1.0)
-    power = 1.0 / (1.0 - alpha**2 * (second - 1))
-    assert found.energy == pytest.approx(2.0 * power, rel=1e-8)
-    np.testing.assert_allclose(found.R, np.full((2, 2), power), rtol=1e-8)
+def test_two_taps_in_closed_form(first, second, alpha, variance, target):
+    """Examples 3 and 4, Figure 2, and others."""
+    found = design(regression([first], [second], alpha, variance), target=target)
+    slack = target - alpha**2 * max(abs(second) - abs(first), 0.0) ** 2
+    assert found.energy == pytest.approx(2.0 * variance * first**2 / slack, rel=1e-8)
     assert 0.0 <= gap(found, found.energy) <= 1.1e-6
+    if first == second or alpha != 0.4:
+        np.testing.assert_allclose(found.R, np.full((2, 2), 0.5 * found.energy), rtol=1e-8)
 
 
 @pytest.mark.first(1)
@@ -46,14 +52,6 @@ def test_example_4_is_infeasible_from_alpha_one(alpha):
     assert error.value.bias == pytest.approx(1.0, rel=1e-8)
     assert error.value.proved >= 1e6
     assert not error.value.assumed
-
-
-@pytest.mark.parametrize(("first", "second"), [(1.0, 0.3), (0.5, -2.0), (-1.0, 1.0)])
-def test_two_taps_in_closed_form(first, second):
-    alpha, variance, target = 0.4, 0.7, 1.5
-    found = design(regression([first], [second], alpha, variance), target=target)
-    slack = target - alpha**2 * max(abs(second) - abs(first), 0.0) ** 2
-    assert found.energy == pytest.approx(2.0 * variance * first**2 / slack, rel=1e-8)
 
 
 REFERENCE = [
@@ -156,7 +154,7 @@ def test_a_structure_costs_energy():
 def test_a_proof_that_ends_early_has_a_bound(monkeypatch):
     """With few boxes the bound is weaker, but it is one: v is at least the square of each entry of L1."""
     best = design(regression(*FOUR), target=1.0)
-    monkeypatch.setattr("inputdesign_cli.design.regression.structured._NODES", 3)
+    monkeypatch.setattr("inputdesign_cli.design.regression.branch._NODES", 3)
     found = design(regression(*FOUR), target=1.0)
     assert found.counts["nodes"] <= 4
     assert 0.5 * best.energy < found.bound < best.bound
