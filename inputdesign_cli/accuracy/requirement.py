@@ -69,7 +69,7 @@ class Requirement(ABC):
 
     @property
     def grid(self) -> Array:
-        """Return frequencies (n,) that see every peak of the ratio; one if it does not depend on frequency."""
+        """Return frequencies (n,) that see every peak of the ratio; a single one if there is no band."""
         return np.zeros(1)
 
     @property
