@@ -138,12 +138,12 @@ class PolynomialKind(Kind):
                 earlier[i, j] -= 1
                 sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
                 larger.append((sooner, "coefficient in B before the others"))
-        for name, rows in (("A", model.A), ("C", model.C), ("D", model.D)):
-            what = "pole in A" if name == "A" else f"coefficient in {name}"
-            for i, row in enumerate(rows):
-                if name != "A" or row.size > 1:
-                    more = (*rows[:i], np.append(row, 0.0), *rows[i + 1 :])
-                    larger.append((replace(model, **{name: more}), what))
+        for i in (i for i, row in enumerate(model.A) if row.size > 1):
+            larger.append((replace(model, A=_longer(model.A, i)), "pole in A"))
+        for i in range(len(model.C)):
+            larger.append((replace(model, C=_longer(model.C, i)), "coefficient in C"))
+        for i in range(len(model.D)):
+            larger.append((replace(model, D=_longer(model.D, i)), "coefficient in D"))
         return [Extension.of(model, one, what) for one, what in larger]
 
     def simulates(self, theta: Array) -> Sequence[bool]:
@@ -172,3 +172,7 @@ def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )
+
+
+def _longer(rows: tuple[Array, ...], i: int) -> tuple[Array, ...]:
+    return (*rows[:i], np.append(rows[i], 0.0), *rows[i + 1 :])

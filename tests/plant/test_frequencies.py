@@ -16,32 +16,48 @@ def test_grid_resolves_a_lightly_damped_pole():
     assert grid[-1] == np.pi
 
 
-def test_maxima_of_a_known_function():
-    def function(w):
-        return np.cos(7 * w) + 0.2 * w
+# Functions, grids, where their maxima are, to this tolerance, and how exact their values are.
+MAXIMA = {
+    # -7 sin(7 w) + 0.2 = 0 next to each maximum of the cosine
+    "smooth": (
+        lambda w: np.cos(7 * w) + 0.2 * w,
+        np.linspace(0, np.pi, 60),
+        [(2 * np.pi * k + np.arcsin(0.2 / 7)) / 7 for k in range(4)],
+        1e-6,
+        1e-12,
+    ),
+    "twin peaks between neighbouring grid points": (
+        lambda w: 1 / (1 + ((w - 1.000) / 2e-3) ** 2) + 1.01 / (1 + ((w - 1.009) / 2e-3) ** 2),
+        np.linspace(0, 2, 401),
+        [1.000, 1.009],
+        1e-3,
+        1e-2,
+    ),
+    "kink": (lambda w: -np.abs(w - 0.3333), np.linspace(0, 1, 11), [0.3333], 1e-6, 1e-6),
+    # Where r_adm is all but used up, the error in units of it has kinks as steep as this one.
+    "steep kink": (
+        lambda w: 1.0 / (1.0 + 1e4 * np.abs(w - 0.245528)),
+        graded_grid([], 0.0, np.pi),
+        [0.245528],
+        1e-6,
+        1e-8,
+    ),
+    # Ripples of 1e-9 are no rounding: all of them are found, whatever stands beside them.
+    "ripples": (
+        lambda w: 1.0 + 1e-9 * np.cos(20.0 * w) + np.where(w > 2.0, w - 2.0, 0.0),
+        np.linspace(0.0, 2.5, 3001),
+        [*(np.pi / 10 * k for k in range(7)), 2.5],
+        1e-4,
+        1e-12,
+    ),
+}
 
-    grid = np.linspace(0, np.pi, 60)
+
+@pytest.mark.parametrize(("function", "grid", "exact", "apart", "off"), MAXIMA.values(), ids=MAXIMA)
+def test_maxima_are_where_calculus_puts_them(function, grid, exact, apart, off):
     w, values = local_maxima(function, grid, function(grid))
-    # -7 sin(7 w) + 0.2 = 0 next to each maximum of the cosine, and the right end, where it still rises
-    exact = [(2 * np.pi * k + np.arcsin(0.2 / 7)) / 7 for k in range(4)]
-    np.testing.assert_allclose(w[:4], exact, atol=1e-6)
-    np.testing.assert_allclose(values[:4], function(np.array(exact)), rtol=1e-12)
-
-
-def test_twin_peaks_between_neighbouring_grid_points_are_parted():
-    def function(w):
-        return 1 / (1 + ((w - 1.000) / 2e-3) ** 2) + 1.01 / (1 + ((w - 1.009) / 2e-3) ** 2)
-
-    grid = np.linspace(0, 2, 401)
-    w, _ = local_maxima(function, grid, function(grid), above=0.9)
-    assert len(w) == 2
-
-
-def test_kinks_are_found():
-    grid = np.linspace(0, 1, 11)
-    w, values = local_maxima(lambda w: -np.abs(w - 0.3333), grid, -np.abs(grid - 0.3333))
-    np.testing.assert_allclose(w, [0.3333], atol=1e-6)
-    assert values[0] > -1e-6
+    np.testing.assert_allclose(w, exact, atol=apart)
+    np.testing.assert_allclose(values, function(np.array(exact)), rtol=0.0, atol=off)
 
 
 @pytest.mark.parametrize("end", [0.0, np.pi])
@@ -73,18 +89,6 @@ def test_a_function_that_is_flat_but_for_rounding_has_one_maximum(noise):
     assert sum(calls[1:]) < 200
 
 
-def test_maxima_between_which_a_function_falls_little_are_kept():
-    """Ripples of 1e-9 are no rounding: all of them are found, whatever stands beside them."""
-
-    def function(w):
-        return 1.0 + 1e-9 * np.cos(20.0 * w) + np.where(w > 2.0, w - 2.0, 0.0)
-
-    grid = np.linspace(0.0, 2.5, 3001)
-    w, _ = local_maxima(function, grid, function(grid))
-    exact = [*(np.pi / 10 * k for k in range(7)), 2.5]
-    np.testing.assert_allclose(w, exact, atol=1e-4)
-
-
 @pytest.mark.parametrize(
     ("coefficients", "roots"),
     [
@@ -99,18 +103,6 @@ def test_roots_without_delays(coefficients, roots):
     found = roots_in_z(coefficients)
     np.testing.assert_allclose(np.sort(found.real), roots, rtol=1e-12)
     np.testing.assert_array_equal(found.imag, 0.0)
-
-
-def test_a_steep_kink_is_found_as_exactly_as_a_smooth_maximum():
-    # Where r_adm is all but used up, the error in units of it has kinks as steep as this one.
-    place = 0.245528
-
-    def function(w):
-        return 1.0 / (1e-4 + np.abs(w - place))
-
-    grid = graded_grid([], 0.0, np.pi)
-    _, values = local_maxima(function, grid, function(grid))
-    assert np.max(values) == pytest.approx(1e4, rel=1e-8)
 
 
 @pytest.mark.first(8)
