@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import cast
 
 import numpy as np
@@ -215,7 +215,8 @@ class Planner:
         off = model.plant_at(w) - other.plant_at(w)
         left = model.left_at(w)[0] @ off @ experiment.response("input", w)
         white = np.linalg.solve(model.forcing_at(w), left)
-        return np.linalg.solve(np.linalg.cholesky(model.covariance)[None], white)
+        whitened = np.linalg.solve(np.linalg.cholesky(model.covariance)[None], white)
+        return np.asarray(whitened, dtype=np.complex128)
 
     @cached_property
     def _unlearned(self) -> float:
@@ -256,7 +257,10 @@ class Planner:
         def cost(experiment: Experiment, applied: Array) -> float:
             return self.cost_of(experiment, np.concatenate([before, applied]), len(before))
 
-        scale = min(_largest_scale(lambda x, at=at: cost(at, part(x)), most) for at, most in caps)
+        def scaled(experiment: Experiment, scale: float) -> float:
+            return cost(experiment, part(scale))
+
+        scale = min(_largest_scale(partial(scaled, at), most) for at, most in caps)
         applied = part(scale)
         if rules.least is not None:
             applied = usefully_moved(applied, last, np.asarray(rules.least), self.reach)
