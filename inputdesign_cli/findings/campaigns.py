@@ -64,7 +64,7 @@ PART_ALONE = note(
 )
 PART_BETWEEN_MINIMA = note(
     "part-between-minima",
-    "The next part is to tell minima of the likelihood apart. Other parameters explain the data nearly as "
+    "The next part separates minima of the likelihood. Other parameters explain the data nearly as "
     "well. The part excites the frequencies at which the two models differ.",
     "Apply the part.",
 )
@@ -201,7 +201,7 @@ def planned_otherwise(
         beyond: whether a sample costs more than the cap; it costs `part_cost`.
         fragile: whether a robust last part was wanted and not found.
         alone: whether it is planned without the data.
-        parts: whether it is to tell minima apart.
+        parts: whether it is to separate minima.
     """
     percent, cost = f"{100 * share:.0f} % of the power of {file}", f"{part_cost:.4g} a sample"
     return [

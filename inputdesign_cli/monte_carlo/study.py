@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Absolute, Entry, ModelError
+from inputdesign_cli.accuracy import Absolute, ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import Counted, tell
@@ -96,32 +96,27 @@ class Trials:
     def errors(self, predicted: PredictedError) -> Array:
         """Return |G_hat - G_0| (runs, n) at the predicted frequencies and entries, or its Frobenius norm."""
         w, where = np.unique(predicted.w, return_inverse=True)
-        true = self.true.model.plant_at(w)
-        parts = []
-        for theta in self.theta:
-            off = np.abs(self.model.at(theta).plant_at(w) - true)
-            if predicted.entries is None:
-                parts.append(np.linalg.norm(off, axis=(1, 2))[where])
-            else:
-                parts.append(off[where, *predicted.entries.T])
-        return np.array(parts)
+        true, entries = self.true.model.plant_at(w), predicted.entries
+        apart = (np.abs(self.model.at(theta).plant_at(w) - true) for theta in self.theta)
+        if entries is None:
+            return np.array([np.linalg.norm(off, axis=(1, 2))[where] for off in apart])
+        return np.array([off[where, *entries.T] for off in apart])
 
     def bound(self, predicted: PredictedError, information: Array) -> Array:
         """Return r_u (n,) on the true system at the frequencies and entries of the prediction."""
-
-        def at(w: Array, entry: Entry | None) -> Array:
-            true, limit = self.true, Absolute(1.0)  # of r_adm, which is not stated
-            error = ModelError(
-                experiment=true, band=true.band, entry=entry, admissible=limit, alpha=predicted.alpha
-            )
-            return error.error_bound(information, w)
-
-        if predicted.entries is None:
-            return at(predicted.w, None)
-        r_u = np.empty(predicted.w.size)
-        for i, j in np.unique(predicted.entries, axis=0).tolist():
-            own = np.all(predicted.entries == (i, j), axis=1)
-            r_u[own] = at(predicted.w[own], (i, j))
+        w, entries, r_u = predicted.w, predicted.entries, np.empty(predicted.w.size)
+        whole = ModelError(
+            experiment=self.true,
+            band=self.true.band,
+            entry=None,
+            admissible=Absolute(1.0),  # of r_adm, which is not stated
+            alpha=predicted.alpha,
+        )
+        if entries is None:
+            return whole.error_bound(information, w)
+        for i, j in np.unique(entries, axis=0).tolist():
+            own = np.all(entries == (i, j), axis=1)
+            r_u[own] = replace(whole, entry=(i, j)).error_bound(information, w[own])
         return r_u
 
 

@@ -114,7 +114,11 @@ def advanced(
     """
     campaign, files, said = memory.campaign, dict(memory.files), Outcome()
     if given is not None:
-        units, data = task.identification.header.units, read_part(task, given, preparation or Preparation())
+        units, levels = task.identification.header.units, task.identification.operating_point
+        stated = preparation or Preparation()
+        known = replace(stated, operating_point={**levels, **stated.operating_point})
+        data = read_data([given], units, known)
+        data = replace(data, u=data.u + np.array([levels.get(f"u{j + 1}", 0.0) for j in range(units.inputs)]))
         table = table_of(units, data)
         record, findings = accepted(memory, units.excitation, given.name, data, table, unlike=unlike)
         files[record.file] = csv_text(table).encode()
@@ -349,14 +353,6 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
         findings += campaign_doubted()
     refuted = ends and done < rules.end and not (contradicted or campaign.regardless)
     return Judged(state, stands, assessment.results, tuple(findings), refuted)
-
-
-def read_part(task: Rounds, path: Path, preparation: Preparation) -> Record:
-    """Return a record of the user, its inputs with their levels; `DataError` if it cannot be used."""
-    units, levels = task.identification.header.units, task.identification.operating_point
-    known = replace(preparation, operating_point={**levels, **preparation.operating_point})
-    data = read_data([path], units, known)
-    return replace(data, u=data.u + np.array([levels.get(f"u{j + 1}", 0.0) for j in range(units.inputs)]))
 
 
 def continued(data: Record, step: float) -> Record:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import cast
 
 import numpy as np
@@ -38,7 +38,7 @@ _LONGER = 4.0  # a length grows at most by this factor at once
 # the first plan after a pilot, in units of the design for that plant.
 _ELSEWHERE = 10.0
 # A minimum beside the estimate counts up to this excess of -2 log likelihood: a hundredth of its weight. A
-# part that is to tell minima apart makes one of them this much less likely, on average.
+# part that separates minima makes one of them this much less likely, on average.
 _LIKELY, _APART = 9.0, 36.0
 # Frequencies at which models are compared, and the lowest as a share of the highest.
 _LINES, _LOWEST = 200, 1e-3
@@ -113,8 +113,8 @@ class Planner:
     ) -> Planned:
         """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
-        Data that suffice now, or with the next part, may leave several models open. Then the next part is
-        also to tell minima apart. If tests are the reason, a sufficient part is planned as if without data.
+        Data that suffice now, or with the next part, may leave several models open. Then the next part
+        also separates minima. If tests are the reason, a sufficient part is planned as if without data.
 
         Args:
             known: None before any data.
@@ -179,9 +179,9 @@ class Planner:
         return Planned(record, take, power_of(record), 0.0, "pilot")
 
     def _parting(self, plan: Planned, known: Standing, take: int, seed: int) -> Planned:
-        """Return a plan whose part also tells the minima of the likelihood apart.
+        """Return a plan whose part also separates the minima of the likelihood.
 
-        The spectrum of what is added is the squared difference of the predictions of the models. Its power
+        The added spectrum is the squared difference of the predictions of the models. Its power
         is the expected difference of -2 log likelihood, as in T-optimal designs ([atkinson-fedorov-1975]).
         """
         experiment = replace(self._experiment(known.model), samples=take)
@@ -215,7 +215,8 @@ class Planner:
         off = model.plant_at(w) - other.plant_at(w)
         left = model.left_at(w)[0] @ off @ experiment.response("input", w)
         white = np.linalg.solve(model.forcing_at(w), left)
-        return np.linalg.solve(np.linalg.cholesky(model.covariance)[None], white)
+        whitened = np.linalg.solve(np.linalg.cholesky(model.covariance)[None], white)
+        return np.asarray(whitened, dtype=np.complex128)
 
     @cached_property
     def _unlearned(self) -> float:
@@ -256,7 +257,10 @@ class Planner:
         def cost(experiment: Experiment, applied: Array) -> float:
             return self.cost_of(experiment, np.concatenate([before, applied]), len(before))
 
-        scale = min(_largest_scale(lambda x, at=at: cost(at, part(x)), most) for at, most in caps)
+        def scaled(experiment: Experiment, scale: float) -> float:
+            return cost(experiment, part(scale))
+
+        scale = min(_largest_scale(partial(scaled, at), most) for at, most in caps)
         applied = part(scale)
         if rules.least is not None:
             applied = usefully_moved(applied, last, np.asarray(rules.least), self.reach)
@@ -399,7 +403,7 @@ def standing(
 def other_minima(model: Model, estimate: Estimate, question: ModelQuestion | None) -> tuple[Array, ...]:
     """Return the parameters (k,) of minima about as likely as the estimate that leave its accuracy open.
 
-    G is another one there, by more than is admitted, or the minima widen the covariance of the estimate.
+    G differs there by more than is admitted, or the minima widen the covariance of the estimate.
     """
     close = [one for one in estimate.search.beside if one.excess < _LIKELY]
     if question is not None:
