@@ -133,7 +133,7 @@ class Experiment:
     @cached_property
     def noise_colouring(self) -> Array:
         """Return the inverse (p, p) of `noise_whitener`."""
-        return np.linalg.inv(self.noise_whitener)
+        return np.asarray(np.linalg.inv(self.noise_whitener), dtype=float)
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return F_x (n, k, p, r): the gradient of the prediction with respect to x, noise whitened to I.

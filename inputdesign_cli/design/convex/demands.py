@@ -7,6 +7,7 @@ import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,10 +140,10 @@ class Demands:
             few: stop after this number of scenarios with violations; the worst ones before are first.
         """
         if len(self.scenarios) == 1:
-            return list(self._violated(0, informations[0], above, side))
+            return self._violated(0, informations[0], above, side)
         found, bad = list[tuple[int, Violation]](), 0
         for number in self._by_most(informations, side, above):
-            nearly = list(self._violated(number, informations[number], _NEARLY * above, side))
+            nearly = self._violated(number, informations[number], _NEARLY * above, side)
             self._seen[int(side)].search(number, max([_NEARLY * above, *(v.ratio for _, v in nearly)]))
             own = [(index, v) for index, v in nearly if v.ratio > above]
             found += own
@@ -183,12 +184,15 @@ class Demands:
 
     def _violated(
         self, number: int, information: Array, above: float, side: bool
-    ) -> Iterator[tuple[int, Violation]]:
-        """Yield the violations of one scenario, each with the index of its requirement."""
+    ) -> list[tuple[int, Violation]]:
+        """Return the violations of one scenario, each with the index of its requirement."""
+        found: list[tuple[int, Violation]] = []
         for index in self._asked_of[number]:
             if self.asked[index].side == side:
-                for violation in self.asked[index].requirement.violations(information, above=above):
-                    yield index, violation
+                found += zip(
+                    repeat(index), self.asked[index].requirement.violations(information, above=above)
+                )
+        return found
 
     @cached_property
     def _seen(self) -> tuple[_Seen, _Seen]:
