@@ -2,44 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures import style
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, PALETTE
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREY, ORANGE, PALETTE
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.results import Array
 
 _POINTS = 200  # of an ellipse
-_PANEL, _ROW = 2.3, 0.3  # inches that a panel takes, and the share of a page that each row beyond two adds
 _BEHIND = (0.01, 100.0)  # points of fit below the best that are told apart
 _OPAQUE = 0.8
 _NUMBERED = 8  # rows up to which the entries are written into the cells
 _MOST_NUMBERS = 10  # along a matrix
-_COLOURS = (BLUE, ORANGE, GREEN, GREY)
-# With few runs, fine bins would show each run separately.
-_FEWEST_BINS, _BINS, _RUNS_A_BIN = 6, 40, 4
-# Shares of the ratios and of the losses that are shown: few runs of the tail would squeeze the rest.
-_RATIOS, _LOSSES = 0.99, 0.998
+_SHOWN = 0.99  # share of the runs that is shown: few runs of the tail would squeeze the rest
 _WIDE = 5.0  # costs beyond it are shown over their logarithm
-
-
-def _panels(page: Figure, number: int, columns: int) -> list[Axes]:
-    """Return axes for a number of panels, row by row, in at most this many columns."""
-    columns = min(columns, number, int(style.width_for(page) // _PANEL))
-    rows = -(-number // columns)
-    page.set_figheight((1.0 + _ROW * max(rows - 2, 0)) * page.get_figheight())
-    grid = list(page.subplots(rows, columns, squeeze=False).flat)
-    for axes in grid[number:]:
-        axes.set_axis_off()
-    for axes in grid[:number]:
-        axes.locator_params(nbins=4)
-    return grid[:number]
 
 
 def boundary(center: Array, covariance: Array, probability: float) -> Array:
@@ -58,7 +37,8 @@ def draw_ellipses(page: Figure, curves: of.EllipseCurves, time_unit: str) -> Non
     """Draw for each pair of parameters the ellipse that holds this share of estimates, and those of runs."""
     runs = any(pair.estimates is not None for pair in curves.pairs)
     share = f"{100 * curves.probability:g} % {'ellipse of theory' if runs else 'of estimates'}"
-    for axes, pair in zip(_panels(page, len(curves.pairs), 2 if runs else 3), curves.pairs, strict=True):
+    for axes, pair in zip(style.panels(page, len(curves.pairs), 2 if runs else 3), curves.pairs, strict=True):
+        axes.locator_params(nbins=4)
         if pair.estimates is not None:
             (dots,) = axes.plot(*pair.estimates.T, ".", color=BLUE, markersize=2.5, alpha=0.5)
             dots.set(rasterized=True, label=f"{len(pair.estimates)} estimates")
@@ -78,7 +58,8 @@ def draw_ellipses(page: Figure, curves: of.EllipseCurves, time_unit: str) -> Non
 
 def draw_estimates(page: Figure, curves: of.EstimateCurves, time_unit: str) -> None:
     """Draw each parameter in a panel: the estimate after each part, with two standard deviations."""
-    for axes, name in zip(_panels(page, len(curves.estimates), 3), curves.estimates, strict=True):
+    for axes, name in zip(style.panels(page, len(curves.estimates), 3), curves.estimates, strict=True):
+        axes.locator_params(nbins=4)
         middle, spread = curves.estimates[name], 2.0 * curves.deviations[name]
         axes.plot(curves.samples, middle, "o-", color=BLUE, markersize=3, label="estimate")
         label = "two standard deviations"
@@ -177,32 +158,30 @@ def draw_campaign(page: Figure, curves: of.CampaignCurves, time_unit: str) -> No
     style.legend_above(upper)
 
 
-def draw_true_ratio(page: Figure, curves: of.RatioCurves, time_unit: str) -> None:
-    """Draw a histogram of the true ratio for each way, on common bins; up to one the requirement is met."""
+def draw_runs(page: Figure, curves: of.RunCurves, time_unit: str) -> None:
+    """Draw the share of the runs up to each value, way by way, with means in theory or a limit of ratios."""
     axes = page.add_subplot()
-    everything = np.concatenate(list(curves.ratios.values()))
-    low, top = min(float(everything.min()), 0.95), max(float(np.quantile(everything, _RATIOS)), 1.05)
-    runs = max(ratios.size for ratios in curves.ratios.values())
-    step = (top - low) / int(np.clip(runs // _RUNS_A_BIN, _FEWEST_BINS, _BINS))
-    # An edge at one: no bin mixes runs that meet the requirement with runs that miss it.
-    bins = (1.0 + step * np.arange(np.floor((low - 1.0) / step), np.ceil((top - 1.0) / step) + 1.0)).tolist()
-    for (name, ratios), colour in zip(curves.ratios.items(), PALETTE, strict=False):
-        filled = name == "campaign"
-        shown, label = np.minimum(ratios, bins[-1]), name.replace("_", " ")
-        kind = "stepfilled" if filled else "step"
-        _histogram(axes, shown, bins, colour, label, alpha=0.45 if filled else 1.0, histtype=kind)
-    axes.axvline(1.0, color=BLACK, linestyle=DASHED)
-    axes.set_xlabel("largest r_u / r_adm of the true plant\n(beyond the last bin: in it)")
+    found = {name: np.sort(values) for name, values in curves.values.items() if values.size}
+    everything = np.concatenate(list(found.values()))
+    low, high = float(everything.min()), float(np.quantile(everything, _SHOWN))
+    for number, (name, values) in enumerate(found.items()):
+        colour, dashes = style.stroke(number)
+        share = 100.0 * np.arange(1, values.size + 1) / values.size
+        label = f"{name.replace('_', ' ')}: mean {values.mean():.4g}"
+        (line,) = axes.plot(
+            np.r_[low, values], np.r_[0.0, share], color=colour, linestyle=dashes, label=label
+        )
+        line.set_drawstyle("steps-post")
+        if name in curves.theory:
+            axes.axvline(curves.theory[name], color=colour, linewidth=1.0, linestyle=DOTTED)
+    what = "loss of a run, √(Σ |y − y₀|²); dotted: mean by theory"
+    if curves.limit is not None:
+        what, low, high = "largest r_u / r_adm of the true plant", min(low, 0.95), max(high, 1.05)
+        axes.axvline(curves.limit, color=BLACK, linestyle=DASHED, label="what is asked")
+    if high > low:
+        axes.set_xlim(low, high)
+    axes.set(ylim=(0.0, 101.0), xlabel=what, ylabel="runs up to it (%)")
     style.legend_over_all(page)
-
-
-def _histogram(
-    axes: Axes, values: Array, bins: Sequence[float], colour: str, label: str, **look: Any
-) -> None:
-    """Draw the shares of the runs by bin, in per cent."""
-    weights = np.full(values.size, 100.0 / max(values.size, 1))
-    axes.hist(values, bins=bins, weights=weights, color=colour, label=label, linewidth=1.4, **look)
-    axes.set_ylabel("share of the runs (%)")
 
 
 def draw_trade(page: Figure, curves: of.TradeCurves, time_unit: str) -> None:
@@ -222,20 +201,3 @@ def draw_trade(page: Figure, curves: of.TradeCurves, time_unit: str) -> None:
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)
     style.legend_over_all(page)
-
-
-def draw_loss(page: Figure, curves: of.LossCurves, time_unit: str) -> None:
-    """Draw the histogram of the loss for each input on common bins, with its mean as a vertical line."""
-    axes = page.add_subplot()
-    top = max(float(np.quantile(loss, _LOSSES)) for loss in curves.losses.values())
-    bins = np.linspace(0.0, top, _BINS + 1).tolist()
-    for index, (name, loss) in enumerate(curves.losses.items()):
-        colour = _COLOURS[index % len(_COLOURS)]
-        label = f"{name}: mean {loss.mean():.4g}, sd {loss.std(ddof=1):.4g}"
-        _histogram(axes, loss, bins, colour, label, alpha=0.45)
-        axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
-        if name in curves.theory:
-            axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
-    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
-    axes.set_xlim(0.0, top)
-    style.legend_above(axes)

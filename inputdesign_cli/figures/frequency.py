@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
-from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
 from inputdesign_cli.figures import style
@@ -90,8 +86,7 @@ def draw_panels(
         lowest = page.add_subplot(cells[rows, :])
         below(lowest, panels)
         style.frequency_axis(lowest, panels[0].frequency, time_unit)
-        if lowest.get_legend() is None:
-            style.legend_above(lowest)
+        style.legend_above(lowest)
 
 
 def draw_bound(page: Figure, curves: of.BoundCurves, time_unit: str) -> None:
@@ -106,43 +101,28 @@ def draw_bound(page: Figure, curves: of.BoundCurves, time_unit: str) -> None:
     draw_panels(page, curves.panels, _plot_error, time_unit, magnitude="error of G", title=title, below=below)
 
 
-@dataclass(frozen=True)
-class _Error:
-    """Holds one r_u (n,) or its ratio, and its style in all figures."""
-
-    name: str
-    values: Array
-    color: str
-    width: float = 1.6
-    style: LineStyleType = "solid"
-
-    def plot(self, axes: Axes, w: Array, values: Array, label: str) -> list[Line2D]:
-        return axes.plot(w, values, color=self.color, linewidth=self.width, linestyle=self.style, label=label)
-
-
-def _errors(curves: of.BoundPanel) -> list[_Error]:
-    """Return the curves of r_u that are known, the widest line first, so that the others show on it."""
+def _errors(curves: of.BoundPanel) -> list[tuple[str, Array, dict[str, Any]]]:
+    """Return name, values and look of each r_u that is known, the widest line first: others show on it."""
     needed, equal = curves.white_labels
-    found = [_Error(curves.label, curves.r_u, BLUE, 2.4)]
-    if curves.r_u_record is not None:
-        found.append(_Error("record", curves.r_u_record, GREEN, 1.2, DASHED))
-    if curves.r_u_equal is not None:
-        found.append(_Error(equal, curves.r_u_equal, GREY, 1.4))
-    if curves.r_u_white is not None:
-        found.append(_Error(needed, curves.r_u_white, GREY, 1.6, DOTTED))
-    return found
+    found: list[tuple[str, Array | None, dict[str, Any]]] = [
+        (curves.label, curves.r_u, {"color": BLUE, "linewidth": 2.4}),
+        ("record", curves.r_u_record, {"color": GREEN, "linewidth": 1.2, "linestyle": DASHED}),
+        (equal, curves.r_u_equal, {"color": GREY, "linewidth": 1.4}),
+        (needed, curves.r_u_white, {"color": GREY, "linestyle": DOTTED}),
+    ]
+    return [(name, values, look) for name, values, look in found if values is not None]
 
 
 def _plot_error(axes: Axes, curves: of.BoundPanel) -> None:
     """Draw the curves of one entry, in the range of the errors."""
     w, errors = curves.frequency, _errors(curves)
     style.log_axes(axes, "y")
-    for error in errors:
-        error.plot(axes, w, style.positive(error.values), f"r_u, {error.name}")
+    for name, values, look in errors:
+        axes.plot(w, style.positive(values), label=f"r_u, {name}", **look)
     if curves.r_adm is not None:
         style.plot_admitted(axes, w, curves.r_adm)
     else:
-        least = _FAR * min(float(np.nanmin(style.positive(error.values))) for error in errors)
+        least = _FAR * min(float(np.nanmin(style.positive(values))) for _, values, _ in errors)
         gain = np.maximum(curves.G_abs, least)  # one that vanishes would stretch the axis without end
         axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
@@ -151,7 +131,6 @@ def _plot_error(axes: Axes, curves: of.BoundPanel) -> None:
 
 def _plot_ratios(axes: Axes, panels: Sequence[of.BoundPanel]) -> None:
     """Draw r_u / r_adm, the largest in the legend: all curves of one entry, or of several the design's."""
-    handles: list[Artist] = []
     tops, ratios = [1.0], [np.zeros(0)]
     for number, curves in enumerate(panels):
         if curves.r_adm is None:
@@ -160,26 +139,25 @@ def _plot_ratios(axes: Axes, panels: Sequence[of.BoundPanel]) -> None:
         if len(panels) > 1:
             at = "" if curves.entry is None else f"G{curves.entry[0] + 1}{curves.entry[1] + 1}"
             color, dashes = style.stroke(number, OTHERS)
-            drawn = [_Error(at, curves.r_u, color, style=dashes)]
-        for place, error in enumerate(drawn):
-            ratio = error.values / style.positive(curves.r_adm)
+            drawn = [(at, curves.r_u, {"color": color, "linestyle": dashes})]
+        for place, (name, values, look) in enumerate(drawn):
+            ratio = values / style.positive(curves.r_adm)
             top = float(np.nanmax(ratio, initial=0.0))
-            lines = error.plot(axes, curves.frequency, ratio, f"{error.name}: up to {top:.3g}")
             # White excitation that meets the same reaches the same: no more than its name is to be said.
-            handles += lines if error.style != DOTTED or curves.r_u_equal is None else []
+            same = curves.r_u_equal is not None and values is curves.r_u_white
+            axes.plot(curves.frequency, ratio, label="" if same else f"{name}: up to {top:.3g}", **look)
             tops.append(top if not place else min(top, _HIGHEST * max(tops)))
             ratios.append(ratio[ratio > 0])
         if len(panels) == 1:
             height = np.interp(curves.active, curves.frequency, curves.r_u / style.positive(curves.r_adm))
             style.marked(axes, curves.active, height)
-    handles.append(style.plot_limit(axes, 1.12 * max(tops) + 1.0))
+    style.plot_limit(axes, 1.12 * max(tops) + 1.0)
     axes.set_ylim(0.0, 1.12 * max(tops))
     values = np.concatenate(ratios)
     if values.size and values.max() < _FAR_BELOW:
         style.plain_decades(axes, "y")
         axes.set_ylim(max(0.8 * float(values.min()), _FAR * float(values.max())), 1.3)
     axes.set_ylabel("r_u / r_adm")
-    style.legend_above(axes, handles)
 
 
 def draw_deviations(page: Figure, curves: of.DeviationCurves, time_unit: str) -> None:
@@ -199,17 +177,7 @@ def _plot_deviations(axes: Axes, panel: of.DeviationPanel) -> None:
 
 def draw_response(page: Figure, curves: of.ResponseCurves, time_unit: str) -> None:
     """Draw the magnitudes with a 95 % band for the true one; below them the phases."""
-    if len(curves.panels) > 1:
-        draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude", below=_phases)
-        return
-    (panel,) = curves.panels
-    above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    _magnitude(above, panel)
-    style.legend_above(above)
-    above.set_ylabel("magnitude")
-    _phase(below, panel, BLUE, BLACK)
-    below.set_ylabel("phase (degrees)")
-    style.frequency_axis(below, panel.frequency, time_unit)
+    draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude", below=_phases)
 
 
 def _magnitude(axes: Axes, panel: of.ResponsePanel) -> None:
@@ -222,23 +190,23 @@ def _magnitude(axes: Axes, panel: of.ResponsePanel) -> None:
 
 
 def _phases(axes: Axes, panels: Sequence[of.ResponsePanel]) -> None:
-    """Draw the phases of all entries; a negative gain begins half a turn away from a positive one."""
+    """Draw the phases of all entries, of models without jumps, and of data, if known, on the nearest turn.
+
+    A negative gain begins half a turn away from a positive one.
+    """
     for number, panel in enumerate(panels):
         color, dashes = style.stroke(number)
-        row, column = panel.entry or (0, 0)
-        (line,) = _phase(axes, panel, color, color)
-        line.set(linestyle=dashes, label=f"G{lowered(row + 1, column + 1)}")
+        of_data, (row, column) = color, panel.entry or (0, 0)
+        label = f"G{lowered(row + 1, column + 1)}"
+        if len(panels) == 1:
+            of_data, color, label = BLUE, BLACK, "model"
+        model = np.degrees(np.unwrap(np.angle(panel.model)))
+        known = panel.radius < np.abs(panel.G)
+        turn = np.degrees(np.angle(panel.G)) - model
+        nearest = model + (turn + 180.0) % 360.0 - 180.0
+        axes.plot(panel.frequency[known], nearest[known], ".", color=of_data, markersize=4)
+        axes.plot(panel.frequency, model, color=color, linestyle=dashes, linewidth=1.2, label=label)
     axes.set_ylabel("phase (degrees)")
-
-
-def _phase(axes: Axes, panel: of.ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
-    """Draw the phase of the model without jumps, and of the data, if known, on the nearest turn."""
-    model = np.degrees(np.unwrap(np.angle(panel.model)))
-    known = panel.radius < np.abs(panel.G)
-    turn = np.degrees(np.angle(panel.G)) - model
-    nearest = model + (turn + 180.0) % 360.0 - 180.0
-    axes.plot(panel.frequency[known], nearest[known], ".", color=of_data, markersize=4)
-    return axes.plot(panel.frequency, model, color=of_model, linewidth=1.2)
 
 
 def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
@@ -300,20 +268,9 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
         _along(np.where(_shown(L), L, np.nan)), np.searchsorted(curves.frequency, curves.limiting)
     )
     at = at[at < L.size]
-    widths = 2.0 * radius[at]
-    discs = EllipseCollection(
-        widths,
-        widths,
-        np.zeros(at.size),
-        units="xy",
-        offsets=np.column_stack([L.real[at], L.imag[at]]),
-        offset_transform=axes.transData,
-        facecolor=BLUE,
-        edgecolor=BLUE,
-        alpha=0.14,
-        linewidth=0.5,
-    )
-    axes.add_collection(discs, autolim=False)
+    for centre, size in zip(L[at], radius[at], strict=True):
+        disc = Circle((centre.real, centre.imag), size, color=BLUE, alpha=0.14, linewidth=0.5)
+        axes.add_patch(disc)
     told = {
         "real part": L.real,
         "imaginary part": L.imag,

@@ -38,11 +38,12 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     page.set_figheight((1.0 + _HIGHER * max(rows - 2, 0)) * page.get_figheight())
     samples, time = curves.time.size, curves.time[:_ONE_BY_ONE]
     grid = page.subplots(rows, 2, sharex="col", squeeze=False, width_ratios=[5, 1])
-    applied: dict[str, Any] = {"color": BLUE, "linewidth": 0.9, "markersize": 4, "label": "to be applied"}
+    single = {"marker": "o", "markersize": 4} if time.size == 1 else {}
+    applied: dict[str, Any] = {"color": BLUE, "linewidth": 0.9, "label": "to be applied", **single}
     if curves.held:
         applied |= {"drawstyle": "steps-post", "label": "to be applied, held between samples"}
     for (name, values), (record, histogram) in zip(channels, grid, strict=False):
-        record.plot(time, values[: time.size], _mark(time), **applied)
+        record.plot(time, values[: time.size], **applied)
         _name(record, name, curves.labels.get(name, ""), "")
         limits = curves.limits.get(name, ())
         for bound, axes in product(limits, (record, histogram)):
@@ -68,11 +69,6 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     style.legend_over_all(page)
 
 
-def _mark(time: Array) -> str:
-    """Return the format of a signal's curve: a line, or a dot for a single sample."""
-    return "-" if time.size > 1 else "o"
-
-
 def _name(axes: Axes, name: str, label: str, what: str) -> None:
     """Label the axis with the user's name and unit of a channel, or with its symbol and unit."""
     symbol = f"{name[0]}{style.lowered(name[1:])}(t)"
@@ -86,7 +82,7 @@ def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: b
     style.band(axes, time, y - noise, y + noise, GREY, 0.3, label=label)
     # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
     said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
-    axes.plot(time, y, _mark(time), color=GREEN, linewidth=1.0, markersize=4, label=said)
+    axes.plot(time, y, "-" if time.size > 1 else "o", color=GREEN, linewidth=1.0, markersize=4, label=said)
     for bound in panel.limits or ():
         axes.axhline(bound, **_LIMIT)
     _name(axes, panel.name, panel.label, "Δ " if levels else "")

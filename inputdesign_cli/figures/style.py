@@ -6,7 +6,7 @@ import io
 import re
 import textwrap
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -61,6 +61,8 @@ OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # for curves n
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
 _LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
+
+_PANEL, _ROW = 2.3, 0.4  # inches that a panel takes at least, and what a further row adds to a page
 
 # A logarithmic axis whose end is below the first multiple of its beginning has even steps; beyond the second
 # only powers of ten have a number.
@@ -202,6 +204,17 @@ def _strokes(axes: Axes) -> None:
         axes.add_artist(marks)
 
 
+def panels(page: Figure, number: int, columns: int, *, shared: bool = False) -> list[Axes]:
+    """Return axes for panels, row by row, in at most this many columns; further rows make a page higher."""
+    columns = min(columns, number, max(int(width_for(page) // _PANEL), 1))
+    rows = -(-number // columns)
+    page.set_figheight((1.0 + _ROW * (rows - 1)) * page.get_figheight())
+    grid = list(page.subplots(rows, columns, squeeze=False, sharex=shared, sharey=shared).flat)
+    for axes in grid[number:]:
+        axes.set_axis_off()
+    return grid[:number]
+
+
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
     """Make the horizontal axis logarithmic over the positive `frequencies`, in rad per time unit."""
     positive = frequencies[frequencies > 0]
@@ -269,10 +282,10 @@ def band(
     axes.fill_between(x, low, high, color=color, alpha=alpha, linewidth=0, **more)
 
 
-def plot_limit(axes: Axes, top: float) -> Line2D:
-    """Draw the limit of a ratio at one, and a shade beyond it up to the top; return the line."""
+def plot_limit(axes: Axes, top: float) -> None:
+    """Draw the limit of a ratio at one, and a shade beyond it up to the top."""
     axes.axhspan(1.0, top, color=ORANGE, alpha=0.07, linewidth=0)
-    return axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit")
+    axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit")
 
 
 def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
@@ -320,13 +333,12 @@ def labelled(*panels: Axes) -> list[Artist]:
     return list(found.values())
 
 
-def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
-    """Draw a legend over the axes, where it covers no curve: of all that has a label, or of `handles`."""
+def legend_above(axes: Axes) -> None:
+    """Draw a legend of all that has a label over the axes, where it covers no curve."""
     page = axes.get_figure(root=True)
     assert page is not None
-    handles = labelled(axes) if handles is None else handles
-    form = _form(handles, page)
-    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.3, **form)
+    corner = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.3}
+    axes.legend(**_legend(labelled(axes), page, corner))
 
 
 def width_for(page: Figure) -> float:
@@ -334,13 +346,10 @@ def width_for(page: Figure) -> float:
     return page.get_figwidth() * TYPE_SIZE / float(mpl.rcParams["font.size"])
 
 
-def _form(handles: Sequence[Artist], page: Figure) -> dict[str, Any]:
-    labels = [str(handle.get_label()) for handle in handles]
-    return {
-        "ncols": _columns(labels, _LETTERS_PER_INCH * width_for(page)),
-        "handlelength": 2.0,
-        "columnspacing": 1.2,
-    }
+def _legend(handles: Sequence[Artist], page: Figure, place: Mapping[str, object]) -> dict[str, Any]:
+    """Return the settings of a legend at a place, with as many columns as the page has room for."""
+    columns = _columns([str(handle.get_label()) for handle in handles], _LETTERS_PER_INCH * width_for(page))
+    return {"handles": handles, "ncols": columns, "handlelength": 2.0, "columnspacing": 1.2, **place}
 
 
 def _columns(labels: Sequence[str], room: float) -> int:
@@ -371,5 +380,5 @@ def _wrapped(page: Figure, title: str) -> str:
 def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str = "") -> None:
     """Draw one legend for all panels of a page, above them: of all that has a label, or of `handles`."""
     handles = labelled(*page.axes) if handles is None else handles
-    title, form = _wrapped(page, title), _form(handles, page)
-    page.legend(handles=handles, loc="outside upper left", title=title, alignment="left", **form)
+    place = {"loc": "outside upper left", "title": _wrapped(page, title), "alignment": "left"}
+    page.legend(**_legend(handles, page, place))

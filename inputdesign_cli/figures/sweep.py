@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from inputdesign_cli.figures import style
-from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, ORANGE, PALETTE, log_axes
+from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, ORANGE, PALETTE
 from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable, Trade
 from inputdesign_cli.outcome.design import OBJECTIVES, objective
 from inputdesign_cli.outcome.results import Array
@@ -26,8 +26,9 @@ BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structu
 MOST_CURVES = len(PALETTE)
 MOST_KEYS = 3
 NAMES = ("curves", "map", "moments")
-COLUMNS, ROW = 3, 0.6  # of small multiples: beside each other, and what a further row adds to the page
+COLUMNS = 3  # of small multiples
 MOST_LABELLED = 100  # cells of a map that carry their number
+_LETTERS = 9.0  # of numbers beside each other, on an inch of a page
 _CELL = 0.6  # inches of the page that a column of a map takes where it has numbers
 _PREFIX, _TRACE = "moments.entries.", "moments.trace"
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
@@ -111,11 +112,8 @@ def _draw_panels(
 ) -> None:
     """Draw curves over one key, a panel for each value of the third, on common axes; name the best point."""
     values = list(dict.fromkeys(table.columns[panels])) if panels else [""]
-    columns = min(len(values), COLUMNS)
-    rows = -(-len(values) // columns)
-    page.set_figheight((1.0 + ROW * (rows - 1)) * page.get_figheight())
-    grid = page.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-    for value, axes in zip(values, grid.flat, strict=False):
+    grid = style.panels(page, len(values), COLUMNS, shared=True)
+    for value, axes in zip(values, grid, strict=True):
         member = np.array([not panels or text == value for text in table.columns[panels or along]])
         _draw_curves(axes, table, quantity, along, across, member)
         if panels:
@@ -124,18 +122,16 @@ def _draw_panels(
             # Under one panel alone there is no room for it.
             axes.set_xlabel("")
             axes.set_ylabel("")
-    for axes in grid.flat[len(values) :]:
-        axes.set_axis_off()
     if panels:
         page.supxlabel(key_label(along), fontsize=style.TYPE_SIZE)
         page.supylabel(_label(table, quantity), fontsize=style.TYPE_SIZE)
     named = table.best
     title = f"best: {named[1]}" if named and named[0] == quantity else ""
-    if panels or len(style.labelled(grid[0][0])) > 4:
+    if panels or len(style.labelled(grid[0])) > 4:
         style.legend_over_all(page, title=title)
     else:
         style.title_above(page, title)
-        style.legend_above(grid[0][0])
+        style.legend_above(grid[0])
 
 
 def _draw_curves(
@@ -213,8 +209,10 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     bar = page.colorbar(image, label=_label(table, quantity))
     if wide:
         style.plain_decades(bar.ax, "y")
-    for axis, texts, key in ((axes.xaxis, columns, along), (axes.yaxis, rows, down)):
-        step = -(-len(texts) // 20)
+    # Beside each other numbers take room by their letters, above each other they take a line each.
+    across = -(-sum(len(text) + 2 for text in columns) // int(_LETTERS * style.width_for(page)))
+    ticks = ((axes.xaxis, columns, along, across), (axes.yaxis, rows, down, -(-len(rows) // 20)))
+    for axis, texts, key, step in ticks:
         axis.set_ticks((np.arange(len(texts))[::step] + 0.5).tolist(), texts[::step])
         axis.set_label_text(key_label(key))
     if cells.size <= MOST_LABELLED and page.get_figwidth() >= _CELL * len(columns):
@@ -305,9 +303,7 @@ def draw_trade(trade: Trade, page: Figure) -> None:
         colour, dashes = style.stroke(number)
         drawn = {"color": colour, "linestyle": dashes, "label": name}
         curve(axes, trade.lengths, row, marker="o", markersize=4, **drawn)
-    log_axes(axes, "x")
-    axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
-    axes.xaxis.set_minor_locator(NullLocator())
+    scale_key(axes, "experiment.samples", trade.lengths)
     axes.set_xlabel(f"length of the experiment ({trade.unit})")
     mark_failures(axes, trade.lengths[np.all(np.isnan([*trade.rows.values()]), axis=0)])
     if trade.criterion:

@@ -45,11 +45,15 @@ class DirectionCurves(Curves):
 
 
 @dataclass(frozen=True)
-class LossCurves(Curves):
-    """Holds the losses in the runs of a Monte Carlo study, input by input."""
+class RunCurves(Curves):
+    """Holds a number of each run of a study, way by way: a loss, or the largest r_u/r_adm of the true plant.
 
-    losses: Mapping[str, Array]  # name -> (runs,)
-    theory: Mapping[str, float] = field(default_factory=dict)  # name -> mean
+    `limit` is what is asked of the ratio, and `theory` has the mean of a loss.
+    """
+
+    values: Mapping[str, Array]  # name -> (runs,)
+    theory: Mapping[str, float] = field(default_factory=dict)
+    limit: float | None = None
 
 
 @dataclass(frozen=True)
@@ -170,13 +174,6 @@ class EstimateCurves(Curves):
     samples: Array
     estimates: Mapping[str, Array]
     deviations: Mapping[str, Array]
-
-
-@dataclass(frozen=True)
-class RatioCurves(Curves):
-    """Holds the largest r_u / r_adm of the true plant in many runs, way by way: (runs,)."""
-
-    ratios: Mapping[str, Array]
 
 
 @dataclass(frozen=True)

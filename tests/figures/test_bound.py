@@ -252,14 +252,14 @@ def test_where_runs_leave_what_is_admitted_is_marked(page):
 
 def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
     (axes,) = page(CURVES["nyquist"]).axes
-    (discs,) = axes.collections
+    *discs, shade, circle = axes.patches
     near = Z[150]
     centre = 0.8 * near**2 / (1 - near)
-    offsets = discs.get_offsets()
-    assert np.hypot(offsets[:, 0] - centre.real, offsets[:, 1] - centre.imag).min() < 1e-9
-    np.testing.assert_allclose(discs.get_widths(), 0.2)
-    assert [circle.get_radius() for circle in axes.patches] == [0.5, 0.5]
-    assert not page(CURVES["nyquist without a bound"]).axes[0].patches
+    assert min(np.hypot(*np.subtract(disc.center, (centre.real, centre.imag))) for disc in discs) < 1e-9
+    assert {disc.get_radius() for disc in discs} == {0.1}
+    assert (shade.get_radius(), circle.get_radius()) == (0.5, 0.5)
+    unbounded = page(CURVES["nyquist without a bound"]).axes[0].patches
+    assert {disc.get_radius() for disc in unbounded} == {0.1}
 
 
 def test_levels_and_deviations_are_told_apart(page):

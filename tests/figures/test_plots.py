@@ -28,6 +28,7 @@ from inputdesign_cli.outcome.curves import (
     NyquistCurves,
     OrderCurves,
     ResponseCurves,
+    RunCurves,
     SignalCurves,
 )
 from inputdesign_cli.outcome.results import Results
@@ -63,8 +64,9 @@ NAMES = [r"$\frac{1}{0", "$$", "$x$", r"\$", "_u", "100 %", "{}", "日本", "a_b
 
 def test_names_and_units_are_drawn_as_they_are():
     """Warnings are errors in these tests: letters that the font lacks cause none."""
+    formulas, others = (" ".join(n for n in NAMES if ("$" in n) is holds) for holds in (True, False))
     wave, long = np.sin(np.arange(50.0)), ["w" * 40, "$" * 40]
-    for names in (*zip(*[iter(NAMES)] * 4, strict=True), long):
+    for names in ((formulas, others, *NAMES[3:5]), long):
         labels = {f"u{i}": f"{name} ({name})" for i, name in enumerate(names)}
         assert draw(SignalCurves(T[:50], dict.fromkeys(labels, wave), labels=labels))
     assert draw(FitCurves(T, (replace(FIT, label=NAMES[7]), replace(FIT, label=long[1]))), "s", "svg")
@@ -242,6 +244,17 @@ def test_fits_that_hardly_differ_are_decades_apart_and_the_worst_is_shown(page):
     shown = axes.transAxes.inverted().transform(axes.transData.transform(axes.lines[0].get_xydata()))[:, 1]
     assert np.all(np.diff(shown) < -0.2)
     assert np.all((shown > 0.0) & (shown < 1.0))
+
+
+def test_runs_are_counted_up_to_each_value(page):
+    """At the limit one reads the share of runs that meet it; a way without a result is left out."""
+    ratios = {"one_shot": np.array([1.2, 0.8, 1.1, 0.9]), "none": np.zeros(0), "single": np.array([0.7])}
+    (axes,) = page(RunCurves(ratios, limit=1.0)).axes
+    drawn = lines_by_label(axes)
+    assert list(drawn) == ["one shot: mean 1", "single: mean 0.7", "what is asked"]
+    x, share = drawn["one shot: mean 1"].get_data()
+    assert share[np.searchsorted(x, 1.0) - 1] == 50.0
+    assert share[-1] == 100.0
 
 
 def test_a_fan_says_which_line_is_which_plant(page):

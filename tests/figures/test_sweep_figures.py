@@ -1,5 +1,7 @@
 """Which figures a sweep has, and what is on them."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,18 @@ def test_the_map_has_a_cell_for_each_point():
     page = pages(given)[-1]
     texts = {(t.get_position(), t.get_text()) for t in page.axes[0].texts}
     assert texts == {((0.5, 0.5), "3"), ((1.5, 0.5), "none"), ((0.5, 1.5), "1"), ((1.5, 1.5), "2")}
+
+
+@pytest.mark.parametrize("width", ["page", "column", "phone"])
+def test_numbers_of_a_map_do_not_lie_on_each_other(width):
+    keys = [f"{1000.25 + n}" for n in range(18)]
+    given = table({N: keys * 2, M: ["1"] * 18 + ["2"] * 18}, [*map(float, range(1, 37))])
+    seen = []
+    rendered(dict(sweep_figures(given))["map"], width=width, seen=seen.append)
+    for axis in (seen[0].axes[0].xaxis, seen[0].axes[0].yaxis):
+        boxes = [tick.get_window_extent() for tick in axis.get_ticklabels() if tick.get_text()]
+        assert len(boxes) > 1
+        assert all(not one.overlaps(other) for one, other in pairwise(boxes))
 
 
 def test_a_criterion_has_a_ceiling_and_its_own_white_value():

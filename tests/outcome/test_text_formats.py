@@ -300,7 +300,7 @@ def test_what_figures_show_comes_back_as_it_was(tmp_path):
 
 @pytest.mark.parametrize(
     "content",
-    [b"", b"[]", b'{"a": 1}', b'{"a": {}}', b'{"a": {"kind": "Path"}}', b'{"a": {"kind": "LossCurves"}}',
+    [b"", b"[]", b'{"a": 1}', b'{"a": {}}', b'{"a": {"kind": "Path"}}', b'{"a": {"kind": "RunCurves"}}',
      b'{"a": {"kind": "ErrorCurves", "energy": "x"}}', b'{"a": {"kind": "BoundCurves", "panels": [3]}}'],
 )  # fmt: skip
 def test_what_is_no_such_file_is_told_by_its_name(content, tmp_path):

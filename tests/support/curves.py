@@ -72,7 +72,7 @@ CURVES = {
     "matrix with zeros": c.SpectrumCurves(W, PAIR * np.maximum(np.cos(20 * W), 0.0)[:, None, None]),
     "directions": c.DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([DENSITY, W], 1), 1.7),
     "directions of lines": c.DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
-    "loss": c.LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
+    "loss": c.RunCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
     "nyquist": c.NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W, 0.5, W[150:151]),
     "nyquist without a bound": c.NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W),
     "optimality": c.OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
@@ -124,7 +124,7 @@ CURVES = {
     "fan": c.FanCurves(W, np.stack([0.3 * G, 0.5 * G]), 0.4 * G, {"plant 2": 0.5 * G}),
     "campaign": c.CampaignCurves(T[20:80:20], 60.0 / T[20:80:20], T[20:80:20], 200),
     "estimates": c.EstimateCurves(T[20:80:20], {"b1": W[:3], "f1": W[3:6]}, {"b1": W[:3], "f1": W[:3]}),
-    "true ratios": c.RatioCurves({"campaign": 0.5 + W / 5, "one shot": 0.8 + W / 5}),
+    "true ratios": c.RunCurves({"campaign": 0.5 + W / 5, "one_shot": 0.8 + W / 5}, limit=1.0),
     "costs and shares": c.TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}),
     "costs beside a record": c.TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}, 0.85),
     "cloud": c.EllipseCurves(

@@ -28,7 +28,7 @@ from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.monte_carlo.study import responses
 from inputdesign_cli.outcome import Simulation
 from inputdesign_cli.outcome.campaign import State
-from inputdesign_cli.outcome.curves import Curves, RatioCurves, TradeCurves
+from inputdesign_cli.outcome.curves import Curves, RunCurves, TradeCurves
 from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
@@ -249,7 +249,9 @@ def campaigns_curves(
     ratios = {
         name: np.array([run.ratio for run in ended if run.ratio is not None]) for name, ended in ways.items()
     }
-    curves: dict[str, Curves] = {"true_ratio": RatioCurves(ratios)} if rows["true_ratio"].size else {}
+    curves: dict[str, Curves] = (
+        {"true_ratio": RunCurves(ratios, limit=1.0)} if rows["true_ratio"].size else {}
+    )
     if oracle is None:
         return tables, curves
     points = {}

@@ -25,7 +25,7 @@ from inputdesign_cli.information import POWER_KINDS, PowerKind
 from inputdesign_cli.monte_carlo.loop_error import LossStudy, study_losses
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.outcome import Signal, Simulation
-from inputdesign_cli.outcome.curves import Curves, DirectionCurves, LossCurves, SpectrumCurves
+from inputdesign_cli.outcome.curves import Curves, DirectionCurves, RunCurves, SpectrumCurves
 from inputdesign_cli.outcome.design import ActivePower, LossMoments, TheoreticalLoss
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
@@ -319,7 +319,7 @@ def loss_results(
         measured = 1 - float(losses["design"].mean() / losses["white"].mean())
         improvement = Improvement(measured, 1 - theory["design"].loss.mean / theory["white"].loss.mean)
     means = {name: theory[name].loss.mean for name in losses}
-    return entries, improvement, {"loss": LossCurves(losses, means)} if losses else {}
+    return entries, improvement, {"loss": RunCurves(losses, means)} if losses else {}
 
 
 def _moments(values: Array) -> LossMoments:
