@@ -214,13 +214,16 @@ def test_closed_poles_are_the_roots_of_the_characteristic_polynomial():
         np.testing.assert_allclose(poles, np.sort_complex(expected), atol=1e-9)
 
 
-def test_unstable_plant_in_a_stable_loop_has_finite_gradients():
-    """An ARX plant with an integrator: S G and the gradients stay finite at DC."""
-    loop = looped(PolynomialModel.single([0.0, 1.0], A=[1.0, -1.0]), [0.5])
+@pytest.mark.parametrize("plant", [PolynomialModel.single([0.0, 1.0], A=[1.0, -1.0]), tank(), sampled_tank()])
+def test_integrating_plant_in_a_stable_loop_has_finite_gradients(plant):
+    """S G and the gradients stay finite at DC."""
+    loop = looped(plant, [0.5])
     loop.check_stability()
     y, u = loop.excited(np.array([0.0]))
-    assert y.item() == pytest.approx(2.0)  # 1 / C at DC
-    assert abs(u.item()) == pytest.approx(0.0)
+    assert y.item() == pytest.approx(2.0, rel=1e-4)  # 1 / C at DC
+    assert abs(u.item()) == pytest.approx(0.0, abs=1e-4)
+    for found in loop.sensitivity(np.zeros(1)):  # S and C S, where G is infinite
+        assert abs(found.item()) == pytest.approx(0.0, abs=1e-4)
     assert np.all(np.isfinite(loop.excitation_gradient(np.array([0.0]))))
 
 

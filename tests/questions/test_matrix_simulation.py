@@ -38,7 +38,7 @@ TRUE = "[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]"
 
 @pytest.fixture(scope="module")
 def studied():
-    overrides = ["spectrum.order=2", "simulation={runs: 120, compare: [white, prbs]}"]
+    overrides = ["spectrum.order=2", "simulation={runs: 60, compare: [white, prbs]}"]
     return simulate(load_spec(SPEC, overrides))
 
 
@@ -86,7 +86,7 @@ def test_every_entry_has_its_error_bands(studied):
     for band in curves.panels:
         assert np.all(band.quantiles[0.05] <= band.quantiles[0.95])
         assert np.all(band.quantiles[0.95] < band.r_u)
-    assert studied.curves["cloud_design"].theta.shape == (120, 10)
+    assert studied.curves["cloud_design"].theta.shape == (60, 10)
 
 
 def test_the_true_system_may_be_another():

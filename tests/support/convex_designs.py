@@ -5,8 +5,7 @@ import dataclasses
 import cvxpy as cp
 import numpy as np
 
-from inputdesign_cli import accuracy
-from inputdesign_cli.accuracy import Criterion, ModelError, Relative
+from inputdesign_cli.accuracy import Criterion, Cut, ModelError, Relative, Requirement, Violation
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.information import Experiment
@@ -127,25 +126,25 @@ def resonant():
     return Experiment(model, 300)
 
 
-class OnGrid(accuracy.Requirement):
+class OnGrid(Requirement):
     """`whole` at these frequencies alone, as programs of the literature do, the worst `most` at a time."""
 
-    def __init__(self, whole: accuracy.Requirement, grid: np.ndarray, most: int | None = None):
+    def __init__(self, whole: Requirement, grid: np.ndarray, most: int | None = None):
         self.whole, self.grid, self.most = whole, grid, most
 
     @property
     def name(self) -> str:
         return "on a grid"
 
-    def violations(self, information, *, above: float = -np.inf) -> list[accuracy.Violation]:
+    def violations(self, information, *, above: float = -np.inf) -> list[Violation]:
         found = self.ratios(information, self.grid)
         worst = np.argsort(-found)[: self.most]
-        return [accuracy.Violation(float(found[i]), float(self.grid[i])) for i in worst if found[i] > above]
+        return [Violation(float(found[i]), float(self.grid[i])) for i in worst if found[i] > above]
 
     def ratios(self, information, frequencies) -> np.ndarray:
         return self.whole.ratios(information, frequencies)
 
-    def cut(self, frequency: float | None) -> accuracy.Cut:
+    def cut(self, frequency: float | None) -> Cut:
         return self.whole.cut(frequency)
 
 
