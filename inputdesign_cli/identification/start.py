@@ -66,7 +66,7 @@ def noise_before(C: Array, D: Array, samples: int) -> Array:
     i, j = np.indices((n, n))
     # p_k for k of 0 to 2 n, and for k of -n to n; zero outside of the coefficients.
     (c, above), (d, below) = (
-        [np.pad(p, (before, 2 * n + 1 - before - p.size)) for before in (0, n)] for p in (C, D)
+        [np.concatenate([np.zeros(k), p, np.zeros(2 * n + 1 - k - p.size)]) for k in (0, n)] for p in (C, D)
     )
     past = c[1 + i + j] @ below[n + j - i] - d[1 + i + j] @ above[n + j - i]
     # Values in a row of e / D, oldest first, made of independent ones of the variance of e.

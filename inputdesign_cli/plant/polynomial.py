@@ -72,8 +72,11 @@ def evaluate_all(polynomials: Mapping[Key, Sequence[Array]], q: ComplexArray) ->
     varying = [key for key, one in tables.items() if one.shape[1] > 1]
     if varying:
         longest = max(tables[key].shape[1] for key in varying)
-        rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
-        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), len(rows[0]), 1, q.size)
+        models = len(tables[varying[0]])
+        rows = np.zeros((len(varying), models, longest))
+        for row, key in zip(rows, varying, strict=True):
+            row[:, : tables[key].shape[1]] = tables[key]
+        at_q = evaluate(rows.reshape(-1, longest), q).reshape(len(varying), models, 1, q.size)
         found |= dict(zip(varying, at_q, strict=True))
     return found
 

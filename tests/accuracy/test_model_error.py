@@ -21,6 +21,7 @@ from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, Rational
+from tests.support.convex_designs import BAND, DENSE
 from tests.support.plants import arx
 
 
@@ -103,12 +104,9 @@ def test_sensitivity_bound_keeps_its_promise(flexible):
     assert worst.min() >= 1 - 1e-3  # and no larger r_adm would do
 
 
-def test_table_interpolates_in_logarithms():
+def test_tables_interpolate_in_logarithms_and_weights_divide():
     table = Table(np.array([0.1, 1.0]), np.array([1.0, 100.0]))
     np.testing.assert_allclose(table.at([0.1, np.sqrt(0.1), 1.0]), [1.0, 10.0, 100.0])
-
-
-def test_weight_divides():
     weighted = Weighted(Absolute(2.0), Rational.build([1.0, 1.0]))
     np.testing.assert_allclose(weighted.at([0.0]), [1.0])
 
@@ -122,11 +120,6 @@ def test_vanishing_admissible_error_is_refused():
     assert error.value.diagnostics[0].code == "admissible-not-positive"
     below = dataclasses.replace(requirement, band=(0.0, 3.0))
     check_positive(below.admissible, below.grid, unit=1.0, named="rad/sample")
-
-
-DENSE = np.unique(np.concatenate([np.linspace(0.0, np.pi, 20001), np.geomspace(1e-4, np.pi, 20001)]))
-
-BAND = (0.0, np.pi)
 
 
 def test_target_is_met_exactly_at_its_ratio():

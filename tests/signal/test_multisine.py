@@ -110,23 +110,14 @@ def test_so_many_harmonics_rise_inside_the_band(period, odd, lines):
     assert not odd or np.all(found % 2 == 1)
 
 
-def test_lines_are_even_in_the_logarithm_where_the_period_resolves_them():
+def test_harmonics_are_even_in_the_logarithm_or_all_or_too_few_or_the_nearest():
     found = harmonics_between(10**6, (0.01, 1.0), 21, odd=False)
     assert np.diff(np.log(found)) == pytest.approx(np.log(100.0) / 20, rel=1e-2)
-
-
-def test_all_harmonics_stand_where_no_number_is_asked_for():
     assert harmonics_between(10, (0.0, np.pi), None, odd=False).tolist() == [1, 2, 3, 4]
     assert harmonics_between(10, (0.0, np.pi), None, odd=True).tolist() == [1, 3]
-
-
-def test_a_band_without_enough_harmonics_says_how_many_there_are():
     with pytest.raises(TooFewHarmonicsError) as caught:
         harmonics_between(100, (0.1, 0.3), 5, odd=False)
     assert caught.value.there == 3  # 2, 3 and 4 times 2 pi / 100
-
-
-def test_frequencies_move_to_the_nearest_harmonic():
     w = 2 * np.pi / 100
     assert nearest_harmonics(100, w * np.array([0.6, 2.4, 2.6]), odd=False).tolist() == [1, 2, 3]
     assert nearest_harmonics(100, w * np.array([1.9, 2.1, 48.9]), odd=True).tolist() == [1, 3, 49]

@@ -190,9 +190,7 @@ def test_without_limits_every_line_just_meets_its_bound():
     assert lines.ratios(lines.deviations(needed, 100)) == pytest.approx(1.0)
     problem = ResponseProblem(needed.ravel(), np.ones(3), (), np.zeros((0, 3)))
     assert cheapest(problem).powers == pytest.approx(needed.ravel())
-
-
-def test_the_worst_output_of_an_input_sets_the_power_of_its_lines():
+    # Of several outputs the worst sets the power of the lines of an input.
     admitted = np.array([[[0.1, 1.0], [0.2, 0.1]]])
     lines = ResponseLines(np.ones((1, 2, 2)) + 0j, np.array([[1.0, 4.0]]), admitted)
     needed = lines.needed(200)
@@ -200,16 +198,13 @@ def test_the_worst_output_of_an_input_sets_the_power_of_its_lines():
     assert lines.ratios(lines.deviations(needed, 200)) == pytest.approx(1.0)
 
 
-def test_limits_that_are_too_tight_say_by_how_much():
+def test_limits_that_are_too_tight_say_by_how_much_and_contradictory_ones_by_no_end():
     limit = PowerLimit("input", 1.0)
     problem = ResponseProblem(np.array([1.0, 3.0]), np.ones(2), (limit,), np.ones((1, 2)))
     with pytest.raises(UnreachableError) as caught:
         cheapest(problem)
     assert caught.value.factor == pytest.approx(2.0)  # a quarter of the power: twice the deviation
     assert caught.value.limits == (limit,)
-
-
-def test_limits_that_contradict_each_other_are_told():
     rows = np.array([[1.0, 1.0], [1.0, 1.0]])
     limits = (PowerLimit("input", 5.0), PowerLimit("output", 6.0, upper=False))
     problem = ResponseProblem(np.ones(2), np.ones(2), limits, rows)
