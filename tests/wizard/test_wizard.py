@@ -210,6 +210,7 @@ def test_many_plants_each_in_its_loop_do_not_take_minutes(plant, loop, bounded, 
     spec = draft_of(plant=plant, loop=loop, time="8 h").spec()
     assert (spec.closed_loop, spec.solver.any_spectrum) == (loop != "open", bounded)
     assert (spec.signal.candidates, spec.experiment.samples) == (candidates, samples)
+    assert spec.uncertainty is None or spec.uncertainty.scenarios == (30 if bounded else 10)
 
 
 @pytest.mark.slow
