@@ -31,6 +31,7 @@ from inputdesign_cli.wizard.wishes import (
 )
 
 _MOST, LEAST = 5000, 50  # samples
+_MOST_IN_LOOP = 1000  # where a record is fitted to its limits at many plants, each in its loop
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
 _UNUSED = (
     "how well the plant is known is not used: a Bode plot is designed at the plant as stated, and another "
@@ -121,12 +122,13 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         short_of = f"{short(there)} {unit} are less than {LEAST} samples, one every {short(step)} {unit}"
         raise bad_answer("time", f"{short_of} ({why})")
     hold, control = dwell(said["hold"], plant), controller(said["loop"], plant)
-    asked = wished(said["wish"], plant, control is not None, min(there, _MOST * step))
+    vague = plant.covariance is not None or bool(plant.intervals)
+    most = _MOST_IN_LOOP if vague and control is not None else _MOST
+    asked = wished(said["wish"], plant, control is not None, min(there, most * step))
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"], plant)
-    made = asking.chosen("signals", said["signals"], _TYPES)
+    made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
-    unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
     heard = list(plant.heard)
     if "slope" in plant.values and control is not None and control == plant.controller:
         heard += [f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"]
@@ -143,10 +145,11 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "points": _points(span),
         "rate": rate,
         "output": output,
-        "duration": _duration(there, step, hold, nonparametric=nonparametric),
+        "looped": vague and control is not None and not nonparametric,
+        "duration": _duration(there, most * step, step, hold, nonparametric=nonparametric),
         "periods": _PERIODS,
         "there": there,
-        "most": _MOST,
+        "most": most,
         "made": "binary" if two_levels else made,
         "converter": quantisation(said["converter"], span),
         "hold": hold,
@@ -166,10 +169,10 @@ def _points(span: Range) -> str:
     return f"  # from {low} to {high} %: not a share of {short(span.offset)}" if percent else ""
 
 
-def _duration(there: float, step: float, hold: int, *, nonparametric: bool) -> float:
+def _duration(there: float, most: float, step: float, hold: int, *, nonparametric: bool) -> float:
     """Return the length of a record in whole positions of the input, each of `hold` samples."""
     # Lines of a response are one over the time apart: it takes all of it.
-    most = there if nonparametric else min(there, _MOST * step)
+    most = there if nonparametric else min(there, most)
     if hold == 1:
         return most
     whole = hold * step * (_PERIODS if nonparametric else 1)
@@ -199,7 +202,8 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     for words, what in spectra:
         one = replace(draft, spectrum=words, why=what)
         with in_their_words(draft.said):
-            result = solve(one.spec().with_(uncertainty=None, **{"signal.candidates": 1}))
+            at_one = {"uncertainty": None, "signal.candidates": 1, "solver.any_spectrum": True}
+            result = solve(one.spec().with_(**at_one))
         value, bound = (float(result["objective"].get(key) or 0.0) for key in ("value", "any_spectrum_bound"))
         rivals = bool(result.get("foreseen", {}).get("rivals"))
         tried.append((one, value, bound, rivals))

@@ -125,6 +125,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     read = {name: phrase.quantity(*words) for name, words in _QUANTITIES.items()}
     found = {name: one for name, one in read.items() if one is not None}
     own = {name: one.share for name, one in found.items() if one.share is not None}
+    sampled = phrase.after(r"sampl(?:e|ing) time|sampled every", "time", named=True)
     part, whole = phrase.share(), phrase.take(ABOUT)
     phrase.finish("known it tank")
     values = {name: one.value for name, one in found.items() if one.value}
@@ -152,6 +153,8 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         values.get("time_constant", 0.0),
         around,
         values,
+        sampling=None if sampled is None else needed(sampled, "plant", "the sample time"),
+        why_sampling="as you said",
         tunable=True,
         heard=(f"{taken}; the design holds for all of these",) if vague else (),
         units=(gain.size, gain.base),
@@ -181,8 +184,8 @@ def _integrating(plant: PlantAnswer) -> PlantAnswer:
         ),
         slow=values.get("time_constant", late),
         controller=f"{{pid: {{{settings}}}}}",
-        sampling=_round_step(late / 2.0),
-        why_sampling="half of dead time and lag, or a little less",
+        sampling=plant.sampling or _round_step(late / 2.0),
+        why_sampling="as you said" if plant.sampling else "half of dead time and lag, or a little less",
     )
 
 

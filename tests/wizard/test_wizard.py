@@ -184,6 +184,7 @@ def test_the_simplest_spectrum_that_is_near_to_every_other(values, bound, rivals
     seen = []
 
     def solve(spec):
+        assert (spec.solver.any_spectrum, spec.uncertainty) == (True, None)
         seen.append(spec.spectrum.order if spec.spectrum.type == "fir" else spec.spectrum.lines)
         number = len(seen) - 1
         found = {"objective": {"value": values[number], "any_spectrum_bound": bound}}
@@ -194,6 +195,22 @@ def test_the_simplest_spectrum_that_is_near_to_every_other(values, bound, rivals
     assert told in draft.text
     assert "e+" not in draft.text
     assert parse_spec(draft.text).spectrum.type == ("fir" if "fir" in spectrum else "multisine")
+
+
+@pytest.mark.parametrize(
+    ("plant", "loop", "bounded", "candidates", "samples"),
+    [
+        (ENGINEER["plant"], "open", True, None, 5000),
+        ("integrates about 0.2 %/min per %, dead time about 10 s", "as the plant", False, 1, 1000),
+        ("integrates 0.2 %/min per %, dead time 10 s", "as the plant", True, None, 5000),  # one plant
+    ],
+)
+def test_many_plants_each_in_its_loop_do_not_take_minutes(plant, loop, bounded, candidates, samples):
+    """The bound over every spectrum prices each limit at each; every record is fitted to the limits there."""
+    spec = draft_of(plant=plant, loop=loop, time="8 h").spec()
+    assert (spec.closed_loop, spec.solver.any_spectrum) == (loop != "open", bounded)
+    assert (spec.signal.candidates, spec.experiment.samples) == (candidates, samples)
+    assert spec.uncertainty is None or spec.uncertainty.scenarios == (30 if bounded else 10)
 
 
 @pytest.mark.slow
@@ -208,22 +225,21 @@ def test_the_record_does_not_repeat():
     assert np.abs(u).max() <= 5.0
 
 
-@pytest.mark.parametrize(("head", "scale"), [("time", 1), ("time_min", 60)])
-def test_a_log_is_explored_and_keeps_its_unit_of_time(head, scale, tmp_path):
+def test_a_log_is_explored_and_keeps_its_unit_of_time(tmp_path):
     """The static gain of 0.5 q^-2/(1 - 0.8 q^-1) is 2.5."""
     rng = np.random.default_rng(3)
     u = np.repeat(rng.choice([-1.0, 1.0], 50), 6)
     y = lfilter([0, 0, 0.5], [1, -0.8], u) + 0.05 * rng.standard_normal(300)
-    saved(tmp_path / "log.csv", f"{head},u,y", 5.0 * np.arange(300) / scale, u, y)
+    saved(tmp_path / "log.csv", "time_min,u,y", np.arange(300) / 12, u, y)
     # What the log contains is not asked.
     asked = {key: text for key, text in ENGINEER.items() if key != "noise"}
     wish = "prediction within 5 % up to 0.1"
     draft = compose({**asked, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
     draft.validate()
     spec = draft.spec()
-    assert spec.sample_time * scale == pytest.approx(5.0, rel=1e-4)
+    assert spec.sample_time == pytest.approx(1 / 12, rel=1e-4)
     assert (spec.experiment.samples, spec.uncertainty.covariance) == (720, "x-model.yaml")
-    assert spec.accuracy.model_error.band[1] / scale == pytest.approx(0.1)
+    assert spec.accuracy.model_error.band[1] == pytest.approx(6.0)
     gain = build_model(spec).plant_at(np.array([1e-6]))[0, 0, 0]
     assert abs(gain) == pytest.approx(2.5, rel=0.01)
 
