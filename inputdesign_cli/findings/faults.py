@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
 from inputdesign_cli.findings.places import SHOWN, Record, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
@@ -18,6 +19,8 @@ from inputdesign_cli.plant import TransferMatrix
 
 # Share of samples above which a frozen sensor biases a model; fit (%) below which spikes do.
 _BIASING, _HALF = 0.02, 50.0
+# Moves of inputs up to so many samples before explain spikes, if they leave less than this share of squares.
+_BEFORE, _LEFT = 6, 0.25
 
 SPIKES = refuted(
     "spikes",
@@ -37,6 +40,8 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
     """Return a finding for each output and kind of fault, with its rows."""
     found = []
     for one in spikes(estimate.errors):
+        if follows_inputs(estimate.errors[list(one.samples), one.output], one.samples, data.u):
+            continue
         rows, name = rows_of(data, [(at, at) for at in one.samples]), _named(units, one.output)
         fact = (
             f"{len(one.samples)} of {len(estimate.errors)} samples of {name} hold {100.0 * one.share:.3g} % "
@@ -64,6 +69,14 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
         span = [[first, last] for _, first, last in rows]
         found.append(FROZEN.found(fact, where=name, remedy=remedy, samples=still, rows=span, option=option))
     return found
+
+
+def follows_inputs(errors: Array, samples: Sequence[int], u: Array) -> bool:
+    """Return whether moves of inputs u (n, r) explain spikes (m,): the model is wrong, not the sensor."""
+    moves, at = np.diff(u, axis=0, prepend=u[:1]), np.array(samples)
+    columns = np.column_stack([moves[np.maximum(at - lag, 0)] for lag in range(_BEFORE + 1)])
+    left = errors - columns @ np.linalg.lstsq(columns, errors, rcond=None)[0]
+    return len(at) >= 2 * columns.shape[1] and float(left @ left) < _LEFT * float(errors @ errors)
 
 
 def biasing(units: Units, estimate: Estimate, data: Record, fitted: Sequence[float]) -> list[Finding]:

@@ -9,6 +9,7 @@ import scipy.signal
 from inputdesign_cli import assess, parse_spec
 from inputdesign_cli.finding import REFUTED, UNDECIDED, Finding
 from inputdesign_cli.findings import kinds
+from inputdesign_cli.findings.faults import follows_inputs
 from inputdesign_cli.findings.leading import leading
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.questions import explore
@@ -85,6 +86,16 @@ def test_the_command_ends_the_matter(fault, seed, tmp_path):
 @pytest.mark.parametrize("fault", ["noise", "drift", "lag", "inverse", "delay"])
 def test_the_command_ends_nearly_every_matter(fault, plant, tmp_path):
     assert sum(ended(fault, plant, seed, tmp_path) for seed in range(10)) >= 9
+
+
+@pytest.mark.parametrize("of_inputs", [True, False])
+def test_spikes_that_follow_the_moves_of_inputs_are_no_faults_of_measurement(of_inputs):
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)[:, None]
+    late = np.concatenate([np.zeros(2), np.diff(u[:, 0], prepend=u[0])[:-2]])
+    other = np.where(rng.random(600) < 0.05, rng.standard_normal(600), 0.0)
+    errors = late if of_inputs else other
+    assert follows_inputs(errors[errors != 0.0], np.flatnonzero(errors).tolist(), u) == of_inputs
 
 
 def test_every_kind_that_leaves_a_verdict_open_names_a_command():
