@@ -128,7 +128,7 @@ class Experiment:
     @cached_property
     def noise_whitener(self) -> Array:
         """Return K (p, p) with K^T K the inverse of the noise covariance."""
-        return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.model.covariance)), dtype=float)
 
     @cached_property
     def noise_colouring(self) -> Array:

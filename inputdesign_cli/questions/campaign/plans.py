@@ -405,11 +405,11 @@ def other_minima(model: Model, estimate: Estimate, question: ModelQuestion | Non
 
     G differs there by more than is admitted, or the minima widen the covariance of the estimate.
     """
-    close = [one for one in estimate.search.beside if one.excess < _LIKELY]
+    close = [point.theta for point, excess in estimate.search.beside if excess < _LIKELY]
     if question is not None:
         information = None if question.asked else question.information
-        close += [one.rival for one in beyond(model, estimate, question.errors, information)]
-    return tuple(one.theta for one in close)
+        close += [one.rival.theta for one in beyond(model, estimate, question.errors, information)]
+    return tuple(close)
 
 
 def usefully_moved(record: Array, start: Array, least: Array, reach: Array) -> Array:
