@@ -34,7 +34,7 @@ def boundary(center: Array, covariance: Array, probability: float) -> Array:
 
 
 def draw_ellipses(page: Figure, curves: of.EllipseCurves, time_unit: str) -> None:
-    """Draw for each pair of parameters the ellipse that holds this share of estimates, and those of runs."""
+    """Draw the confidence ellipse of each pair of parameters, with the estimates of simulated runs."""
     runs = any(pair.estimates is not None for pair in curves.pairs)
     share = f"{100 * curves.probability:g} % {'ellipse of theory' if runs else 'of estimates'}"
     for axes, pair in zip(style.panels(page, len(curves.pairs), 2 if runs else 3), curves.pairs, strict=True):

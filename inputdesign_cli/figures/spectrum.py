@@ -125,7 +125,7 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     axes.set_ylabel("relative worth of excitation")
     style.frequency_axis(axes, w, time_unit)
     title = (
-        "No frequency gives more accuracy per unit of cost than those that the design excites: "
+        "Accuracy per unit of cost is highest at the frequencies that the design excites: "
         "no other spectrum does better than the proved bound."
     )
     if curves.record_bound is not None:

@@ -184,8 +184,13 @@ def integrate(
             return fine
         coarse, earlier = fine, change
     off = np.hypot(singularities.real - np.clip(singularities.real, lo, hi), singularities.imag)
-    if off.min(initial=np.inf) > _ON_AXIS:
-        raise InaccurateError.because(
+    raise _unsettled(on_axis=bool(off.min(initial=np.inf) <= _ON_AXIS))
+
+
+def _unsettled(*, on_axis: bool) -> InaccurateError:
+    """Return the error that an integral does not settle, with a pole on the axis or without."""
+    if not on_axis:
+        return InaccurateError.because(
             "numerically-singular",
             "an integral of the information matrix did not settle: parameters have so nearly the same effect "
             "on the samples that the difference between them is rounding",
@@ -193,7 +198,7 @@ def integrate(
             "zeros that nearly cancel; plant.known takes what need not be estimated",
             key="plant",
         )
-    raise InaccurateError.because(
+    return InaccurateError.because(
         "integral-inaccurate",
         "an integral of the information matrix did not settle: the integrand has a pole on, "
         "or within rounding of, the unit circle",

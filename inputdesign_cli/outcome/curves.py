@@ -192,7 +192,7 @@ class TradeCurves(Curves):
 class Ellipse:
     """Holds the predicted confidence region of a pair of parameters: values and (2, 2) covariances.
 
-    `estimates` (runs, 2) are those of simulated experiments with the truth at the center.
+    `estimates` (runs, 2) come from simulated experiments, with the truth at the center.
     """
 
     names: tuple[str, str]

@@ -134,7 +134,7 @@ class Phrase:
     def after(
         self, words: str, kind: str = "any", *, named: bool = False, unit: str | None = None
     ) -> float | None:
-        """Read words, a number and its unit, and return the number in units of the spec.
+        """Return the number behind these words, converted to the unit of the spec.
 
         Args:
             kind: of the unit: time, frequency, rate, slope, gain, any (a size) or none.

@@ -106,13 +106,11 @@ def _certified(
     of_rows = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
     price = weighted_mean(problem.costs, proof.costs) if problem.goal == "cost" else None
     upper = lower = fixed_lower = 0.0
-    # One functional for all forms of the lags: many of them may count.
     forms = [(row, w) for row, w in zip(rows, of_rows, strict=True) if row.form is not None]
-    form = sum(w * row.form for row, w in forms)
-    if np.any(form):
-        together = problem.form(np.asarray(form))
+    form, of_forms = np.asarray(sum(w * row.form for row, w in forms)), sum(w * row.bound for row, w in forms)
+    if np.any(form):  # one functional for all forms of the lags: many of them may count
+        together, upper = problem.form(form), upper + of_forms
         price = together if price is None else price + together
-        upper += sum(w * row.bound for row, w in forms)
     for row, w in zip(rows, of_rows, strict=True):
         if w == 0.0 or row.form is not None:
             continue
@@ -143,21 +141,26 @@ def _certified(
         spent = upper + t * (scaled - lower - scaled_required)
         bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
     t = t if bound > 0.0 else 0.0
-    shares = np.zeros(len(problem.limits))
-    for row, w in zip(rows, of_rows, strict=True):
-        if row.limit is not None:
-            shares[row.limit] = w * unit * (1.0 if row.upper else t)
     return Certificate(
         bound=max(bound, 0.0),
         weights=t * unit * weights,
         directions=pricing.directions,
-        limits=shares,
+        limits=_of_limits(problem, rows, unit * of_rows, t),
         price=price * unit,
         value=value * (t * unit),
         costs=proof.costs,
-        form=unit * _raised(np.asarray(form), lift) if forms else None,
-        form_share=unit * (lifted + sum(w * row.bound for row, w in forms)),
+        form=unit * _raised(form, lift) if forms else None,
+        form_share=unit * (lifted + of_forms),
     )
+
+
+def _of_limits(problem: Problem, rows: Sequence[Row], of_rows: Array, scale: float) -> Array:
+    """Return the multipliers of the limits that rows stand for; lower limits count `scale` times."""
+    shares = np.zeros(len(problem.limits))
+    for row, w in zip(rows, of_rows, strict=True):
+        if row.limit is not None:
+            shares[row.limit] = w * (1.0 if row.upper else scale)
+    return shares
 
 
 def _grid(problem: Problem, weights: NDArray[np.float64], costs: Array) -> Array:

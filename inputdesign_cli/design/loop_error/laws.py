@@ -265,7 +265,7 @@ class MinimumVariance(ControlLaw):
 
     @property
     def singularities(self) -> ComplexArray:
-        """Return those of the plant and the zeros of E, see `ControlLaw`."""
+        """Return the singularities of the plant, and the zeros of E; see `ControlLaw`."""
         return np.append(self.plant.singularities, logarithmic_distance(all_roots(self._terms)))
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:

@@ -123,7 +123,7 @@ class _Dual:
         )
 
     def ascended(self, point: _Point) -> _Point | None:
-        """Return the point after a damped step of Newton's method; None where the dual rises no more."""
+        """Return the point after a damped step of Newton's method, or None once the dual rises no more."""
         share, gradient = point.share, point.powers - 1.0
         free = ~((share < 1e-8 * share.max()) & (gradient < 0))
         size = share[free]

@@ -84,7 +84,7 @@ class MomentsDesign:
     """Holds moments R (n, n) with their error, and the proof of their energy or error: the `bound`.
 
     No R of the structure does better than the bound. Toeplitz moments have autocorrelations `rho` (n,), with
-    rho_0 = 1, and `counts` of what search and proof took.
+    rho_0 = 1, and `counts` of the steps of search and proof.
     """
 
     R: Array

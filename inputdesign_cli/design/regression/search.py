@@ -25,7 +25,7 @@ _FAINT = 1e-5  # powers of lines below this share, in a design that is flat ther
 
 @dataclass
 class Search:
-    """Searches the shapes of a region for a local minimum of the goal, in so many `solves`."""
+    """Searches the shapes of a region for a local minimum of the goal, and counts its `solves`."""
 
     problem: ToeplitzProblem
     goal: Goal

@@ -155,9 +155,9 @@ def fit_of(
 
 
 def fit_to_log(fit: FitCurves, log: Record, used: Record) -> FitCurves:
-    """Return the fit with the columns of a log as names, and with its samples that the estimate does without.
+    """Return the fit with the columns of a log as names, and with the samples left out of the estimate.
 
-    Samples of several files, whose times may be the same, are not told apart.
+    Samples of several files are not marked, since their times may be the same.
     """
     rest = ~np.isin(log.time, used.time) & (len(log.files) == 1)
     panels = []

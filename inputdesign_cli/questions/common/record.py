@@ -109,8 +109,7 @@ def make_record(
     """Return the best of several records of the designed spectrum, or the `first` that meets what is asked.
 
     The best record meets the requirements of every scenario with the least power, or has the best criterion
-    at its worst plant. Return None when no excitation is needed. Return None, too, when the record would be
-    too short (criteria per sample without `signal.samples`) or longer than any that is computed.
+    at its worst plant. None: no excitation is needed, or the record would be too short or too long.
     """
     problem, settings = design.problem, request.settings
     # In the coordinates of this design, which its requirements use too.
@@ -124,7 +123,6 @@ def make_record(
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
     bounding = [least_ratio(scenario.requirements) for scenario in problem.scenarios]
     spectrum = spectrum_of(request, design.result.basis, design.result.x)
-
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
     generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
     others = {n: FiniteRecord(plant, samples, request.step) for n, plant in enumerate(plants)}
@@ -136,24 +134,18 @@ def make_record(
     # The nominal plant, and the scenarios that bind the design.
     numbers = [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
     if len(plants) > 1 and bounds.hard:  # plants that answer most to one record do so to others
-        values = generator.values(np.random.default_rng(settings.seed))
-        limiting += beyond_peaks(np.repeat(values, settings.hold, axis=0), range(1, len(plants)))
+        one = generator.values(np.random.default_rng(settings.seed))
+        limiting += beyond_peaks(np.repeat(one, settings.hold, axis=0), range(1, len(plants)))
 
     def together(which: Sequence[int]) -> FiniteRecord:
         if len(plants) == 1:
             return others[0]
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
-    def at_worst(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
-        largest = -np.inf
-        for n, M in zip(numbers, informations, strict=True):
-            largest = max(largest, of[n](M))
-        return largest
-
-    cost = design_cost(design, request.cost)
     score, bound = scores[0], bounding[0]
     if len(plants) > 1:
-        score, bound = partial(at_worst, scores), partial(at_worst, bounding)
+        score, bound = partial(_largest, scores, numbers), partial(_largest, bounding, numbers)
+    cost = design_cost(design, request.cost)
     target = Target(score, meets, request.cost, cost, bound if meets else None)
     while True:
         at, limits = together(numbers), together(limiting)
@@ -171,6 +163,13 @@ def make_record(
             return record if _few_moves(bounds, record) else replace(record, met=False)
         numbers += [*missed, *beyond]
         limiting += higher
+
+
+def _largest(
+    of: Sequence[Callable[[Array], float]], numbers: Sequence[int], informations: NDArray[np.float64]
+) -> float:
+    """Return the largest value at the plants of these numbers, from their information (plants, k, k)."""
+    return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
 
 
 def _with_powers(bounds: Bounds, design: Design) -> Bounds:

@@ -38,7 +38,7 @@ _SURELY, _FORGOTTEN = 0.19, 8.0
 class SpectrumTask(ABC):
     """Asks about the spectrum of an experiment, with its record and its trial.
 
-    Without a requirement on errors those of the simulation have r_u; `ellipses` are None for a choice.
+    Without a requirement on errors, r_u is that of the simulated errors. `ellipses` of None are chosen.
     """
 
     header: Header
