@@ -76,7 +76,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         found = [one for one in against if one.code == DRIFT.code]
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
-    middle, files = float(data.time[len(data.time) // 2]), [name for name, _ in data.files]
+    middle, files = float(data.time[len(data.time) // 2]), [name for name, _ in data.files] or ["DATA"]
     figures = {
         "logs": " ".join(files),
         "first": files[0],
