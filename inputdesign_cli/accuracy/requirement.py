@@ -68,11 +68,6 @@ class Requirement(ABC):
         return False
 
     @property
-    def grid(self) -> Array:
-        """Return frequencies (n,) that see every peak of the ratio; a single one if there is no band."""
-        return np.zeros(1)
-
-    @property
     def definite(self) -> bool:
         """Return whether the requirement excludes a singular M."""
         return True

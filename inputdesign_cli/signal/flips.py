@@ -59,7 +59,7 @@ class PlantGoal:
     @cached_property
     def everywhere(self) -> list[tuple[Requirement, Array]]:
         """Return each requirement with frequencies over all of its band."""
-        return [(r, r.grid) for r in self.requirements]
+        return [(r, getattr(r, "grid", np.zeros(1))) for r in self.requirements]
 
 
 def _squares(places: list[tuple[Requirement, Array]], information: Array) -> Array:

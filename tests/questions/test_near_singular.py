@@ -98,8 +98,8 @@ experiment: {{samples: 500}}
 accuracy: {{model_error: {{relative: 0.1, band: [0.01, 3]}}}}
 spectrum: {{type: fir, order: 3}}
 """
-    notes = solve(parse_spec(spec)).result.get("notes", [])
-    assert any("the slowest mode" in note for note in notes) == told
+    findings = solve(parse_spec(spec)).result.get("findings", [])
+    assert any(one["code"] == "experiment-short" for one in findings) == told
 
 
 FAST = """

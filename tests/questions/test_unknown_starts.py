@@ -1,6 +1,5 @@
 """Records that live on their start from rest say so: errors with unknown starts, by plain regression."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -39,8 +38,7 @@ SETTLED = SINGLE.replace("F: [1, -1]", "F: [1, -0.8]")
 
 def told(text):
     done = solve(parse_spec(text))
-    notes = [note for note in done.result.get("notes", []) if "start from rest" in note]
-    return done, notes
+    return done, [one for one in done.result.get("findings", []) if one["code"] == "start-from-rest"]
 
 
 def left(psi, starts):
@@ -48,9 +46,9 @@ def left(psi, starts):
     return np.linalg.norm(psi - starts @ np.linalg.lstsq(starts, psi, rcond=None)[0])
 
 
-def growth(notes):
-    (note,) = notes
-    return float(re.search(r"([\d.e+]+) times as large", note).group(1))
+def growth(found):
+    (one,) = found
+    return one["figures"]["growth"]
 
 
 def test_a_position_and_a_velocity_that_nobody_knows():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,8 @@ from inputdesign_cli.specification.models.sizes import most
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
+# Periods that are tried for a hint, up to that many times as long.
+_LONGEST, _TRIED = 1e3, 400
 # Periods of a block after the transient, if none are stated: their scatter shows the noise.
 _COUNTED = 4
 _SIGNAL = (
@@ -188,19 +192,25 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
         asked = "at least one is" if lines is None else f"{lines} are"
         silent = ", with the silent lines that show a nonlinearity" if lines != stated.lines else ""
         message = f"the band holds {there}, and {asked} asked for{silent}"
-        # So many steps between harmonics, and one that the Nyquist frequency may take.
-        longer = int(np.ceil(2.0 * np.pi * (1 + odd) * ((lines or 1) + 1) / (hi - lo)))
-        whole = longer * max(spec.experiment.samples // period, 1)
-        enough = f"{whole} samples or {whole * spec.sample_time:.6g} {spec.time_unit} in all"
-        hint = (
-            f"take a longer period (more samples, or fewer periods: {longer} samples hold them, {enough}), "
-        )
+        enough = _longer(spec, period, (lo, hi), lines, odd=odd)
+        longer = f"a longer period (more samples, or fewer periods{enough})"
+        hint = f"take {longer}, fewer lines, or a higher end of the band"
         key = f"{KEY}.band" if lines is None else f"{KEY}.lines"
-        hint += ", fewer lines, or a higher end of the band"
         raise bad_spec("too-few-lines", message, hint=hint, key=key) from None
     if group is None:
         return found
     return harmonic_grid.thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
+
+
+def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
+    """Return the end of a hint: the shortest period that holds the lines, and its experiment; else nothing."""
+    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
+        with suppress(harmonic_grid.TooFewHarmonicsError):
+            harmonic_grid.harmonics_between(longer, band, lines, odd=odd)
+            whole = longer * max(spec.experiment.samples // period, 1)
+            lasts = whole * spec.sample_time
+            return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
+    return ""
 
 
 def _admitted(

@@ -53,7 +53,7 @@ def test_every_whole_number_of_the_schema_has_a_limit():
 CHECKED = {
     "one for each channel, or each pair of them": re.compile(
         r"cost\.\w+_power|limits\.(\w+_power(\.max|\.min)?|amplitude(\.input|\.output)?|rate)"
-        r"|noise\.(C|D|drift|standard_deviation|correlation_time|variance(\[\])?)|plant\.A|signal\.(amplitudes|offset|quantisation\.range)"
+        r"|noise\.(C|D|drift|standard_deviation|correlation_time|variance(\[\])?)|plant\.A|signal\.(amplitudes|least_move|offset|quantisation\.range)"
         r"|spectrum\.given\.(power|amplitudes(\[\])?)|accuracy\.closed_loop_error\.reference\.variance"
         r"|.*controller\.loops"
     ),
