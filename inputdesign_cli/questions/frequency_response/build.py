@@ -203,7 +203,7 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
 
 
 def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
-    """Return the end of a hint: the shortest period that holds the lines, and its experiment; else nothing."""
+    """Return the end of a hint: the shortest period that holds the lines, and its experiment, or nothing."""
     for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
         with suppress(harmonic_grid.TooFewHarmonicsError):
             harmonic_grid.harmonics_between(longer, band, lines, odd=odd)
