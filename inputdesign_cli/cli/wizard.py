@@ -109,6 +109,9 @@ def _asked(
     """Ask for a draft, again where an answer cannot be used; return it and the answers.
 
     Without a terminal the lines of stdin are the answers. There is no draft if they end before the questions.
+
+    Raises:
+        IdesignError: a line cannot be used.
     """
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.composing import Conversation
@@ -121,6 +124,8 @@ def _asked(
             return None, replace(said, texts=talk.answers)
         with status("thinking ...", quiet=quiet):
             wrong = talk.answer(text if text.strip() else default)
+        if wrong is not None and not terminal:  # the lines that follow answer other questions
+            raise wrong
         if wrong is not None:
             complain(wrong)
     return talk.draft, replace(said, texts=talk.answers, places={})  # what is typed stands in no file

@@ -162,12 +162,13 @@ class Phrase:
 
     def lasting(self) -> float:
         """Read the whole answer as a time, as in "45 min" or "one shift"."""
-        found = self.take(rf"{NUMBER}\s*([a-z]*?)s?(?![a-z])")
+        found = self.take(rf"{NUMBER}\s*([a-z]*)")
         if found is None:
             raise bad_answer(self.key, f'"{self.text}" is no time')
         unit = found[2].lower() or "s"
+        unit = unit if unit in _TIMES else unit.removesuffix("s")
         if unit not in _TIMES:
-            raise bad_answer(self.key, f'"{found[2]}" is no unit of time: s, min, h, shifts or days')
+            raise bad_answer(self.key, f'"{found[2]}" is no unit of time: ms, s, min, h, shifts or days')
         self.finish("there only for up to")
         return needed(self._scaled(float(found[1]), unit, "time"), self.key, "the time")
 

@@ -141,12 +141,16 @@ SENTENCE = (
 
 @pytest.mark.slow
 def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
-    """A line that is not understood is asked for again; the rest has its default where the lines end."""
+    """A line that is not understood ends it, since later lines answer other questions; defaults fill the end."""
     monkeypatch.setattr("inputdesign_cli.wizard.composing.with_spectrum", lambda draft, solve: draft)
-    monkeypatch.setattr("sys.stdin", io.StringIO("soon\nconverter: steps of 0.1\n1 min\n"))
+    monkeypatch.setattr("sys.stdin", io.StringIO("soon\n1 min\n"))
     code, out, err = run("wizard", SENTENCE, "-o", "mine.yaml")
-    assert (code, err.count("error[bad-answer]")) == (0, 1)
-    assert "How long must the actuator keep each position? (Enter: no) 1 min" in err
+    assert (code, err.count("error[bad-answer]")) == (2, 1)
+    assert not (tmp_path / "mine.yaml").exists()
+    monkeypatch.setattr("sys.stdin", io.StringIO("converter: steps of 0.1\n60000 ms\n"))
+    code, out, err = run("wizard", SENTENCE, "-o", "mine.yaml")
+    assert (code, err.count("error[bad-answer]")) == (0, 0)
+    assert "How long must the actuator keep each position? (Enter: no) 60000 ms" in err
     assert "mine.yaml: written" in out
     written = yaml.safe_load((tmp_path / "mine.yaml").read_text())
     assert written["channels"] == {"u1": {"name": "valve", "unit": "%"}, "y1": {"unit": "degC"}}
