@@ -55,6 +55,13 @@ def too_long(kind: FindingKind, samples: int, longest: int) -> list[Finding]:
     return kind.when(samples > longest, fact, where="signal.samples", samples=samples, longest=longest)
 
 
+@finding(NOTE, "record-too-few-values", "Take more samples, a shorter `signal.hold`, or fewer periods.")
+def too_short(kind: FindingKind, values: int, fewest: int) -> list[Finding]:
+    """The experiment is too short for a record. Each input needs some values of its own in a period."""
+    fact = f"a period has {values} values, and at least {fewest} are needed"
+    return kind.when(values < fewest, fact, where="signal.samples", values=values, fewest=fewest)
+
+
 def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
     """Return a finding if a record misses the accuracy; limits, a level or the length may hold its power."""
     if not (record.met or np.isfinite(record.worst_ratio)):

@@ -39,7 +39,7 @@ _PER_CHANNEL = {
         *("cost.input_power", "cost.excitation_power", "limits.rate", "limits.amplitude.input"),
         *("limits.input_power.max", "limits.input_power.min"),
         *("limits.excitation_power.max", "limits.excitation_power.min"),
-        *("signal.amplitudes", "signal.offset", "signal.quantisation.range"),
+        *("signal.amplitudes", "signal.least_move", "signal.offset", "signal.quantisation.range"),
         *("spectrum.given.power", "spectrum.given.amplitudes"),
     ),
     "output": (

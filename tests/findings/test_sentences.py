@@ -89,6 +89,7 @@ FOUND = {
     "record-misses-accuracy": [f for h in (True, False) for f in records.accuracy_missed(MADE, held=h)],
     "record-dear": records.length_of_record(MADE, 40, 1, {}),
     "record-longer": records.length_of_record(MADE, 20, 1, {"rate": 0.99}),
+    "record-too-few-values": records.too_short(6, 16),
     "bound-of-power-only": records.short_windows(12, 1000.0, 0.6),
     "record-less-accurate": records.less_accurate(1.2, 1.0),
     "record-misses-requirement": records.requirement_missed(["model_error"], 1.1),

@@ -64,15 +64,16 @@ class LagPolytope:
         inputs, unit = self.windows.letters.shape[1], float(np.abs(self.windows.letters).max()) ** 2
         twice = weighted(np.ones_like(lags)).ravel()
         goal = lags.ravel() * twice / unit
+        size = float(np.abs(goal).max()) or 1.0  # the solver takes large numbers for infinite
         # Forms that are convex in every value are largest at the ends of its range.
         lower = np.full(lags.shape, -_BOX)
         lower[0, range(inputs), range(inputs)] = 0.0
         bounds = np.column_stack([lower.ravel(), np.full(goal.size, _BOX)])
         best, multiple = Facet(np.zeros(lags.shape), 0.0), np.inf
         for _ in range(_MOST_CYCLES):
-            columns = np.array(self._columns) * twice / unit
-            found = scipy.optimize.linprog(-goal, A_ub=columns, b_ub=np.ones(len(columns)), bounds=bounds)
-            multiple, form = -found.fun, found.x.reshape(lags.shape) / unit
+            columns, most = np.array(self._columns) * twice / unit, np.ones(len(self._columns))
+            found = scipy.optimize.linprog(-goal / size, A_ub=columns, b_ub=most, bounds=bounds)
+            multiple, form = -found.fun * size, found.x.reshape(lags.shape) / unit
             form[0] = 0.5 * (form[0] + form[0].T)
             most, cycle, self._values = self.windows.largest_mean(form, self._values, 1.0 + _DEEP)
             if multiple / most > best.share:

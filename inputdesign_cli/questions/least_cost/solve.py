@@ -30,7 +30,14 @@ from inputdesign_cli.questions.common.bound import (
 )
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
-from inputdesign_cli.questions.common.record import Made, design_cost, peak_at, redrawn, spectrum_of
+from inputdesign_cli.questions.common.record import (
+    Made,
+    design_cost,
+    least_period,
+    peak_at,
+    redrawn,
+    spectrum_of,
+)
 from inputdesign_cli.questions.common.searched_record import distance_to_best
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.task import SpectrumTask
@@ -184,7 +191,10 @@ class ConvexTask(SpectrumTask):
         error = results.outcome.model_error
         coverage = None if error is None else error.confidence
         if record is None:
-            missing = of_records.too_long(request.length(done.experiment.samples), request.longest)
+            length, inputs = request.length(done.experiment.samples), problem.experiment.inputs
+            missing = of_records.too_long(length, request.longest)
+            if done.excites:
+                missing += of_records.too_short(request.settings.period(length), least_period(inputs))
             missed = [] if coverage is None else confidence_missed(coverage, None)
             found = [*missed, *made.findings, *missing]
             return adding(results, results.outcome, found)
