@@ -141,7 +141,7 @@ SENTENCE = (
 
 @pytest.mark.slow
 def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
-    """A line that is not understood ends it, since later lines answer other questions; defaults fill the end."""
+    """A line that is not understood ends it, as later lines answer other questions; defaults fill the end."""
     monkeypatch.setattr("inputdesign_cli.wizard.composing.with_spectrum", lambda draft, solve: draft)
     monkeypatch.setattr("sys.stdin", io.StringIO("soon\n1 min\n"))
     code, out, err = run("wizard", SENTENCE, "-o", "mine.yaml")

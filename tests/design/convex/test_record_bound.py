@@ -88,6 +88,16 @@ def test_held_values_have_a_bound_of_their_own():
     assert 0.6 * best <= np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("amplitude", [1e-14, 1e-6, 1e9])
+def test_the_bound_on_errors_falls_as_the_amplitude_grows(amplitude):
+    bounds = []
+    for size in (1.0, amplitude):
+        design = designed(PLANTS[0][0], 20, ERROR, limits={"amplitude": {"input": size}})
+        found = bound_over_records(design.problem, design.any_spectrum, 20, windows=5)
+        bounds.append(np.sqrt(found.bound) * size)
+    assert bounds[1] == pytest.approx(bounds[0], rel=1e-3)
+
+
 def test_fewer_samples_than_the_bound_do_not_suffice():
     relative = {"model_error": {"relative": 1.0, "band": [0.02, 2.5], "alpha": 3}}
     design = designed({"B": [0, 1.0], "F": [1, -0.5]}, 9, relative, "shortest_experiment")
