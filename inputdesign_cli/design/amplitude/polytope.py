@@ -71,8 +71,8 @@ class LagPolytope:
         bounds = np.column_stack([lower.ravel(), np.full(goal.size, _BOX)])
         best, multiple = Facet(np.zeros(lags.shape), 0.0), np.inf
         for _ in range(_MOST_CYCLES):
-            columns, most = np.array(self._columns) * twice / unit, np.ones(len(self._columns))
-            found = scipy.optimize.linprog(-goal / size, A_ub=columns, b_ub=most, bounds=bounds)
+            columns, ones = np.array(self._columns) * twice / unit, np.ones(len(self._columns))
+            found = scipy.optimize.linprog(-goal / size, A_ub=columns, b_ub=ones, bounds=bounds)
             multiple, form = -found.fun * size, found.x.reshape(lags.shape) / unit
             form[0] = 0.5 * (form[0] + form[0].T)
             most, cycle, self._values = self.windows.largest_mean(form, self._values, 1.0 + _DEEP)
