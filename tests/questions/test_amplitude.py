@@ -69,6 +69,12 @@ def test_held_values_are_searched_as_such():
     assert results.result["objective"]["any_record_bound"] <= ratio(u.ravel())
 
 
+def test_a_record_of_few_values_is_the_best_of_all():
+    results = solve(asked(experiment="{samples: 24}", signal="{type: binary, hold: 4, seconds: 5}"))
+    every = [ratio(np.repeat((1.0, *rest), 4)) for rest in product((-1.0, 1.0), repeat=5)]
+    assert ratio(results.signal[:, 0]) == pytest.approx(min(every), rel=1e-6)
+
+
 def test_the_cheapest_record_is_that_of_the_best_shape_at_the_level_that_it_needs():
     more = {"experiment": "{samples: 200}", "objective": "least_cost", "cost": "{input_power: 1}"}
     results = solve(asked(**more))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from inputdesign_cli.signal.settings import SignalSettings
 # of these starts are improved, and at last random changes of the best record.
 _DRAWN, _REGISTERS, _CLOCKS = 8, range(2, 12), (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 _IMPROVED, _CHANGES = 6, 1000
+_FEW = 2048  # if there are no more records, all are tried
 # A shortest record is sought to this share of its length; a length takes this share of the time that is left.
 _FINE, _SHARE = 0.005, 0.25
 _SHORTER = 0.6  # of the way from the bound to the shortest record so far
@@ -117,6 +119,9 @@ class LevelSearch:
         search = FlipSearch(goals, letters, values, hold, self.allowed, most_moves=most, returns=returns)
         own = _nearest(record[::hold], letters) if len(letters) == 2 else record[::hold]
         starts = [own, *(_nearest(start, letters) for start in self._starts(values))]
+        if len(letters) ** own.size <= _FEW:  # then the best of all records is among the starts
+            levels = np.array([*product(range(len(letters)), repeat=own.size)]).reshape(-1, *own.shape)
+            starts += [*letters[levels, range(own.shape[1])]]
         if most is not None:
             starts = [with_few_moves(start, most - returns) for start in starts]
         if returns:
