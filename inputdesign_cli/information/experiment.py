@@ -77,9 +77,6 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
 """The powers that results state; the power of the moves of u between samples is only limited."""
-# The last plant or loop, and whether its noise informs; the last experiment, and its gradients at flat nodes.
-_latest: list[tuple[object, bool]] = [(None, False)]
-_flat: list[tuple] = [(None, ())]
 # What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
 _NOTHING = 1e-13
 
@@ -262,11 +259,7 @@ class Experiment:
         """Return whether the noise alone has information on any parameter."""
         if self.model.continuous:
             return False
-        source, told = _latest[0]
-        if source is not self._source:  # the experiments of a design have one plant, in many coordinates
-            source, told = self._source, bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
-            _latest[0] = source, told
-        return told
+        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
 
     def whitened(self, power: float | Array) -> Experiment:
         """Return the experiment in coordinates where M = I by this power, flat over the band.
@@ -277,13 +270,16 @@ class Experiment:
         Raises:
             SpecError: `not-identifiable` when even that excitation does not identify all parameters.
         """
-        of, gradients = _flat[0]
-        if of is not self:  # several powers are tried in turn
-            raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
-            noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
-            gradients = (excited, raw.excitation_gradient(excited.nodes)), (around, noise)
-            _flat[0] = self, gradients
-        return self.whitened_by(power, *gradients)
+        return self.whitened_by(power, *self._at_flat_nodes)
+
+    @cached_property
+    def _at_flat_nodes(
+        self,
+    ) -> tuple[tuple[Quadrature, ComplexArray], tuple[Quadrature, ComplexArray | None]]:
+        """Return the nodes of flat excitation and of the noise, with gradients of raw parameters."""
+        raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
+        noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
+        return (excited, raw.excitation_gradient(excited.nodes)), (around, noise)
 
     def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
         """Return nodes for flat excitation over the band, and for the noise, with these singularities."""

@@ -38,9 +38,6 @@ from inputdesign_cli.plant.polynomial import (
 )
 from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix, product_of
 
-# A model, frequencies, and its polynomials there.
-_latest: list[tuple] = [(None, None, None)]
-
 
 @dataclass(frozen=True)
 class PolynomialModel(Parametrised):
@@ -198,27 +195,12 @@ class PolynomialModel(Parametrised):
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """Return the frequency response G as (n, p, r)."""
-        _, known = self._at_last(w)
-        G = np.zeros((np.size(w), self.outputs, self.inputs), dtype=complex)
+        q = unit_circle(w)
+        G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
-            A, B, F = known[i, j]
+            A, B, F = evaluate(self._entries[i][j], q)
             G[:, i, j] = B / (A * F)
         return G
-
-    def _at_last(self, w: ArrayLike) -> tuple[ComplexArray, dict[tuple[int, int], ComplexArray]]:
-        """Return q^-1, and A_i, B_ij, F_ij of each entry; who asks for dG then asks for G at the same w."""
-        of, asked, known = _latest[0]
-        if of is self and asked is w:
-            return known
-        q, found = np.exp(-1j * np.asarray(w)), dict[tuple[int, int], ComplexArray]()
-        for i, j in self.active:
-            table = self._entries[i][j]
-            found[i, j] = np.zeros((len(table), *np.shape(q)), dtype=complex)
-            for coefficients in table.T[::-1]:  # Horner
-                found[i, j] *= q
-                found[i, j].real += coefficients.reshape(-1, *(1,) * np.ndim(q))
-        _latest[0] = self, w, (q, found)
-        return q, found
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """Return the noise filter H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
@@ -256,16 +238,14 @@ class PolynomialModel(Parametrised):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
         highest = max((parameter.power for parameter in self.parameters), default=0)
-        q, known = self._at_last(w)
+        q, entries = unit_circle(w), self._entries
         # Frequencies lie side by side in memory.
         shape = (len(self.parameters), self.outputs, self.inputs, q.size)
         gradient = np.zeros(shape, dtype=complex).transpose(3, 0, 1, 2)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
-        shifts = [np.ones_like(q), q]
-        for _ in range(highest - 1):
-            shifts.append(shifts[-1] * q)
+        shifts = powers(q, highest)
         for i, j in self.active:
-            A, B, F = known[i, j]
+            A, B, F = evaluate(entries[i][j], q)
             AF = A * F
             factors["b", i, j] = 1.0 / AF
             for letter, own in (("a", A), ("f", F)):

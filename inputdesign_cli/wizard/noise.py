@@ -190,7 +190,7 @@ def _at_rest(path: Path, plant: PlantAnswer) -> _Level:
     Noise with one pole is assumed where rows are not as far apart as samples. Its correlation then fades by
     the same factor in the same time.
     """
-    from inputdesign_cli.questions.building.header import read_samples
+    from inputdesign_cli.questions.building.tables import read_samples
     from inputdesign_cli.records import read_sheet
     from inputdesign_cli.records.columns import columns_of, time_columns
 

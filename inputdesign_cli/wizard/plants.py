@@ -281,7 +281,7 @@ def unit_of_time(sheet: Sheet, name: str) -> str:
 def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     """Estimate gain, time constant and dead time from a record that begins at rest."""
     from inputdesign_cli import questions
-    from inputdesign_cli.questions.building.header import read_columns
+    from inputdesign_cli.questions.building.tables import read_columns
     from inputdesign_cli.records import Preparation, read_sheet
 
     wanted = {"time": "time", "u1": "u", "y1": "y"} | dict(columns)

@@ -16,7 +16,7 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
-from inputdesign_cli.questions.building.header import read_columns, read_samples
+from inputdesign_cli.questions.building.tables import read_columns, read_samples
 from inputdesign_cli.records import Preparation, read_log, read_sheet
 
 U, Y = np.arange(20.0) % 7, np.arange(20.0) % 5

@@ -16,15 +16,11 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.plant import Model, Rational
-from inputdesign_cli.questions.building.controllers import (
-    build_weight,
-    check_finite,
-    loop_controller,
-    on_the_limit,
-    rational,
-)
-from inputdesign_cli.questions.building.header import bad_table, build_units, has_column, read_frequency_table
+from inputdesign_cli.questions.building.controllers import loop_controller
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_loop
+from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
+from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE

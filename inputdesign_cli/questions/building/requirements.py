@@ -16,9 +16,9 @@ from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.building import model_error
-from inputdesign_cli.questions.building.controllers import build_weight, check_finite
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import embedded
+from inputdesign_cli.questions.building.weights import build_weight, check_finite
 from inputdesign_cli.questions.common.infeasible import StatedBound
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.plugins import added

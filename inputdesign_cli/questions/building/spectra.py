@@ -12,9 +12,10 @@ from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
-from inputdesign_cli.questions.building.controllers import build_weight, check_finite, on_the_limit
-from inputdesign_cli.questions.building.header import bad_table, build_units, has_column, read_frequency_table
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.signal_settings import stated_moves, stated_peaks
+from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
+from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
 from inputdesign_cli.specification.models.sizes import SIZES

@@ -32,7 +32,8 @@ from inputdesign_cli.plant import (
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.demand import check_effects, check_model, on_finite_information
-from inputdesign_cli.questions.building.header import build_units, read_frequency_table, read_samples
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.experiment import NoiseShape

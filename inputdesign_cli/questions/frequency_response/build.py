@@ -14,19 +14,14 @@ from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.build import operating_point
-from inputdesign_cli.questions.building.header import (
-    ONE_PLANT,
-    build_header,
-    build_units,
-    check_compared,
-    has_column,
-    refuse_unhandled,
-)
+from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.model_error import positive_table
 from inputdesign_cli.questions.building.signal_settings import build_record_request
 from inputdesign_cli.questions.building.spectra import build_power_limits, implied_limits
 from inputdesign_cli.questions.building.system import build_cost, build_model
+from inputdesign_cli.questions.building.tables import has_column
 from inputdesign_cli.questions.building.uncertainty import build_simulation
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.frequency_response.measure import Measurement
 from inputdesign_cli.questions.frequency_response.solve import KEY, ResponseTask
 from inputdesign_cli.signal import harmonic_grid

@@ -10,7 +10,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import InPhase
-from inputdesign_cli.questions.building.header import build_header, build_units, refuse_unhandled
+from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.model_error import build_confidence
 from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
@@ -22,6 +22,7 @@ from inputdesign_cli.questions.building.system import (
     record_step,
 )
 from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants, build_simulation
+from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported

@@ -8,8 +8,8 @@ from dataclasses import replace
 from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.limits import Goal
 from inputdesign_cli.errors import refuse
-from inputdesign_cli.questions.building.demand import check_design, check_every_direction_counts, check_reach
-from inputdesign_cli.questions.building.header import build_header, refuse_unhandled
+from inputdesign_cli.questions.building.demand import check_design
+from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.model_error import build_confidence
 from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
 from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
@@ -25,7 +25,9 @@ from inputdesign_cli.questions.building.system import (
     check_known,
     excitation_band,
 )
+from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants, build_simulation
+from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.questions.least_cost.sought import FewColumns, GridMethod, Sought

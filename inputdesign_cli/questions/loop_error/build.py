@@ -24,16 +24,12 @@ from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries
 from inputdesign_cli.plant.polynomial import all_roots, roots_in_z
 from inputdesign_cli.questions.building import system
-from inputdesign_cli.questions.building.controllers import held, rational
 from inputdesign_cli.questions.building.demand import check_effects, check_model, check_record
-from inputdesign_cli.questions.building.header import (
-    ONE_PLANT,
-    build_header,
-    check_compared,
-    refuse_unhandled,
-)
+from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.signal_settings import build_bounds
 from inputdesign_cli.questions.building.spectra import build_power_limits, implied_limits
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
+from inputdesign_cli.questions.building.weights import held, rational
 from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorTask
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant

@@ -12,12 +12,8 @@ from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
-from inputdesign_cli.questions.building.header import (
-    ONE_PLANT,
-    build_header,
-    check_compared,
-    refuse_unhandled,
-)
+from inputdesign_cli.questions.building.header import build_header
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.regression.solve import KEY, RegressionTask
 from inputdesign_cli.specification import Noise, Simulation, SimulationNoise, Spec
 

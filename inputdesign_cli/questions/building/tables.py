@@ -1,0 +1,89 @@
+"""Data files that a spec names: columns of numbers, read with diagnostics that name the line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.specification import Spec
+
+_LARGEST = 1e40  # of a data file, as of other numbers in a spec
+
+
+def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
+    """Return columns (n,) of a data file without gaps, by role; `wanted` is their header, or how that begins.
+
+    Raises `DataError`: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
+    """
+    from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.columns import columns_of
+
+    sheet = read_sheet(path, key=key)
+    found = columns_of(sheet, wanted)
+    for role, numbers in found.items():
+        missing = np.flatnonzero(np.isnan(numbers))
+        if missing.size:
+            message = f"a number is missing in column {wanted[role]}"
+            hint = "write plain numbers with a decimal point, one row a line"
+            raise sheet.error("data-not-a-number", message, hint, int(missing[0]))
+    return found
+
+
+def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
+    """Return the columns of a signal, of which no sample may be missing, nor a row between them.
+
+    Raises `DataError`: see `read_columns`; `beyond-precision`.
+    """
+    from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.signals import check_range
+
+    sheet = read_sheet(path, key=key)
+    for line in sheet.passed:
+        message = f"line {line} of {path.name} is blank or commented out: is a sample missing there?"
+        row = int(np.searchsorted(sheet.lines, line)) - 1
+        raise sheet.error("data-not-a-number", message, "take the line out of the file", row)
+    found = read_columns(path, wanted, key=key)
+    for role, numbers in found.items():
+        check_range(sheet, wanted[role], numbers)
+    return found
+
+
+def has_column(path: Path, start: str, *, key: str) -> bool:
+    """Return whether some header of a data file begins like this; `DataError` (`data-unreadable`)."""
+    from inputdesign_cli.records import read_sheet
+
+    return any(name.startswith(start) for name in read_sheet(path, key=key).header)
+
+
+def read_frequency_table(
+    spec: Spec, name: str, columns: Sequence[str], key: str, *, least: int = 2
+) -> dict[str, Array]:
+    """Return `columns`, and `frequency` in the unit of the experiment, of `least` rows or more.
+
+    Raises `DataError`: the file cannot be read, or its frequencies do not rise from zero (`bad-table`).
+    """
+    wanted = {"frequency": "frequency", **{column: column for column in columns}}
+    found = read_columns(spec.resolve_path(name), wanted, key=key)
+    frequency = found["frequency"]
+    if frequency.size < least or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
+        message = "the frequencies must be nonnegative and increase from row to row"
+        hint = f"sort the rows; there must be {'one' if least == 1 else 'two'} at least"
+        raise bad_table(spec, name, message, hint, key)
+    for column, values in found.items():
+        size = np.abs(values)
+        beyond = np.flatnonzero((size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0)))
+        if beyond.size:
+            message = f"{column} is {values[beyond[0]]:g} in row {beyond[0] + 2}"
+            hint = f"numbers other than zero lie between {1.0 / _LARGEST:g} and {_LARGEST:g}"
+            raise bad_table(spec, name, message, hint, key)
+    return found | {"frequency": frequency * build_units(spec).frequency}
+
+
+def bad_table(spec: Spec, name: str, message: str, hint: str, key: str) -> DataError:
+    """Return the error about a table that can be read but not used."""
+    return DataError.because("bad-table", f"{spec.resolve_path(name).name}: {message}", hint, key)
