@@ -107,6 +107,14 @@ def test_what_no_record_can_is_refused_with_a_proof():
     assert 26 <= least <= 32
 
 
+def test_a_plant_that_integrates_has_a_record_but_no_bound():
+    plant = "{B: [0, 0.1], F: [1, -1], known: [f1]}"
+    limits, deviation = "{amplitude: 1, band: [0.05, 3]}", "{standard_deviation: {b1: 0.01}}"
+    result = solve(asked(plant=plant, limits=limits, accuracy=deviation)).result
+    assert "any_record_bound" not in result["objective"]
+    assert result["signal"]["samples"] == 60
+
+
 @pytest.mark.parametrize(
     "more",
     [

@@ -29,6 +29,7 @@ from inputdesign_cli.spectrum.held import HeldLines
 # Windows grow by so many values until the bound gains less than the share.
 _FIRST, _MORE, _GAIN = 4, 4, 1e-3
 _MOST_BITS = 13  # of the number of states
+_ON_THE_CIRCLE = 1e-9
 _TOLERANCE = 1e-4
 _INPUTS = ("input", "excitation")
 
@@ -73,12 +74,17 @@ def bound_over_records(
         hold: the samples for which each value is held.
 
     Returns:
-        None if no bound is known: in a loop, without an amplitude, for costs of outputs.
+        None if no bound is known: in a loop, without an amplitude, for costs of outputs, for plants with a
+        pole on the unit circle.
     """
     inputs = problem.experiment.inputs
     amplitude = amplitude_of(problem.limits, inputs)
     dear = problem.goal == "cost" and any(kind not in _INPUTS for kind in problem.cost)
     if amplitude is None or problem.experiment.loop is not None or dear or windows < 2:
+        return None
+    # At a pole on the circle a relaxed record would have unlimited information.
+    poles = [one.experiment.model.singularities.imag.min(initial=np.inf) for one in problem.scenarios]
+    if min(poles) <= _ON_THE_CIRCLE:
         return None
     kept = tuple(limit for limit in problem.limits if limit.upper and limit.kind in _INPUTS)
     basis, x, known = free.basis, free.x, free.active
