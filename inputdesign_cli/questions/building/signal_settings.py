@@ -293,7 +293,7 @@ def _check_levels(spec: Spec) -> None:
         unlimited if bound is None or spec.closed_loop else bound for bound in (bounds.amplitude, bounds.rate)
     )
     for channel, level in enumerate(np.broadcast_to(spec.signal.amplitudes or 0.0, inputs)):
-        if level > most[channel]:
+        if level > max(most[channel], 0.0):
             of = f" of input {channel + 1}" if inputs > 1 else ""
             hint = "lower it, or remove it: the tool finds the level that the accuracy needs"
             message = f"amplitudes is {level:g}, above limits.amplitude {most[channel]:g}{of}"
