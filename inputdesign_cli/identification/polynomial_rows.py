@@ -125,7 +125,7 @@ def errors_and_gradients(rows: Sequence[Row], theta: Array, u: Array, y: Array) 
         # Signals of which the gradients are delays.
         for one, source in zip(row.all, (of_a, *of_b, of_c, -shaped, *of_f), strict=True):
             for lag in one.lags:
-                psi[:, number, lag:] = source[:, : samples - lag]
+                psi[:, number, lag:] = source[:, : max(samples - lag, 0)]  # a short segment has no such past
                 number += 1
     return errors, psi
 

@@ -204,3 +204,16 @@ def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
     expected = np.linalg.lstsq(arx_regressors(u, y), y, rcond=None)[0]
     np.testing.assert_allclose(found.theta, expected, rtol=1e-6)
     assert np.all(np.array(found.tests.alike) > 0.01)
+
+
+@pytest.mark.parametrize("samples", range(1, 7))
+def test_gradients_of_a_segment_shorter_than_its_lags_are_differences(samples):
+    """What is left between gaps may be shorter than the delay and the orders."""
+    model = one_channel([0, 0, 0, 0.4, 0.2], F=[1, -0.8], C=[1, 0.5], D=[1, -0.7, 0.1])
+    kind, rng = estimator(model, 1.0), np.random.default_rng(samples)
+    u, y = rng.standard_normal((2, samples, 1))
+    errors, psi = kind.errors_and_gradient(model.theta, u, y)
+    for k, step in enumerate(1e-6 * np.eye(model.theta.size)):
+        up, down = (kind.errors_and_gradient(model.theta + sign * step, u, y)[0] for sign in (1.0, -1.0))
+        np.testing.assert_allclose(psi[k].ravel(), -(up - down).ravel() / 2e-6, atol=1e-8)
+    assert errors.shape == (samples, 1)
