@@ -41,8 +41,9 @@ The log is [real](data/README.md): run the commands in a folder with a copy of
 `docs/data/tclab/two_heaters.txt`. The experiments are simulated by an energy balance that is fitted to the
 log (`python docs/make_tutorial.py`).
 
-> The outputs below are of an earlier version. `explore` now also reports that the temperature rises about row 144 for
-> no logged reason (the second heater), and leaves rows 135 to 193 out; later numbers differ, and a third record is needed.
+> The outputs below are of an earlier version. `explore` now also reports that the temperature rises about
+> row 144 for no logged reason (the second heater), and leaves rows 135 to 193 out. Later numbers differ, and
+> both records together miss the target.
 
 ## 1. What is in the log
 
