@@ -186,8 +186,8 @@ class OverFrequency(Requirement):
         """Return the ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
         return largest_singular(half)
 
-    def measured(self, half: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return combinations (n, m, k) of the rows of half, whose squares add up to the squared ratio."""
+    def ratio_rows(self, half: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return rows (n, m, k) made of the rows of half; their squares add up to the squared ratio."""
         if half.shape[1] != 2:
             return np.linalg.eigh(half @ half.swapaxes(1, 2))[1][:, None, :, -1] @ half
         real, imaginary = half[:, :1], half[:, 1:]
@@ -271,10 +271,10 @@ class OverFrequency(Requirement):
         return self.measure(turned(rows, inverse_factor(information).T), frequencies)
 
     def slope(self, information: Array, frequencies: Array, shares: Array) -> Array:
-        """Return minus the gradient of a sum of squared ratios, from what `measured` says, (k, k)."""
+        """Return minus the gradient of a sum of squared ratios, by its `ratio_rows`, (k, k)."""
         factor = inverse_factor(information)
         half = turned(self._last.rows_at(frequencies, self.rows), factor.T)
-        parts = self.measured(half) @ factor
+        parts = self.ratio_rows(half) @ factor
         return np.asarray(np.einsum("n,nmi,nmj->ij", shares, parts, parts, optimize=True))
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:

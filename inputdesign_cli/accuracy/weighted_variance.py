@@ -49,7 +49,7 @@ class WeightedVariance(OverFrequency):
         """Return the weighted standard deviation over its limit."""
         return np.sqrt(np.einsum("nqi,nqi->n", half, half))
 
-    def measured(self, half: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ratio_rows(self, half: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the rows themselves."""
         return half
 

@@ -111,7 +111,7 @@ def less_accurate(
 
 @finding(NOTE, "bound-of-power-only", "Take `signal.hold: auto` if the actuator may keep its values as long.")
 def short_windows(kind: FindingKind, seen: int, remembered: float, distance: float | None) -> list[Finding]:
-    """The bound over all records knows no more than the power. Its windows are shorter than the memory.
+    """The bound over all records equals that of the power. Its windows are shorter than the memory.
 
     Args:
         seen: samples in a window of the bound.
