@@ -6,13 +6,14 @@ import io
 import re
 import textwrap
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
@@ -127,11 +128,22 @@ class Page(Figure):
 
 def _typeset(page: Figure) -> None:
     """Set the indices of r_u and r_adm low, in texts that have no formula otherwise."""
-    for text in page.findobj(Text):
+    for text in _texts(page):
         written = text.get_text()
         if _SYMBOL.search(written) and not set(written) & set("$\\"):
             text.set_parse_math(True)
             text.set_text(_SYMBOL.sub(r"r$_{\1}$", written))
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """Yield the texts of an artist and its parts, without the numbers at ticks: to list those makes them."""
+    for part in artist.get_children():
+        if isinstance(part, Axis):
+            yield part.label
+            continue
+        if isinstance(part, Text):
+            yield part
+        yield from _texts(part)
 
 
 def rendered(
