@@ -198,8 +198,8 @@ class Workers:
         from inputdesign_cli.compute.processes import Processes
 
         if self.cluster is not None:
-            tell = (lambda text: None) if quiet else (lambda text: typer.echo(text, err=True))
-            return Cluster(self.cluster, worker_timeout=self.worker_timeout, tell=tell)
+            say = (lambda text: None) if quiet else (lambda text: typer.echo(text, err=True))
+            return Cluster(self.cluster, worker_timeout=self.worker_timeout, say=say)
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         count = self.jobs or cores
         return Processes(count) if count > 1 else InProcess()

@@ -91,12 +91,12 @@ def _simulated(outcome: Outcome) -> Iterator[Line]:
     if table and found is not None:
         yield "simulated", f"{found.runs} runs of each input"
         for name, *cells in table.rows:
-            told = [
+            figures = [
                 f"{head} {' ('.join(cell.split(BREAK))}{')' * cell.count(BREAK)}"
                 for head, cell in zip(table.head[1:], cells, strict=True)
                 if cell
             ]
-            yield "", f"{name}: {', '.join(told)}".replace("±", "+-")
+            yield "", f"{name}: {', '.join(figures)}".replace("±", "+-")
 
 
 def _named(name: str, texts: Iterable[str]) -> Iterator[Line]:

@@ -122,14 +122,14 @@ def _list(points: Iterable[Listing], *, json_output: bool) -> None:
 
 def pace(progress: SweepRun, seconds: float) -> str:
     """Return the points done, their rate, the time left and the failures. Points done before add no speed."""
-    told = [f"{progress.passed}/{progress.total}"]
+    parts = [f"{progress.passed}/{progress.total}"]
     if progress.computed and seconds > 0:
         rate = progress.computed / seconds
         left = timedelta(seconds=round((progress.total - progress.passed) / rate))
-        told.append(f"{rate:.3g} points/s  {left} left")
+        parts.append(f"{rate:.3g} points/s  {left} left")
     if progress.failed:
-        told.append(f"{progress.failed} without a result")
-    return "  ".join(told)
+        parts.append(f"{progress.failed} without a result")
+    return "  ".join(parts)
 
 
 def show_trade(

@@ -110,7 +110,7 @@ def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figur
                 board.show(solved(pictures=False).page)
                 followed = solved()
                 board.show(followed.page)
-                typer.echo(followed.told, err=True)
+                typer.echo(followed.said, err=True)
                 if figures and stamp(files) == before:
                     keep(results, place, Shown(quiet=True))
         except IdesignError as error:
@@ -166,6 +166,6 @@ def _follow_directory(directory: Path, board: Board) -> None:
             board.show(followed_page(report_text(directory)))
         except IdesignError as error:
             points = sum(1 for _ in (directory / "points").glob("*/result.json"))
-            told = f"{points} points have a result so far." if points else error.diagnostics[0].message
-            board.show(message_page(directory.name, told, "shows what comes"))
+            said = f"{points} points have a result so far." if points else error.diagnostics[0].message
+            board.show(message_page(directory.name, said, "shows what comes"))
         wait_for_change(records, before)

@@ -30,7 +30,7 @@ class Cluster:
     address: str
     patience: float = 10.0  # seconds to find the scheduler, and a first worker
     worker_timeout: float | None = None  # seconds without any worker before the work is given up
-    tell: Callable[[str], None] = field(default=lambda text: None)  # what a user should know meanwhile
+    say: Callable[[str], None] = field(default=lambda text: None)  # what a user should know meanwhile
     shares_files: bool = field(default=False, init=False)
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
@@ -77,7 +77,7 @@ class Cluster:
                 continue
             if alone_since is None:
                 alone_since = time.monotonic()
-                self.tell(f"no workers at {self.address}; waiting")
+                self.say(f"no workers at {self.address}; waiting")
             alone = time.monotonic() - alone_since
             if self.worker_timeout is not None and alone > self.worker_timeout:
                 raise DataError.because(

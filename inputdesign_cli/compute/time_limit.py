@@ -102,10 +102,10 @@ def more_time() -> str:
 def out_of_time(reached: str) -> OutOfTimeError:
     """Return the error `out-of-time`, with a sentence on the result that was reached."""
     when = "before the interrupt" if was_stopped() else "within solver.time_limit"
-    told = f"the answer was not found {when}"
+    message = f"the answer was not found {when}"
     return OutOfTimeError.because(
         "out-of-time",
-        f"{told}: {reached}" if reached else told,
+        f"{message}: {reached}" if reached else message,
         hint=f"{more_time()}, lower the orders, or ask for a shorter signal",
         key="solver.time_limit",
     )
@@ -151,7 +151,7 @@ def watching(watcher: Watcher) -> Iterator[None]:
         _watcher.reset(token)
 
 
-def tell(done: Round | Counted) -> None:
+def report_progress(done: Round | Counted) -> None:
     """Report to the watcher, if there is one."""
     watcher = _watcher.get()
     if watcher is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore.division import busiest, cut, divided
 from inputdesign_cli.explore.drift import levelled, slopes_of
@@ -166,7 +166,7 @@ def _estimated(
         if made and not good:
             break
         names = " and ".join(dict.fromkeys(c.orders.family for c in taken))
-        tell(Counted(f"models of the whole record, now {names}", len(made), len(made) + 1))
+        report_progress(Counted(f"models of the whole record, now {names}", len(made), len(made) + 1))
         try:
             estimate, model = _together(taken, used, feedback, ramp)
         except SpecError as error:

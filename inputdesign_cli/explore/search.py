@@ -20,7 +20,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import LEAST_DECAY, NOT_COMPUTED, Parts, fits, is_steady
 from inputdesign_cli.explore.structures import Orders, Process
@@ -256,7 +256,7 @@ def explore_structure(
     shapes = [shape for shape in every if _PER_PARAMETER * shape.size <= records.samples]
     found = list[Candidate]()
     for count, shape in enumerate(shapes):
-        tell(Counted(f"structures estimated, now {shape.family}", count, len(shapes)))
+        report_progress(Counted(f"structures estimated, now {shape.family}", count, len(shapes)))
         try:
             found.append(records.candidate(shape))
         except NOT_COMPUTED:

@@ -271,13 +271,13 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     for centre, size in zip(L[at], radius[at], strict=True):
         disc = Circle((centre.real, centre.imag), size, color=BLUE, alpha=0.14, linewidth=0.5)
         axes.add_patch(disc)
-    told = {
+    values = {
         "real part": L.real,
         "imaginary part": L.imag,
         "radius of its disc": radius,
         "distance of the disc from −1": np.abs(1.0 + L) - radius,
     }
-    line = Traced(L.real, L.imag, curves.frequency, style.frequency_label(time_unit), told, color=BLUE)
+    line = Traced(L.real, L.imag, curves.frequency, style.frequency_label(time_unit), values, color=BLUE)
     line.set_label("C G, nominal")
     axes.add_line(line)
     handles: list[Artist] = [line, Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)")]

@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying
 from inputdesign_cli.identification.derived import Derived
@@ -205,7 +205,7 @@ def identify(
             begin = kind.starting_points(centred(chosen) if records.free else chosen, start)
         others = [] if earlier is None else [earlier.theta[None]]
         points = np.concatenate([begin.points, *([] if known is None else [known[None]]), *others])
-        tell(Counted("starting points followed to a minimum", 0, len(points)))
+        report_progress(Counted("starting points followed to a minimum", 0, len(points)))
         return search(records, points, starts=begin.tried + (earlier is not None))
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import STEP, Extension, Kind, Mask, Parts, Starts, late_samples
 from inputdesign_cli.identification.polynomials import with_entry
@@ -142,7 +142,7 @@ class TransferKind(Kind):
                 begun[above] = np.linalg.lstsq(columns / scale, errors.ravel(), rcond=1e-10)[0] / scale
                 made.append(begun)
         begun = np.array(made)
-        tell(Counted("starting points tried", 0, len(begun)))
+        report_progress(Counted("starting points tried", 0, len(begun)))
         found = minimise(RecordProblem((about,) * len(begun)), begun, most=_QUICK, idle=_IDLE)
         chosen: list[Array] = []
         for run in np.argsort(found.cost, kind="stable"):

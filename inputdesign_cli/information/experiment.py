@@ -239,10 +239,10 @@ class Experiment:
     @cached_property
     def noise_information(self) -> Array:
         """Return the information (k, k) in N samples of noise alone, without excitation."""
-        if not self.told_by_noise:
+        if not self.noise_informs:
             return np.zeros((self.size, self.size))
-        told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities)
-        return self.samples * told[0]
+        found = information_of_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities)
+        return self.samples * found[0]
 
     @property
     def baseline_information(self) -> Array:
@@ -255,7 +255,7 @@ class Experiment:
         return known + samples / self.samples * (information - known)
 
     @cached_property
-    def told_by_noise(self) -> bool:
+    def noise_informs(self) -> bool:
         """Return whether the noise alone has information on any parameter."""
         if self.model.continuous:
             return False
@@ -278,7 +278,7 @@ class Experiment:
     ) -> tuple[tuple[Quadrature, ComplexArray], tuple[Quadrature, ComplexArray | None]]:
         """Return the nodes of flat excitation and of the noise, with gradients of raw parameters."""
         raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
-        noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
+        noise = raw.noise_gradient(around.nodes) if self.noise_informs else None
         return (excited, raw.excitation_gradient(excited.nodes)), (around, noise)
 
     def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
@@ -388,7 +388,7 @@ def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
     return np.where(np.abs(row) > _NOTHING * largest, row, 0.0)
 
 
-def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
+def information_of_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
     """Return the information (S, k, k) of a sample of each of S plants without any excitation.
 
     Args:

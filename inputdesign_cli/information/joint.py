@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel, told_by_noise
+from inputdesign_cli.information.experiment import Experiment, PowerKind, information_of_noise, of_channel
 from inputdesign_cli.plant import (
     disturbance_gradients,
     excitation_gradients,
@@ -41,7 +41,7 @@ def _whitened(experiments: Sequence[Experiment], power: float | Array) -> list[E
         return [first.whitened(power)]
     excited, around = first.flat_rules(_singularities(experiments))
     F = _excitation_gradients(experiments, excited.nodes)
-    V = _noise_gradients(experiments, around.nodes) if first.told_by_noise else None
+    V = _noise_gradients(experiments, around.nodes) if first.noise_informs else None
     return [
         experiment.whitened_by(
             power, (excited, experiment.noise_whitener[0, 0] * F[s]), (around, None if V is None else V[s])
@@ -57,7 +57,7 @@ def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
 
 def _noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
     first, number = experiments[0], len(experiments)
-    if number == 1 or not first.told_by_noise:
+    if number == 1 or not first.noise_informs:
         return np.stack([experiment.noise_information for experiment in experiments])
     whiteners = np.array([experiment.from_raw for experiment in experiments])
 
@@ -65,8 +65,8 @@ def _noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
         columns = whiteners @ _noise_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
         return columns.transpose(2, 0, 1)[..., None, None]
 
-    told = told_by_noise(gradients, _singularities(experiments))
-    return np.asarray(first.samples * told)
+    found = information_of_noise(gradients, _singularities(experiments))
+    return np.asarray(first.samples * found)
 
 
 def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:

@@ -55,28 +55,28 @@ class Followed:
 
     name: str
     state: str = "computing"  # computing, done, failed
-    told: str = ""
+    said: str = ""
     designs: tuple[dict[str, object], ...] = ()
     errors: tuple[dict[str, object], ...] = field(default=())
     awaits: str = "computes whenever it is saved"
 
     def computing(self) -> Followed:
         """Return the followed spec with the state of a new computation."""
-        return replace(self, state="computing", told="The file was saved: computing ..", errors=())
+        return replace(self, state="computing", said="The file was saved: computing ..", errors=())
 
     def solved(self, run: Path, clock: str, seconds: float, *, pictures: bool = True) -> Followed:
         """Return the followed spec with the design in `run`; without `pictures` these are yet to be drawn."""
         made = run_page(run, pictures=pictures) | {"clock": clock}
-        told = (
+        said = (
             f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
         )
-        return replace(self, state="done", told=told, designs=(made, *self.designs[:1]), errors=())
+        return replace(self, state="done", said=said, designs=(made, *self.designs[:1]), errors=())
 
     def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:
         """Return the page with the error; `lines` are the lines of `file`, the spec as it was read."""
         listed = tuple(_placed(diagnostic, lines, file) for diagnostic in error.diagnostics)
         number = f"{len(listed)} errors" if len(listed) > 1 else "One error"
-        return replace(self, state="failed", told=f"{number}: the last good design stays.", errors=listed)
+        return replace(self, state="failed", said=f"{number}: the last good design stays.", errors=listed)
 
     @property
     def page(self) -> str:
@@ -86,15 +86,15 @@ class Followed:
 
 def followed_page(report: str) -> str:
     """Return the page of a report, with the script that makes a browser follow it."""
-    told = '<p id="connection" class="bad" role="status"></p>'
+    said = '<p id="connection" class="bad" role="status"></p>'
     return report.replace("</head>", '<script src="follow.js" defer></script>\n</head>', 1).replace(
-        "</body>", f"{told}\n</body>", 1
+        "</body>", f"{said}\n</body>", 1
     )
 
 
-def message_page(name: str, told: str, awaits: str = "computes whenever it is saved") -> str:
+def message_page(name: str, said: str, awaits: str = "computes whenever it is saved") -> str:
     """Return a page with a message; `awaits` says what happens next."""
-    return Followed(name, "waiting", told, awaits=awaits).page
+    return Followed(name, "waiting", said, awaits=awaits).page
 
 
 def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str, object]:

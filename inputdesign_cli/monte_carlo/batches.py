@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from inputdesign_cli.compute.executor import Executor, InProcess, WorkerLostError
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import IdesignError
 
 Answer = TypeVar("Answer")
@@ -44,7 +44,7 @@ def run_batches(
         for index, start in enumerate(range(0, runs, size))
     )
     answers: dict[int, Answer] = {}
-    told = 0
+    counted = 0
     for done in (executor or InProcess()).run(partial(_compute, function), batches):
         count, stream = done.job
         if isinstance(done.error, WorkerLostError):
@@ -55,8 +55,8 @@ def run_batches(
             raise done.error
         assert done.answer is not None  # there is an answer or an error
         answers[stream.spawn_key[-1]] = done.answer
-        told += count
-        tell(Counted("simulated runs", told, runs))
+        counted += count
+        report_progress(Counted("simulated runs", counted, runs))
     return [answers[index] for index in range(len(answers))]
 
 

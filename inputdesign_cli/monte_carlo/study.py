@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import Absolute, ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, Earlier, Estimate, Rival, fit_batch, identify
 from inputdesign_cli.information import Experiment, PowerKind
@@ -197,7 +197,7 @@ def _again_where_lost(
     converged, steps = found.converged.copy(), found.steps.copy()
     lost = np.flatnonzero(~converged).tolist()
     for done, run in enumerate(lost):
-        tell(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))
+        report_progress(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))
         try:
             other = again(u[run], y[run])
         except SpecError:  # the noise of this run leaves some parameter without an estimate

@@ -12,7 +12,7 @@ import pytest
 
 from inputdesign_cli.cli import terminal as terminal_module
 from inputdesign_cli.cli.terminal import aligned, colourful, computing, status
-from inputdesign_cli.compute.time_limit import Counted, tell
+from inputdesign_cli.compute.time_limit import Counted, report_progress
 from tests.support.processes import running
 
 ROOT = Path(__file__).parents[2]
@@ -191,18 +191,18 @@ def shown_by(monkeypatch):
 def test_a_long_computation_tells_how_far_it_is(monkeypatch):
     terminal = shown_by(monkeypatch)
     with computing("log.csv", quiet=False):
-        tell(Counted("starting points tried", 3, 30))
+        report_progress(Counted("starting points tried", 3, 30))
         time.sleep(0.3)
     assert "log.csv: computing ..." in terminal.text
-    assert "3 of 30" not in terminal.text, "there is no need to tell at once"
+    assert "3 of 30" not in terminal.text, "there is no need to say so at once"
     monkeypatch.setattr(terminal_module, "_PATIENCE", 0.0)
     with computing("log.csv", quiet=False):
-        tell(Counted("starting points tried", 3, 30))
+        report_progress(Counted("starting points tried", 3, 30))
         time.sleep(0.3)
     assert "log.csv: starting points tried: 3 of 30 ..." in terminal.text
     terminal.text = ""
     with computing("log.csv", quiet=True):
-        tell(Counted("starting points tried", 3, 30))
+        report_progress(Counted("starting points tried", 3, 30))
     assert terminal.text == ""
 
 

@@ -125,7 +125,7 @@ def test_a_cluster_without_workers_says_so_and_is_given_up(tmp_path):
     cluster = Loopback(tmp_path)
     worker = cluster.add_worker()
     told = []
-    executor = Cluster(cluster.address, worker_timeout=1.0, tell=told.append)
+    executor = Cluster(cluster.address, worker_timeout=1.0, say=told.append)
     answers = executor.run(jobs.slow_identity, range(100))
     try:
         next(answers)

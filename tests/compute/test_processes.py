@@ -15,7 +15,7 @@ from inputdesign_cli.compute import interruptions
 from inputdesign_cli.compute.executor import InProcess, WorkerLostError
 from inputdesign_cli.compute.interruptions import bare_interruptions, interrupt
 from inputdesign_cli.compute.processes import Processes
-from inputdesign_cli.compute.time_limit import Counted, Round, tell, watching
+from inputdesign_cli.compute.time_limit import Counted, Round, report_progress, watching
 from tests.support import jobs
 from tests.support.processes import running
 
@@ -127,7 +127,7 @@ def test_what_comes_after_the_design_is_counted():
 
 
 def test_nobody_has_to_watch():
-    tell(Round(1, 2.0, 1.0, 3))
+    report_progress(Round(1, 2.0, 1.0, 3))
     assert str(Round(1, 2.0, 1.0, 3)) == "round 1: 2, proved to 5.0e-01, 3 cuts"
 
 

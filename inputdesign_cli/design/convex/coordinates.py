@@ -94,7 +94,7 @@ def suited(problem: Problem, question: Question, start: Array) -> Problem:
     if np.all(np.linalg.cond(informations) < _UNSUITED):
         return problem
     pairs = zip(problem.scenarios, informations, strict=True)
-    coordinates = [_suited_to(problem, one.experiment, told, start) for one, told in pairs]
+    coordinates = [_suited_to(problem, one.experiment, known, start) for one, known in pairs]
     return _restated(problem, question, coordinates)
 
 

@@ -245,9 +245,9 @@ def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResu
     if least.min() <= 0.0:
         return found
     samples = found.s if problem.goal == "samples" else 1.0  # of the information that was found
-    told = samples * found.x * np.max(np.linalg.norm(at.information_maps, axis=(2, 3)) / least, axis=1)
-    order = np.argsort(told)
-    lost = np.cumsum(told[order])
+    shares = samples * found.x * np.max(np.linalg.norm(at.information_maps, axis=(2, 3)) / least, axis=1)
+    order = np.argsort(shares)
+    lost = np.cumsum(shares[order])
     # Beside limits there is no room to make up for more than rounding.
     tight = problem.scaled or problem.limits or problem.densities
     faint = lost <= (_ROUNDING if tight else _FAINT)

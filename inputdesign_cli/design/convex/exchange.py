@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError, Round, tell
+from inputdesign_cli.compute.time_limit import OutOfTimeError, Round, report_progress
 from inputdesign_cli.design.convex.candidate import Place
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.problem import Problem
@@ -130,7 +130,7 @@ def exchange(
             except OutOfTimeError as ended:
                 raise UnfinishedError.of(ended, _result(state.on(problem).tight(), rounds)) from None
             gaps.append(state.gap)
-            tell(Round(rounds, state.best.objective, state.certificate.bound, len(state.cuts)))
+            report_progress(Round(rounds, state.best.objective, state.certificate.bound, len(state.cuts)))
             grows = state.problem.basis.size > stage.basis.size
             patience = _PATIENCE_GROWING if grows else _PATIENCE
             stalled = len(gaps) > patience and gaps[-1] > 0.9 * gaps[-1 - patience]

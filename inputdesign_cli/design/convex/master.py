@@ -135,10 +135,10 @@ def solve_master(
         return None
     y = worth * _in_cone(face, solution.v[:inside])
     kept = worth * np.maximum(solution.v[inside : inside + ray.shape[1]], 0.0)
-    told = {plant: iter(found) for plant, found in zip(involved, solution.proofs, strict=True)}
+    of_plant = {plant: iter(found) for plant, found in zip(involved, solution.proofs, strict=True)}
     proofs = []
     for placed in cuts:
-        turn, (Y, r) = turns[placed.scenario], next(told[placed.scenario])
+        turn, (Y, r) = turns[placed.scenario], next(of_plant[placed.scenario])
         proofs.append(Implied(objective * turn.T @ Y @ turn, objective * r, placed.scenario, placed.side))
     scales = np.array([_level(problem, row, best.s) for row in rows])
     weights = objective * np.maximum(solution.limit_weights[: len(rows)], 0.0) / scales

@@ -35,7 +35,7 @@ from inputdesign_cli.questions.assessment.identify import (
     ModelQuestion,
     identification_results,
     identified,
-    told,
+    sentence_of,
 )
 from inputdesign_cli.questions.assessment.outcome import response_without_model
 from inputdesign_cli.questions.common.delivery import adding
@@ -89,7 +89,7 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     try:
         topped = found.question.top_up(found.preparation.levels)
     except IdesignError as error:
-        return replace(assessment, results=_assessed(judged, no_top_up=told(error)))
+        return replace(assessment, results=_assessed(judged, no_top_up=sentence_of(error)))
     return replace(assessment, results=_topped_up(task, found, found.question, judged, topped))
 
 

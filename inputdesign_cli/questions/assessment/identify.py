@@ -137,7 +137,7 @@ class Identified:
     Attributes:
         question: None if the requirement cannot be evaluated at this estimate; `unasked` says why.
         ruled_out: other minima, which knowledge of the plant rules out.
-        loop_told: whether a note says already that inputs answer the outputs.
+        loop_noted: whether a note says already that inputs answer the outputs.
         noise_refuted: the probability of the residuals with the noise of the spec, where a larger one was
             estimated in its place.
         scatter: what simulated records say of the errors of the estimate.
@@ -150,7 +150,7 @@ class Identified:
     question: ModelQuestion | None = None
     unasked: str = ""
     ruled_out: tuple[Rival, ...] = ()
-    loop_told: bool = False
+    loop_noted: bool = False
     noise_refuted: float | None = None
     scatter: tuple[Finding, ...] = ()
 
@@ -160,7 +160,7 @@ class Identified:
         try:
             return replace(self, question=task.at(self.model, samples, factor, source))
         except IdesignError as error:
-            return replace(self, unasked=told(error))
+            return replace(self, unasked=sentence_of(error))
 
 
 def identified(
@@ -255,7 +255,7 @@ def estimated(
     return found.asked_by(task, f"{first.name} (estimate)")
 
 
-def told(error: IdesignError) -> str:
+def sentence_of(error: IdesignError) -> str:
     """Return the messages and hints of an error as one sentence."""
     return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
@@ -283,7 +283,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
                 *([] if at_ends else idle(units, task.nominal, model, estimate)),
                 *shifted_levels(estimate, found.data, units.time_unit),
                 *refutations(model, estimate),
-                *([] if found.loop_told else answering(units, estimate)),
+                *([] if found.loop_noted else answering(units, estimate)),
                 *found.data.repeated,
             ]
         ),

@@ -283,7 +283,7 @@ def response_of_data(
             far.append(apart > radius + _FAR * size)
         number = "" if units.single else f"_{i + 1}"
         columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}
-    told = MeasuredLines(
+    lines = MeasuredLines(
         method=found.method,
         excitation="r" if by_reference else "u",
         frequencies=int(w.size),
@@ -292,4 +292,4 @@ def response_of_data(
         model_far_outside=float(np.mean(far)),
         caveat=BY_U if (units.closed_loop or loop) and not by_reference else None,
     )
-    return Table(columns), ResponseCurves(tuple(panels)), told
+    return Table(columns), ResponseCurves(tuple(panels)), lines

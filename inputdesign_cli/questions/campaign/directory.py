@@ -31,7 +31,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.text_formats import csv_text
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.assess import judge
-from inputdesign_cli.questions.assessment.identify import Identification, estimated, mismeasured, told
+from inputdesign_cli.questions.assessment.identify import Identification, estimated, mismeasured, sentence_of
 from inputdesign_cli.questions.campaign.acceptance import accepted, table_of
 from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests, signals_in
 from inputdesign_cli.questions.campaign.plans import Planner, other_minima, standing
@@ -322,7 +322,7 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
     except DataError as error:
         if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
             raise
-        return replace(now, findings=tuple(no_estimate_yet(told(error))))
+        return replace(now, findings=tuple(no_estimate_yet(sentence_of(error))))
     estimate = found.estimate
 
     def informed(model: Model) -> Array:

@@ -161,12 +161,12 @@ def settled_alpha(needed: Callable[[float], float | None], start: float) -> floa
     """
     x, before, missing, refused = np.log(start), None, np.nan, False
     for _ in range(_MOST_ROUNDS):
-        told = needed(float(np.exp(x)))
-        if told is None:
+        alpha = needed(float(np.exp(x)))
+        if alpha is None:
             refused, before = True, None
             x -= _SMALLER
             continue
-        missing = float(np.log(told) - x)
+        missing = float(np.log(alpha) - x)
         if abs(missing) <= SETTLED:
             return float(np.exp(x))
         step = missing

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import Counted, OutOfTimeError, seconds_left, tell, what_ended
+from inputdesign_cli.compute.time_limit import (
+    Counted,
+    OutOfTimeError,
+    report_progress,
+    seconds_left,
+    what_ended,
+)
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, foreseen_rivals, not_foreseen
@@ -139,7 +145,7 @@ class Foresight:
         """Return how many of `runs` simulations end elsewhere and how many leave rivals; None if unknown."""
         elsewhere, rivals = 0, 0
         for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
-            tell(Counted("records searched from several starts", done, runs))
+            report_progress(Counted("records searched from several starts", done, runs))
             try:
                 _, at_home, found = self._searched(record, requirements, rng)
             except _ENDS:

@@ -94,7 +94,7 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     reasons = tuple(one.message for one in doubts)
     remarks = (*log.remarks, *exploration_notes(log, found, loops))
     noted = replace(data, findings=log.findings, remarks=remarks)
-    identified = Identified(found.estimate, found.model, noted, preparation, loop_told=looped)
+    identified = Identified(found.estimate, found.model, noted, preparation, loop_noted=looped)
     results = identification_results(task, identified.asked_by(task, "the estimate"), started)
     names = " and ".join(path.name for path in paths)
     outcome = replace(

@@ -16,7 +16,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import Counted, OutOfTimeError, seconds_left, tell
+from inputdesign_cli.compute.time_limit import Counted, OutOfTimeError, report_progress, seconds_left
 from inputdesign_cli.design.convex.demands import Alternative, Question
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
@@ -312,7 +312,7 @@ def fresh_plants(
         shares += (one.share for one in at_each)
         costs += (one.cost for one in at_each)
         floors += (Floor.at(one.asked) for one in at_each)
-        tell(Counted("fresh plants", len(shares), plants.fresh))
+        report_progress(Counted("fresh plants", len(shares), plants.fresh))
         rejected += batch.rejected
         largest = max((share for share in shares if np.isfinite(share)), default=0.0)
     draws = len(shares)

@@ -25,20 +25,20 @@
     const panels = JSON.parse(figure.dataset.readings);
     delete figure.dataset.readings;
     const plot = figure.querySelector(".plot"), cursor = document.createElement("span");
-    const told = document.createElement("p");
+    const line = document.createElement("p");
     cursor.className = "cursor";
-    told.className = "soft told";
-    told.textContent = "Point at a curve, or step with the arrow keys, to read values.";
+    line.className = "soft values-line";
+    line.textContent = "Point at a curve, or step with the arrow keys, to read values.";
     plot.append(cursor);
-    plot.after(told);
+    plot.after(line);
     let place = 0, at = panels[0];
-    const tell = (panel, index) => {
+    const show = (panel, index) => {
       const xs = panel.curves[0].x;
       place = Math.min(Math.max(index, 0), xs.length - 1);
       at = panel;
       const x = xs[place], [left, top, width, height] = panel.box;
       const values = panel.curves.map((curve) => curve.name + " " + shown(curve.y[nearest(curve.x, x)]));
-      told.textContent = panel.x + " " + shown(x) + " | " + panel.y + ": " + values.join("; ");
+      line.textContent = panel.x + " " + shown(x) + " | " + panel.y + ": " + values.join("; ");
       const [across, down] = panel.path
         ? [panel.path[0][place], panel.path[1][place]] : [share(panel, x), 0];
       cursor.classList.toggle("point", Boolean(panel.path));
@@ -47,7 +47,7 @@
       cursor.style.height = panel.path ? "" : 100 * height + "%";
       plot.setAttribute("aria-valuenow", place);
       plot.setAttribute("aria-valuemax", xs.length - 1);
-      plot.setAttribute("aria-valuetext", told.textContent);
+      plot.setAttribute("aria-valuetext", line.textContent);
     };
     for (const [name, text] of Object.entries({ tabindex: 0, role: "slider", "aria-valuemin": 0,
       "aria-valuemax": panels[0].curves[0].x.length - 1, "aria-valuenow": 0,
@@ -60,13 +60,13 @@
         && down >= box[1] && down <= box[1] + box[3]);
       if (!panel) return;
       const inside = [(across - panel.box[0]) / panel.box[2], (down - panel.box[1]) / panel.box[3]];
-      tell(panel, panel.path ? nearby(panel, inside, area)
+      show(panel, panel.path ? nearby(panel, inside, area)
         : nearest(panel.curves[0].x, value(panel, inside[0])));
     });
     plot.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1, PageDown: -20, PageUp: 20,
         Home: -Infinity, End: Infinity }[event.key];
-      if (step) { event.preventDefault(); tell(at, place + step); }
+      if (step) { event.preventDefault(); show(at, place + step); }
     });
   };
   const all = () => document.querySelectorAll("figure").forEach((figure) => {
