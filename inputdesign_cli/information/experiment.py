@@ -138,24 +138,29 @@ class Experiment:
         F_u = H^-1 dG in open loop; in closed loop what x causes at y and u enters the prediction as well
         ([bombois-least-costly], below (4) and (15), for one channel).
         """
-        of = self.model.input_gradient if self.loop is None else self.loop.excitation_gradient
-        return self._whitened(of, w, self.noise_whitener)
+        if self.loop is not None:
+            return self._whitened(self.loop.excitation_gradient(w), self.noise_whitener)
+        u = np.eye(self.inputs, dtype=complex)[None]
+        return self._whitened(self.model.prediction_gradient(w, None, u, None), self.noise_whitener)
+
+    def disturbance_gradient(self, w: ArrayLike) -> ComplexArray:
+        """Return what e causes in the prediction, also around the loop, for raw parameters, (n, k, p, p)."""
+        if self.loop is not None:
+            return self.loop.noise_gradient(w)
+        e = np.eye(self.model.outputs, dtype=complex)[None]
+        return self.model.prediction_gradient(w, None, None, e)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient for white e of covariance I, noise whitened to I, (n, k, p, p)."""
+        gradient = self.disturbance_gradient(w)
         if self.model.outputs == 1:
-            return self._whitened(self._source.noise_gradient, w)
-        return self._whitened(self._source.noise_gradient, w, self.noise_whitener, self.noise_colouring)
+            return self._whitened(gradient)
+        return self._whitened(gradient, self.noise_whitener, self.noise_colouring)
 
     def _whitened(
-        self,
-        of: Callable[[ArrayLike], ComplexArray],
-        w: ArrayLike,
-        left: Array | None = None,
-        right: Array | None = None,
+        self, gradient: ComplexArray, left: Array | None = None, right: Array | None = None
     ) -> ComplexArray:
-        """Return left G right of gradients G (n, k, p, r) at frequencies, in these coordinates."""
-        gradient = of(w)
+        """Return left G right of gradients G (n, k, p, r) for raw parameters, in these coordinates."""
         if left is not None:
             single = len(left) == 1
             gradient = left[0, 0] * gradient if single else np.einsum("pq,nkqr->nkpr", left, gradient)
@@ -259,7 +264,7 @@ class Experiment:
         """Return whether the noise alone has information on any parameter."""
         if self.model.continuous:
             return False
-        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
+        return bool(np.any(self.disturbance_gradient(np.array([0.3, 1.1, 2.3]))))
 
     def whitened(self, power: float | Array) -> Experiment:
         """Return the experiment in coordinates where M = I by this power, flat over the band.

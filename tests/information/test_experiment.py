@@ -21,6 +21,7 @@ from inputdesign_cli.plant import (
     disturbance_gradients,
     excitation_gradients,
     excited,
+    input_gradients,
 )
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 from inputdesign_cli.spectrum import FirBasis, FlatBasis, LinesBasis
@@ -49,7 +50,7 @@ def test_densities_are_the_definition(experiment):
     r, k = experiment.inputs, experiment.size
     X = rng.normal(size=(3, r, r)) + 1j * rng.normal(size=(3, r, r))
     phi = X @ X.conj().swapaxes(1, 2)
-    H_inverse_dG = experiment.model.input_gradient(W)
+    H_inverse_dG = input_gradients([experiment.model], W)[0]
     precision = np.linalg.inv(experiment.model.covariance)
     raw = (
         np.einsum(
