@@ -22,7 +22,7 @@ from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature, Values, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
 
-_AT_ONCE = 256
+_AT_ONCE = 2**13  # numbers of gradients, so that they stay in the cache of the processor
 _ROUNDING = 1e-15  # shares of the largest gradient of an output
 _RANK_TOLERANCE = 1e-11
 # Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.
@@ -36,14 +36,11 @@ class WeightedProducts:
     parts: list[list[tuple[NDArray[np.intp], ComplexArray]]]
 
     @classmethod
-    def of(cls, gradient: Callable[[Array], ComplexArray], w: Array) -> WeightedProducts:
-        """Build the products of F = `gradient` (n, k, p, r) at frequencies `w`."""
-        return cls(
-            [
-                _by_output(gradient(w[start : start + _AT_ONCE]))
-                for start in range(0, max(w.size, 1), _AT_ONCE)
-            ]
-        )
+    def of(cls, gradient: Callable[[Array], ComplexArray], w: Array, size: int) -> WeightedProducts:
+        """Build the products of F = `gradient` (n, k, p, r) at frequencies `w`; `size` is k p r."""
+        step = max(_AT_ONCE // size, 1)
+        parts = (w[start : start + step] for start in range(0, max(w.size, 1), step))
+        return cls([_by_output(gradient(part)) for part in parts])
 
     def at(self, weight: Array) -> ComplexArray:
         """Return sum over outputs of F^* Y F, Y = `weight` (k, k) symmetric, (n, r, r)."""
@@ -200,7 +197,7 @@ class Experiment:
 
     def products(self, w: Array) -> WeightedProducts:
         """Return the part of `value_density` that depends on the frequencies, not on the weight."""
-        return WeightedProducts.of(self.excitation_gradient, w)
+        return WeightedProducts.of(self.excitation_gradient, w, self.size * self.model.outputs * self.inputs)
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
         """Return `value_density` where the products are at hand."""
@@ -253,6 +250,10 @@ class Experiment:
     def baseline_information(self) -> Array:
         """Return the information (k, k) without any excitation, by the noise and by `prior`."""
         return self.noise_information + self.prior_information
+
+    def with_samples(self, samples: int) -> Experiment:
+        """Return the experiment with this number of samples: itself, with all it knows, if it has them."""
+        return self if samples == self.samples else replace(self, samples=samples)
 
     def of_length(self, information: Array, samples: int) -> Array:
         """Return M (k, k) of this many samples of the same excitation, from M of `self.samples`."""

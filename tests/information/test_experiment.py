@@ -188,7 +188,7 @@ def test_weighted_products_are_the_sums_over_outputs(frequencies, inputs, silent
     F[:, 2, 1] = 0.0
     F[:, :, list(silent)] = 0.0
     w, Y = np.arange(frequencies, dtype=float), np.diag([1.0, 2.0, 3.0, 4.0]) + 0.5
-    got = WeightedProducts.of(lambda at: F[at.astype(int)], w).at(Y)
+    got = WeightedProducts.of(lambda at: F[at.astype(int)], w, 100).at(Y)  # in parts
     assert got.shape == (frequencies, inputs, inputs)
     np.testing.assert_allclose(got, np.einsum("nkpa,kl,nlpb->nab", F.conj(), Y, F), atol=1e-12)
 
