@@ -310,7 +310,12 @@ class OnModelError(OverFrequency):
 
     def error_bound(self, information: Array, w: ArrayLike) -> Array:
         """Return r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
-        return self.alpha * largest_singular(turned(self.plant_rows(w), inverse_factor(information).T))
+        return self.error_bounds([information], w)[0]
+
+    def error_bounds(self, informations: Iterable[Array], w: ArrayLike) -> list[Array]:
+        """Return `error_bound` for each of several information matrices."""
+        rows = self.plant_rows(w)
+        return [self.alpha * largest_singular(turned(rows, inverse_factor(M).T)) for M in informations]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,7 +338,8 @@ def check_positive(admissible: AdmissibleError, grid: Array, *, unit: float, nam
 
     The message states the frequency divided by `unit`, in the unit `named`.
     """
-    if not np.any(admissible.at(grid)):
+    on_grid = admissible.at(grid)
+    if not np.any(on_grid):
         raise bad_spec(
             "admissible-not-positive",
             "the admissible error is zero at every frequency: no model can be that good",
@@ -341,8 +347,8 @@ def check_positive(admissible: AdmissibleError, grid: Array, *, unit: float, nam
             "absolute one, or for that of the norm (norm: frobenius)",
             key="accuracy.model_error",
         )
-    w, negative = local_maxima(lambda w: -admissible.at(w), grid, -admissible.at(grid))
-    scale = np.median(np.abs(admissible.at(grid)))
+    w, negative = local_maxima(lambda w: -admissible.at(w), grid, -on_grid)
+    scale = np.median(np.abs(on_grid))
     bad = negative >= -1e-9 * scale
     if np.any(bad):
         at = w[bad][int(np.argmax(negative[bad]))]

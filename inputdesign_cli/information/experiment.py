@@ -22,7 +22,7 @@ from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature, Values, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
 
-_AT_ONCE = 256
+_AT_ONCE = 2**13  # numbers of gradients, so that they stay in the cache of the processor
 _ROUNDING = 1e-15  # shares of the largest gradient of an output
 _RANK_TOLERANCE = 1e-11
 # Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.
@@ -36,14 +36,11 @@ class WeightedProducts:
     parts: list[list[tuple[NDArray[np.intp], ComplexArray]]]
 
     @classmethod
-    def of(cls, gradient: Callable[[Array], ComplexArray], w: Array) -> WeightedProducts:
-        """Build the products of F = `gradient` (n, k, p, r) at frequencies `w`."""
-        return cls(
-            [
-                _by_output(gradient(w[start : start + _AT_ONCE]))
-                for start in range(0, max(w.size, 1), _AT_ONCE)
-            ]
-        )
+    def of(cls, gradient: Callable[[Array], ComplexArray], w: Array, size: int) -> WeightedProducts:
+        """Build the products of F = `gradient` (n, k, p, r) at frequencies `w`; `size` is k p r."""
+        step = max(_AT_ONCE // size, 1)
+        parts = (w[start : start + step] for start in range(0, max(w.size, 1), step))
+        return cls([_by_output(gradient(part)) for part in parts])
 
     def at(self, weight: Array) -> ComplexArray:
         """Return sum over outputs of F^* Y F, Y = `weight` (k, k) symmetric, (n, r, r)."""
@@ -138,24 +135,29 @@ class Experiment:
         F_u = H^-1 dG in open loop; in closed loop what x causes at y and u enters the prediction as well
         ([bombois-least-costly], below (4) and (15), for one channel).
         """
-        of = self.model.input_gradient if self.loop is None else self.loop.excitation_gradient
-        return self._whitened(of, w, self.noise_whitener)
+        if self.loop is not None:
+            return self._whitened(self.loop.excitation_gradient(w), self.noise_whitener)
+        u = np.eye(self.inputs, dtype=complex)[None]
+        return self._whitened(self.model.prediction_gradient(w, None, u, None), self.noise_whitener)
+
+    def disturbance_gradient(self, w: ArrayLike) -> ComplexArray:
+        """Return what e causes in the prediction, also around the loop, for raw parameters, (n, k, p, p)."""
+        if self.loop is not None:
+            return self.loop.noise_gradient(w)
+        e = np.eye(self.model.outputs, dtype=complex)[None]
+        return self.model.prediction_gradient(w, None, None, e)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient for white e of covariance I, noise whitened to I, (n, k, p, p)."""
+        gradient = self.disturbance_gradient(w)
         if self.model.outputs == 1:
-            return self._whitened(self._source.noise_gradient, w)
-        return self._whitened(self._source.noise_gradient, w, self.noise_whitener, self.noise_colouring)
+            return self._whitened(gradient)
+        return self._whitened(gradient, self.noise_whitener, self.noise_colouring)
 
     def _whitened(
-        self,
-        of: Callable[[ArrayLike], ComplexArray],
-        w: ArrayLike,
-        left: Array | None = None,
-        right: Array | None = None,
+        self, gradient: ComplexArray, left: Array | None = None, right: Array | None = None
     ) -> ComplexArray:
-        """Return left G right of gradients G (n, k, p, r) at frequencies, in these coordinates."""
-        gradient = of(w)
+        """Return left G right of gradients G (n, k, p, r) for raw parameters, in these coordinates."""
         if left is not None:
             single = len(left) == 1
             gradient = left[0, 0] * gradient if single else np.einsum("pq,nkqr->nkpr", left, gradient)
@@ -195,7 +197,7 @@ class Experiment:
 
     def products(self, w: Array) -> WeightedProducts:
         """Return the part of `value_density` that depends on the frequencies, not on the weight."""
-        return WeightedProducts.of(self.excitation_gradient, w)
+        return WeightedProducts.of(self.excitation_gradient, w, self.size * self.model.outputs * self.inputs)
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
         """Return `value_density` where the products are at hand."""
@@ -249,6 +251,10 @@ class Experiment:
         """Return the information (k, k) without any excitation, by the noise and by `prior`."""
         return self.noise_information + self.prior_information
 
+    def with_samples(self, samples: int) -> Experiment:
+        """Return the experiment with this number of samples: itself, with all it knows, if it has them."""
+        return self if samples == self.samples else replace(self, samples=samples)
+
     def of_length(self, information: Array, samples: int) -> Array:
         """Return M (k, k) of this many samples of the same excitation, from M of `self.samples`."""
         known = self.prior_information
@@ -259,7 +265,7 @@ class Experiment:
         """Return whether the noise alone has information on any parameter."""
         if self.model.continuous:
             return False
-        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
+        return bool(np.any(self.disturbance_gradient(np.array([0.3, 1.1, 2.3]))))
 
     def whitened(self, power: float | Array) -> Experiment:
         """Return the experiment in coordinates where M = I by this power, flat over the band.

@@ -239,6 +239,7 @@ def integrate_band(
     sums: Sums = PRODUCTS,
     highest_lag: int = 0,
     knots: Array = _NONE,
+    several: bool = False,
 ) -> NDArray:
     """Integrate over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
@@ -255,7 +256,7 @@ def integrate_band(
         hi=band[1] / unit,
         highest_lag=highest_lag,
         knots=knots / unit,
-        several=True,
+        several=several,
         unit=unit,
     )
 

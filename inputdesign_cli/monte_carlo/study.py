@@ -233,7 +233,7 @@ def searched_run(
     Raises:
         SpecError: see `identify`.
     """
-    true, model = replace(nominal, samples=len(record)), nominal.model
+    true, model = nominal.with_samples(len(record)), nominal.model
     (_, u), (_, y) = responses(true, record[None], _noise(true, 1, rng), step)
     found = identify(
         model, u[0], y[0], step, start=model.theta, feedback=true.loop is not None, rest=True, earlier=earlier

@@ -131,18 +131,13 @@ class Model(Protocol):
         """
         return _inner(self).simulate(u, e, step)
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the gradient of the one-step prediction due to u."""
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the gradient of the one-step prediction due to e."""
-
     def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return psi = -d epsilon / d theta, the gradient of the one-step prediction, as (n, k, p, m).
 
         `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
-        outputs, inputs and prediction errors epsilon. Without `y` it is the response of the model to one of
-        the others, which is then the only one.
+        outputs, inputs and prediction errors epsilon, n or 1 where they are the same at all frequencies.
+        Without `y` it is the response of the model to one of the others, which is then the only one: u = I
+        gives H^-1 dG/dtheta, e = I gives H^-1 dH/dtheta.
         """
 
 
@@ -273,27 +268,15 @@ def prediction_gradients(
 
 
 def input_gradients(models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return `input_gradient` of models of one structure, (S, n, k, p, r)."""
+    """Return H^-1 dG/dtheta, what u causes in the predictions of models of one structure, (S, n, k, p, r)."""
     u = np.eye(models[0].inputs, dtype=complex)[None, None]
     return prediction_gradients(models[0], models, w, None, u, None)
 
 
 def noise_gradients(models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return `noise_gradient` of models of one structure, (S, n, k, p, p)."""
+    """Return H^-1 dH/dtheta, what e causes in the predictions of models of one structure, (S, n, k, p, p)."""
     e = np.eye(models[0].outputs, dtype=complex)[None, None]
     return prediction_gradients(models[0], models, w, None, None, e)
-
-
-class Predicting:
-    """Derives what u alone and e alone cause from the gradient of the prediction."""
-
-    def input_gradient(self: Model, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dG/dtheta as (n, k, p, r), the gradient of the one-step prediction due to u."""
-        return input_gradients([self], w)[0]
-
-    def noise_gradient(self: Model, w: ArrayLike) -> ComplexArray:
-        """Return H^-1 dH/dtheta as (n, k, p, p), the gradient of the one-step prediction due to e."""
-        return noise_gradients([self], w)[0]
 
 
 class Listed(Model, Protocol):
@@ -304,7 +287,7 @@ class Listed(Model, Protocol):
         """Return the parameters in the order of theta, (k,)."""
 
 
-class Parametrised(Predicting):
+class Parametrised:
     """Derives the properties of a model from its list of `parameters`."""
 
     @cached_property

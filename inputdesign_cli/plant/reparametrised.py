@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
-from inputdesign_cli.plant.model import Derived, Fraction, Model, Predicting, SampledPlant, Signals
+from inputdesign_cli.plant.model import Derived, Fraction, Model, SampledPlant, Signals
 
 # Number of recent parameter values that are kept with their coefficients.
 _RECENT = 4
@@ -120,7 +120,7 @@ class Words:
 
 
 @dataclass(frozen=True)
-class Reparametrised(Predicting, Derived):
+class Reparametrised(Derived):
     """A model whose `coefficients` follow from `parametrisation`, with k free parameters."""
 
     coefficients: Model

@@ -28,10 +28,8 @@ _WEIGHTS = (
     *("accuracy.model_error.weight", "accuracy.weighted_variance.weight"),
     *("limits.spectrum.max", "limits.spectrum.min"),
 )
-_BANDS = (
-    *("limits.band", "accuracy.model_error.band", "accuracy.loop.band", "accuracy.weighted_variance.band"),
-    *("accuracy.frequency_response.band", "spectrum.band"),
-)
+_BANDED = ("model_error", "loop", "weighted_variance", "frequency_response")
+_BANDS = (("limits", "band"), *(("accuracy", key, "band") for key in _BANDED), ("spectrum", "band"))
 _SENSITIVITY, _LOOP = ("accuracy", "model_error", "sensitivity"), ("accuracy", "loop")
 # Every key that takes a list with one entry per input or output.
 _PER_CHANNEL = {
@@ -322,8 +320,8 @@ def delays(spec: Spec) -> _Found:
 
 def bands(spec: Spec) -> _Found:
     """Check that bands end at pi/sample_time."""
-    for path in map(parse_key, _BANDS):
-        band = spec.at(*map(str, path))
+    for path in _BANDS:
+        band = spec.at(*path)
         if isinstance(band, tuple) and band[1] > spec.nyquist * (1 + _ROUNDING):
             yield _beyond(spec, band[1], path)
 

@@ -215,6 +215,9 @@ def test_the_worst_ratio_of_a_campaign_stands_beside_three_numbers_or_more(most)
 
 
 SIZES = np.array([2.0, 4.0])
+NINE = BoundCurves(
+    tuple(BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=entry) for entry in product(range(3), repeat=2))
+)
 
 
 def looks(line):
@@ -257,19 +260,14 @@ def test_runs_are_counted_up_to_each_value(page):
     assert share[-1] == 100.0
 
 
-def test_a_fan_says_which_line_is_which_plant(page):
-    """Every line has a name: the plants, the largest ratio, the plant of the spec, the binding one."""
-    (axes,) = page(CURVES["fan"]).axes
-    drawn = lines_by_label(axes)
-    assert list(drawn) == [
-        "each of 2 plants",
-        "largest of 2 plants",
-        "plant of the spec",
-        "binding: plant 2",
-        "limit",
-    ]
-    np.testing.assert_array_equal(drawn["largest of 2 plants"].get_ydata(), 0.5 * G)
+@pytest.mark.parametrize("curves", [CURVES["fan"], NINE], ids=["fan", "nine entries"])
+def test_every_line_has_a_name_and_looks_of_its_own(page, curves):
+    """The plants, the largest ratio, that of the spec and the binding one; the limit beside nine entries."""
+    drawn = lines_by_label(page(curves).axes[-1])
+    assert len(drawn) == (5 if curves is CURVES["fan"] else 10)
     assert apart(list(drawn.values()))
+    if curves is CURVES["fan"]:
+        np.testing.assert_array_equal(drawn["largest of 2 plants"].get_ydata(), 0.5 * G)
 
 
 def test_every_amplitude_of_a_trade_is_drawn():
@@ -279,17 +277,6 @@ def test_every_amplitude_of_a_trade_is_drawn():
     (axes,) = page.axes
     drawn = lines_by_label(axes)
     assert names <= set(drawn)
-    assert apart(list(drawn.values()))
-
-
-@pytest.mark.slow
-def test_ratios_of_nine_entries_are_told_apart(page):
-    panels = tuple(
-        BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=entry) for entry in product(range(3), repeat=2)
-    )
-    below = page(BoundCurves(panels)).axes[-1]
-    drawn = lines_by_label(below)
-    assert len(drawn) == 10  # the limit
     assert apart(list(drawn.values()))
 
 

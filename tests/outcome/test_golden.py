@@ -12,6 +12,7 @@ from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions import execute
 from tests.support.outcomes import typed
+from tests.support.refusals import refused
 
 SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
 
@@ -44,9 +45,7 @@ def written(tmp_path, text):
 
 
 def diagnostics(tmp_path, text):
-    with pytest.raises(SpecError) as caught:
-        load_golden(written(tmp_path, text))
-    return caught.value.diagnostics
+    return refused(load_golden, written(tmp_path, text))
 
 
 def test_a_golden_file_is_read(tmp_path):
@@ -164,8 +163,6 @@ def test_the_shipped_files_are_sound():
 
 def test_a_spec_in_place_of_a_golden_file_is_told_as_one():
     for spec in sorted((Path(__file__).parents[2] / "specs").glob("*.yaml"))[::5]:
-        with pytest.raises(SpecError) as raised:
-            load_golden(spec)
-        (one,) = raised.value.diagnostics
+        (one,) = refused(load_golden, spec)
         assert one.code == "golden-is-spec"
         assert f"`idesign validate {spec}`" in one.hint

@@ -20,6 +20,7 @@ from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from tests.support.outcomes import typed
 from tests.support.processes import running
+from tests.support.refusals import refused
 from tests.support.run_directories import a_run, marks, names, write_with_figures
 
 FILES = ["spec.yaml", "signal.csv", "optimality.csv", "signal.png", "optimality.png", "figures.json"]
@@ -65,10 +66,9 @@ def test_a_later_run_replaces_an_earlier_one_with_its_stale_figure_and_no_file_o
 )
 def test_a_file_of_the_user_is_never_overwritten(tmp_path, there, target, code):
     (tmp_path / there).write_text("mine")
-    with pytest.raises(OutputError) as caught:
-        write_with_figures(a_run("first"), tmp_path / target)
-    assert caught.value.diagnostics[0].code == code
-    assert code != "output-not-a-run" or there in caught.value.diagnostics[0].message
+    found = refused(write_with_figures, a_run("first"), tmp_path / target, kind=OutputError)
+    assert found[0].code == code
+    assert code != "output-not-a-run" or there in found[0].message
     assert names(tmp_path) == {there}
     assert (tmp_path / there).read_text() == "mine"
 
@@ -174,13 +174,9 @@ def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
 def test_read_run_explains_what_is_wrong(tmp_path, files, code):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    with pytest.raises(DataError) as caught:
-        read_run(tmp_path)
-    assert caught.value.diagnostics[0].code == code
+    assert refused(read_run, tmp_path, kind=DataError)[0].code == code
     if not files:
-        with pytest.raises(DataError) as caught:
-            read_run(tmp_path / "nowhere")
-        assert caught.value.diagnostics[0].code == code
+        assert refused(read_run, tmp_path / "nowhere", kind=DataError)[0].code == code
 
 
 @pytest.mark.parametrize("name", ["../precious.txt", "{}/precious.txt", "..", ".", "", "a/b", "x\0y", 7])
@@ -196,9 +192,8 @@ def test_a_record_that_names_files_elsewhere_moves_none(tmp_path, name):
     for part in ("new", "old"):
         (target / ".run.partial" / part).mkdir(parents=True)
         (target / ".run.partial" / part / "result.json").write_text(json.dumps(record))
-    with pytest.raises((OutputError, DataError)) as caught:
-        write_run(a_run("first"), target)
-    assert caught.value.diagnostics[0].code == "output-not-a-run"
+    found = refused(write_run, a_run("first"), target, kind=(OutputError, DataError))
+    assert found[0].code == "output-not-a-run"
     with pytest.raises(DataError):
         read_run(target)
     assert precious.read_text() == "mine"

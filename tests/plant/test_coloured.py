@@ -5,7 +5,15 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant import Coloured, PolynomialModel, SampledModel, TransferMatrix, close_loop
+from inputdesign_cli.plant import (
+    Coloured,
+    PolynomialModel,
+    SampledModel,
+    TransferMatrix,
+    close_loop,
+    input_gradients,
+    noise_gradients,
+)
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.plants import arrays, box_jenkins, in_words, known, lag_of, process
 from tests.support.records import check_estimate, check_record
@@ -35,8 +43,8 @@ def test_gradients_are_those_of_polynomials_inside():
     rng = np.random.default_rng(0)
     y, u, e = (rng.standard_normal((W.size, 1, 2)) + 0j for _ in range(3))
     for one, other in (
-        (model.input_gradient(W), known.input_gradient(W)),
-        (model.noise_gradient(W), known.noise_gradient(W)),
+        (input_gradients([model], W)[0], input_gradients([known], W)[0]),
+        (noise_gradients([model], W)[0], noise_gradients([known], W)[0]),
         (model.plant_gradient(W), known.plant_gradient(W)),
         (model.prediction_gradient(W, y, u, e), known.prediction_gradient(W, y, u, e)),
     ):

@@ -6,7 +6,14 @@ import control
 import numpy as np
 import pytest
 
-from inputdesign_cli.plant import Coloured, ContinuousModel, PolynomialModel, SampledModel
+from inputdesign_cli.plant import (
+    Coloured,
+    ContinuousModel,
+    PolynomialModel,
+    SampledModel,
+    input_gradients,
+    noise_gradients,
+)
 from tests.support.loop_error import column, full_plant
 from tests.support.plants import (
     arrays,
@@ -99,12 +106,12 @@ def test_noise_and_input_gradients_are_those_of_the_responses(name):
     model, step = POLYNOMIALS[name], 1e-5
     H = model.noise_at(W)
     expected = np.linalg.solve(H[:, None], model.plant_gradient(W))
-    np.testing.assert_allclose(model.input_gradient(W), expected, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_allclose(input_gradients([model], W)[0], expected, atol=1e-12 * np.abs(expected).max())
     for k, unit in enumerate(step * np.eye(model.theta.size)):
         up, down = (model.at(model.theta + sign * unit) for sign in (1, -1))
         found = np.linalg.solve(H, up.noise_at(W) - down.noise_at(W)) / (2 * step)
         scale = max(np.abs(found).max(), 1.0)
-        np.testing.assert_allclose(model.noise_gradient(W)[:, k], found, atol=1e-6 * scale)
+        np.testing.assert_allclose(noise_gradients([model], W)[0, :, k], found, atol=1e-6 * scale)
         if model.outputs == model.inputs == 1:
             by_name = bode(polynomials(model, model.theta + unit), W)
             for own, plain in zip((up.plant_at(W), up.noise_at(W)), by_name, strict=True):
@@ -121,11 +128,11 @@ def test_prediction_gradient_equals_the_formulas_of_the_paper(structure, closed)
     G, H = bode(polynomials(model), w)
     C = loop.controller.at(w)[:, 0, 0] if closed else np.zeros_like(G)
     S = 1 / (1 + C * G)
-    dG, dH = model.plant_gradient(w)[:, :, 0, 0], model.noise_gradient(w)[:, :, 0, 0] * H[:, None]
-    source = loop if closed else model
-    excited = (source.excitation_gradient if closed else source.input_gradient)(w)[:, :, 0, 0]
-    noise = source.noise_gradient(w)[:, :, 0, 0]
-    np.testing.assert_allclose(excited, (S / H)[:, None] * dG, rtol=1e-8, atol=1e-10)
+    relative = noise_gradients([model], w)[0]
+    dG, dH = model.plant_gradient(w)[:, :, 0, 0], relative[:, :, 0, 0] * H[:, None]
+    excited = loop.excitation_gradient(w) if closed else input_gradients([model], w)[0]
+    noise = (loop.noise_gradient(w) if closed else relative)[:, :, 0, 0]
+    np.testing.assert_allclose(excited[:, :, 0, 0], (S / H)[:, None] * dG, rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(noise, dH / H[:, None] - (C * S)[:, None] * dG, rtol=1e-8, atol=1e-8)
 
 

@@ -16,6 +16,8 @@ from inputdesign_cli.plant import (
     StateSpaceModel,
     TransferMatrix,
     close_loop,
+    input_gradients,
+    noise_gradients,
 )
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
@@ -80,8 +82,8 @@ def test_responses_and_gradients(sample_time):
     found = model(sample_time=sample_time, delay=0.4 if sample_time else 0.0, places=places)
     found = found if sample_time else found.at(0.3 * found.theta)
     w, step = W[::6], 1e-30
-    exact, response = (found.plant_gradient(w), found.noise_gradient(w)), found.plant_at(w)
-    by_input = found.input_gradient(w)
+    exact, response = (found.plant_gradient(w), noise_gradients([found], w)[0]), found.plant_at(w)
+    by_input = input_gradients([found], w)[0]
     for index, (letter, i, j) in enumerate(places):
         moved = {k: v.astype(complex) for k, v in zip("ABCDK", found.matrices[:5], strict=True)}
         delay = complex(found.matrices.delay)

@@ -8,6 +8,7 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import Diagnostic, SpecError
+from inputdesign_cli.plant import input_gradients
 from inputdesign_cli.questions.building.system import build_model
 
 INTEGRATOR = """
@@ -281,7 +282,7 @@ def test_an_integrator_beside_noise_that_drifts_tells_as_much_everywhere(plant):
     spec = parse_spec(f"plant: {plant}\n{DRIFTING}{asked}")
     assert solve(spec).result["cost"] == pytest.approx(0.04 / (300 * 0.01**2), rel=1e-9)
     w = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, np.pi])
-    gradient = build_model(spec).input_gradient(w)[:, 0, 0, 0]
+    gradient = input_gradients([build_model(spec)], w)[0, :, 0, 0, 0]
     np.testing.assert_allclose(gradient, np.exp(-1j * w), atol=2e-5)
 
 

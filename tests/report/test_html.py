@@ -23,6 +23,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.run_directory import read_curves, write_run
 from inputdesign_cli.report.render import bibtex_text, report_text
 from tests.support.pages import LOOP, SPEC, XHTML, parse, rows, words
+from tests.support.refusals import refused
 from tests.support.sweep_files import run_sweep
 
 page_of = cache(report_text)  # the pictures of a page take most of its time
@@ -83,9 +84,7 @@ def copied(runs, tmp_path):
 def test_what_is_no_run_is_said(copied, tmp_path):
     (copied / "result.json").write_text('{"format": 1}')
     for directory, code in ((copied, "run-unreadable"), (tmp_path, "run-missing")):
-        with pytest.raises(DataError) as caught:
-            report_text(directory)
-        assert caught.value.diagnostics[0].code == code
+        assert refused(report_text, directory, kind=DataError)[0].code == code
 
 
 def paths(value, path=()):

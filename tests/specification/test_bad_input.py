@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import pytest
 
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import parse_spec
+from tests.support.refusals import refused
 
 UNTOLD = ("Input should", "valid dictionary", "Field required", "Extra inputs", "{key}", "type=", "\x00")
 BASE: dict[str, str | None] = {
@@ -308,13 +308,12 @@ def diagnostics():
 
     def found(marked):
         index = marked.index("§") if "§" in marked else None
-        with pytest.raises(SpecError) as caught:
-            parse_spec(marked.replace("§", ""), "x.yaml")
+        found = refused(parse_spec, marked.replace("§", ""), "x.yaml")
         expected = None
         if index is not None:
             before = marked[:index]
             expected = (before.count("\n") + 1, index - (before.rfind("\n") + 1) + 1)
-        return caught.value.diagnostics, expected
+        return found, expected
 
     return found
 

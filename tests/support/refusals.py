@@ -9,6 +9,13 @@ from inputdesign_cli.errors import Diagnostic, IdesignError, SpecError
 
 def refusals(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> tuple[Diagnostic, ...]:
     """All complaints with which `ask` ends, in an error of this kind."""
+    return refused(ask, kind=kind)
+
+
+def refused(
+    call: Callable[..., object], *given: object, kind: type[IdesignError] = SpecError, **named: object
+) -> tuple[Diagnostic, ...]:
+    """All complaints with which a call with these arguments ends, in an error of this kind."""
     with pytest.raises(kind) as caught:
-        ask()
+        call(*given, **named)
     return caught.value.diagnostics

@@ -15,13 +15,14 @@ import pytest
 import inputdesign_cli
 from inputdesign_cli import load_spec, parse_spec, questions, sweep
 from inputdesign_cli.compute.processes import Processes
-from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError, SpecError
+from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError
 from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings
 from inputdesign_cli.sweeps.points import Layout
 from inputdesign_cli.sweeps.running import list_points, row_of, scalars, table_lines
 from tests.support.processes import running
+from tests.support.refusals import refused
 from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files, timeless_rows
 
 TWO = ["experiment.samples=10,20"]
@@ -159,10 +160,9 @@ def test_a_directory_is_swept_by_one_process_at_a_time(spec, stub, tmp_path):
     out = tmp_path / "out"
     with running([sys.executable, "-c", HOLD, str(out)], stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout.readline() == "held\n"
-        with pytest.raises(OutputError) as caught:
-            run_sweep(spec, TWO, directory=out)
-        assert caught.value.diagnostics[0].code == "sweep-locked"
-        assert f"process {holder.pid}" in caught.value.diagnostics[0].message
+        found = refused(run_sweep, spec, TWO, kind=OutputError, directory=out)
+        assert found[0].code == "sweep-locked"
+        assert f"process {holder.pid}" in found[0].message
     (out / "points" / ".abc.partial-1").mkdir(parents=True)
     (out / ".sweep.csv.partial-1").write_text("half")
     (out / "sweep.json").write_text("{")  # it had begun
@@ -216,9 +216,7 @@ def test_a_worker_writes_nothing_but_the_files_of_a_run(tmp_path, files):
     outside = {
         n.format(outside=tmp_path) if isinstance(n, str) else n: content for n, content in files.items()
     }
-    with pytest.raises(DataError) as refused:
-        Layout(tmp_path / "out").adopt("k", outside)
-    assert refused.value.diagnostics[0].code == "worker-answer"
+    assert refused(Layout(tmp_path / "out").adopt, "k", outside, kind=DataError)[0].code == "worker-answer"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -295,9 +293,8 @@ def test_values_of_a_setting(setting, values):
 def test_sweeps_that_are_refused(settings, code, spec, stub):
     """Values are taken side by side where their numbers differ."""
     verb, zipped = ("divine" if "divine" in settings else "solve"), code == "sweep-lengths"
-    with pytest.raises(SpecError) as caught:
-        build_plan(spec, settings.split() if verb == "solve" else TWO, verb=verb, zipped=zipped)
-    assert (caught.value.diagnostics[0].code, stub) == (code, [])
+    found = refused(build_plan, spec, settings.split() if verb == "solve" else TWO, verb=verb, zipped=zipped)
+    assert (found[0].code, stub) == (code, [])
 
 
 @pytest.mark.parametrize("lengths", [(1,), (3, 1), (2, 4, 3), (1, 2, 1, 2)])
@@ -334,7 +331,5 @@ def test_the_block_of_a_spec_and_the_command_line():
     ],
 )
 def test_a_bad_block_is_a_complaint_of_the_spec(block, code, key):
-    with pytest.raises(SpecError) as caught:
-        parse_spec(f"{SPEC}sweep: {{{block}}}\n", "x.yaml")
-    diagnostic = caught.value.diagnostics[0]
+    diagnostic = refused(parse_spec, f"{SPEC}sweep: {{{block}}}\n", "x.yaml")[0]
     assert (diagnostic.code, diagnostic.key, diagnostic.location.line) == (code, key, 8)

@@ -270,5 +270,5 @@ class Question:
 
     def of_length(self, samples: int) -> Question:
         """Return the question for experiments with this number of samples."""
-        others = [replace(one, experiment=replace(one.experiment, samples=samples)) for one in self.others]
-        return replace(self, experiment=replace(self.experiment, samples=samples), others=others)
+        others = [replace(one, experiment=one.experiment.with_samples(samples)) for one in self.others]
+        return replace(self, experiment=self.experiment.with_samples(samples), others=others)

@@ -19,7 +19,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.information.experiment import of_channel
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Model
+from inputdesign_cli.plant.model import Model, noise_gradients
 from inputdesign_cli.plant.transfer import Rational
 
 _SETTLED = 1e-11
@@ -142,7 +142,7 @@ class LoopErrorProblem:
         """Return the criterion tr(W P) of the model structure."""
         plant, model, rule = self.plant, self.structure, self.rule(1, band=False)
         w = rule.nodes
-        dG, relative = model.plant_gradient(w), model.noise_gradient(w)  # H^-1 dH of the noise
+        dG, relative = model.plant_gradient(w), noise_gradients([model], w)[0]  # H^-1 dH of the noise
         T, inverse = self.law.complementary(w), np.linalg.inv(plant.plant_at(w))
         X = -sensitivity(T)[:, None] @ dG @ (inverse @ T)[:, None]
         moved = self.law.loop_gradient(np.einsum("kab,klba->kl", inverse, dG), relative, rule)

@@ -111,7 +111,7 @@ def question_at(stated: Spec, model: Model, samples: int, factor: Array, source:
         SpecError: the loop is unstable; see the builders of the parts.
     """
     spec = restated(stated, model, source)
-    raw = replace(build_experiment(spec), samples=samples)
+    raw = build_experiment(spec).with_samples(samples)
     experiment = replace(raw, factor=factor)
 
     def topped_up(levels: Mapping[str, float]) -> Results:

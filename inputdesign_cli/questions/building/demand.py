@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Model
+from inputdesign_cli.plant import Model, noise_gradients
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models import spectrum
@@ -54,7 +54,7 @@ def check_effects(spec: Spec, experiment: Experiment) -> None:
     G, slope = np.abs(model.plant_at(w)), np.abs(model.plant_gradient(w))
     moved = slope * np.abs(model.theta)[:, None, None]
     small = np.all((moved < _TRACE * G[:, None]) | (slope == 0.0), axis=(0, 2, 3)) & (model.theta != 0.0)
-    silent = ~np.any(slope, axis=(0, 2, 3)) & ~np.any(model.noise_gradient(w), axis=(0, 2, 3))
+    silent = ~np.any(slope, axis=(0, 2, 3)) & ~np.any(noise_gradients([model], w), axis=(0, 1, 3, 4))
     lost = model.in_plant & (silent | small)
     if not np.any(lost):
         return
@@ -127,8 +127,7 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     `SpecError`: `infinite-information`, `infinite-output`.
     """
     model, loop, (lo, hi) = experiment.model, experiment.loop, experiment.band
-    noise = model.noise_gradient if loop is None else loop.noise_gradient
-    if not model.continuous and (unbounded := _growing(experiment, noise)):
+    if not model.continuous and (unbounded := _growing(experiment, experiment.disturbance_gradient)):
         first = unbounded[0]
         part, other = "noise", "say noise: {drift: true}, and leave that root out of D"
         if model.in_plant[model.names.index(first)]:

@@ -240,7 +240,7 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
     """Return the information (k, k) about the plant in the samples (n, r) of an earlier excitation."""
-    earlier = replace(experiment, samples=len(record))
+    earlier = experiment.with_samples(len(record))
     return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
 
 

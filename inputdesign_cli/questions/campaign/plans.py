@@ -184,7 +184,7 @@ class Planner:
         The added spectrum is the squared difference of the predictions of the models. Its power
         is the expected difference of -2 log likelihood, as in T-optimal designs ([atkinson-fedorov-1975]).
         """
-        experiment = replace(self._experiment(known.model), samples=take)
+        experiment = self._experiment(known.model).with_samples(take)
         lo, hi = experiment.band
         w = np.linspace(max(lo, _LOWEST * hi), hi, _LINES)
         apart = [self._apart(experiment, known.model.at(theta), w) for theta in known.others]
@@ -271,7 +271,7 @@ class Planner:
 
     def cost_of(self, experiment: Experiment, record: Array, begin: int = 0) -> float:
         """Return the cost of a sample of a record (n, r), from the sample `begin` on, without any noise."""
-        at = FiniteRecord(replace(experiment, samples=len(record)), len(record), self.step)
+        at = FiniteRecord(experiment.with_samples(len(record)), len(record), self.step)
         signals = {kind: at.signals(kind, record)[begin:] for kind in self.cost}
         powers = {kind: np.mean(x**2, axis=0).tolist() for kind, x in signals.items()}
         return weighted_sum(self.cost, powers)

@@ -372,7 +372,7 @@ class _Run:
         if samples:
             energy = samples * self.planner.cost_of(self.true, self.r)
         if samples and self.true.model.names == self.last.names:
-            true = replace(self.true, samples=samples)
+            true = self.true.with_samples(samples)
             information = FiniteRecord(true, samples, self.planner.step).information(self.r)
             with suppress(IdesignError, np.linalg.LinAlgError):
                 question = self.planner.question(true.model, information)

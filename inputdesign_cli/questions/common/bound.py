@@ -90,18 +90,17 @@ class Informed:
         w = axis(*self.errors[0].band, np.concatenate([*binding, peaks, shape]))
         frequency = w / self.units.frequency
         columns: dict[str, Array] = {self.units.frequency_header: frequency}
+        others = {"r_u_white": self.white, "r_u_record": self.record, "r_u_equal": self.equal}
+        compared = {"r_u": self.information, **{name: M for name, M in others.items() if M is not None}}
         panels = []
         for error, binds in zip(self.errors, binding, strict=True):
-            r_u, G_abs = error.error_bound(self.information, w), error.nominal_size(w)
+            bounds = dict(zip(compared, error.error_bounds(compared.values(), w), strict=True))
             suffix = "" if error.entry is None else self.units.suffix(*error.entry)
-            listed: dict[str, Array | None] = {
-                "r_u": r_u,
-                "r_adm": error.admissible.at(w) if self.stated else None,
-                "G_abs": G_abs,
-            }
-            for name, M in (("white", self.white), ("record", self.record), ("equal", self.equal)):
-                listed[f"r_u_{name}"] = None if M is None else error.error_bound(M, w)
-            columns |= {f"{name}{suffix}": found for name, found in listed.items() if found is not None}
+            listed = {"r_u": bounds.pop("r_u")}
+            if self.stated:
+                listed["r_adm"] = error.admissible.at(w)
+            listed |= {"G_abs": error.nominal_size(w), **bounds}
+            columns |= {f"{name}{suffix}": found for name, found in listed.items()}
             panels.append(
                 plots.BoundPanel(
                     frequency=frequency,
@@ -110,12 +109,12 @@ class Informed:
                     white_labels=self.white_labels,
                     entry=None if self.units.single else error.entry,
                     names=self.units.passage(error.entry),
-                    r_u=r_u,
-                    G_abs=G_abs,
-                    r_adm=listed["r_adm"],
-                    r_u_white=listed["r_u_white"],
-                    r_u_record=listed["r_u_record"],
-                    r_u_equal=listed["r_u_equal"],
+                    r_u=listed["r_u"],
+                    G_abs=listed["G_abs"],
+                    r_adm=listed.get("r_adm"),
+                    r_u_white=listed.get("r_u_white"),
+                    r_u_record=listed.get("r_u_record"),
+                    r_u_equal=listed.get("r_u_equal"),
                 )
             )
         return Table(columns), plots.BoundCurves(tuple(panels), self.of_several)

@@ -48,7 +48,7 @@ class SimulatedEstimates:
         """Return estimates from records of this length; None if long records make asymptotic theory good."""
         if samples * self.runs > _MOST:
             return None
-        nominal = replace(self.nominal, samples=samples)
+        nominal = self.nominal.with_samples(samples)
         return replace(self, nominal=nominal, excitation=excitation, sets=sets)
 
     def of_record(self, record: Array) -> SimulatedEstimates | None:

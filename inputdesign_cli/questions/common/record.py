@@ -113,13 +113,13 @@ def make_record(
     """
     problem, settings = design.problem, request.settings
     # In the coordinates of this design, which its requirements use too.
-    experiment = replace(problem.experiment, samples=experiment_samples)
+    experiment = problem.experiment.with_samples(experiment_samples)
     samples = request.length(experiment_samples)
     if not (design.result.x.any() and request.feasible(experiment_samples, least_period(experiment.inputs))):
         return None
     bounds = _with_powers(request.bounds, design)
     meets = problem.goal != "factor" and request.meets
-    plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
+    plants = [scenario.experiment.with_samples(experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
     bounding = [least_ratio(scenario.requirements) for scenario in problem.scenarios]
     spectrum = spectrum_of(request, design.result.basis, design.result.x)
@@ -193,7 +193,7 @@ def level_search(request: RecordRequest, design: Design) -> LevelSearch:
 
     @cache
     def plants(samples: int) -> list[FiniteRecord]:
-        each = (replace(scenario.experiment, samples=samples) for scenario in scenarios)
+        each = (scenario.experiment.with_samples(samples) for scenario in scenarios)
         return [FiniteRecord(plant, samples, request.step) for plant in each]
 
     def allowed(samples: Array) -> bool:
@@ -266,7 +266,7 @@ def peak_at(request: RecordRequest, design: Design, record: Record) -> Callable[
         return None
 
     def share(plant: Experiment) -> float:
-        return peak_share(FiniteRecord(replace(plant, samples=n), n, request.step), bounds, record.samples)
+        return peak_share(FiniteRecord(plant.with_samples(n), n, request.step), bounds, record.samples)
 
     return share
 
@@ -300,7 +300,7 @@ def ratio_before(design: Design, step: float) -> float:
     """Return the worst ratio that information without excitation gives, at the plant where it is worst."""
     ratios = []
     for scenario in design.problem.scenarios:
-        silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)
+        silent = FiniteRecord(scenario.experiment.with_samples(1), 1, step)
         score = least_ratio(scenario.requirements)
         try:
             ratios.append(score(silent.information(np.zeros((1, scenario.experiment.inputs)))))

@@ -207,7 +207,7 @@ def _at(design: Design, samples: int, plants: Sequence[Alternative]) -> Problem:
     """Return the requirements at plants outside the design, each in coordinates of its own."""
     on = design.problem.on(design.result.basis)
     power = max(on.power("excitation").at(design.result.x), np.finfo(float).tiny)
-    of_length = [replace(plant.experiment, samples=samples) for plant in plants]
+    of_length = [plant.experiment.with_samples(samples) for plant in plants]
     whitened = jointly_whitened(of_length, power)
     first, *others = (plant.at(own) for plant, own in zip(plants, whitened, strict=True))
     return replace(

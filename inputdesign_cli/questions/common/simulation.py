@@ -207,7 +207,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     assert outcome.power is not None
     assert outcome.samples is not None
     excitations = _excitations(plan, delivered, delivered.record)
-    nominal = replace(plan.nominal, samples=len(delivered.record))
+    nominal = plan.nominal.with_samples(len(delivered.record))
     true = plan.on_truth(nominal, outcome.power.output or ())
     trying = partial(tried_on, runs=plan.runs, seed=plan.seed, step=units.step, executor=executor)
     counted, simulated = outcome.samples, len(delivered.record)

@@ -101,7 +101,7 @@ class GivenExcitation:
     def at(self, plant: Alternative, samples: int) -> Kept:
         """Return the largest error ratio at a plant: infinite if its parameters are undetermined."""
         seconds_left()
-        own = replace(plant.experiment, samples=samples)
+        own = plant.experiment.with_samples(samples)
         try:
             coordinates = own.whitened(self.scale)
             there = plant.at(coordinates)
@@ -147,7 +147,7 @@ class GivenTask(SpectrumTask):
         excitation = self.excitation
         experiment = self.experiment.whitened(excitation.scale)
         if excitation.samples is not None:
-            experiment = replace(experiment, samples=len(excitation.samples))
+            experiment = experiment.with_samples(len(excitation.samples))
         information = excitation.information(experiment)
         eigenvalues, vectors = np.linalg.eigh(information)
         if eigenvalues[0] <= _TOO_FAINT * eigenvalues[-1]:

@@ -7,7 +7,7 @@ its own: four Gauss points on intervals of the grid on which peaks are sought.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -146,7 +146,7 @@ class _Reread:
     @cached_property
     def _experiment(self) -> Experiment:
         """Return the experiment of the delivered length, in the coordinates of the requirements."""
-        return replace(self.scenario.experiment, samples=self.done.experiment.samples)
+        return self.scenario.experiment.with_samples(self.done.experiment.samples)
 
     @cached_property
     def _information(self) -> Array:

@@ -50,7 +50,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     basis = build_basis(spec, experiment.inputs, excitation_band(spec))
     grid = _grid_method(spec)
     check_design(spec, experiment, basis)
-    counted = replace(experiment, samples=1) if goal == "samples" else experiment
+    counted = experiment.with_samples(1) if goal == "samples" else experiment
     plants = build_plants(spec, counted, basis)
     question = Question(
         experiment=counted,

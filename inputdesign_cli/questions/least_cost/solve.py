@@ -201,7 +201,7 @@ class ConvexTask(SpectrumTask):
         design, exact = made.design, self.asked.exact
         signal = signal_of(
             made.request,
-            replace(design.problem.experiment, samples=done.experiment.samples),
+            design.problem.experiment.with_samples(done.experiment.samples),
             record,
             design.problem.requirements,
             designed=done.information if design is done.design else design.result.information,

@@ -174,7 +174,7 @@ class Sought:
             kept = list(range(len(question.others)))
         if self.columns is not None:
             answer = self.columns.climbed(answer)
-        experiment = replace(answer.design.problem.experiment, samples=delivered_samples(answer.design))
+        experiment = answer.design.problem.experiment.with_samples(delivered_samples(answer.design))
         return Designed(self.header, question, answer, experiment, self.cost, confidence, kept, plants)
 
     def _by_exchange(

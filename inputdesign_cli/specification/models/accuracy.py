@@ -243,11 +243,15 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
     def requirements(self) -> tuple[str, ...]:
         """Return the keys of the requirements that are given, in the order of the contract."""
         names = (key for key in type(self).model_fields if key not in _NO_REQUIREMENTS)
-        bounded = self.mean_squared_error is not None and self.mean_squared_error.target is not None
-        return self.stated(*names, *(("mean_squared_error",) if bounded else ()))
+        return self.stated(*names, *(("mean_squared_error",) if self._bounds_mean_square else ()))
 
     @property
     def goals(self) -> tuple[str, ...]:
         """Return the keys that ask for the best that limits allow."""
-        goals = self.stated("criterion", "closed_loop_error", "mean_squared_error")
-        return tuple(goal for goal in goals if goal not in self.requirements)
+        least = () if self._bounds_mean_square else ("mean_squared_error",)
+        return self.stated("criterion", "closed_loop_error", *least)
+
+    @property
+    def _bounds_mean_square(self) -> bool:
+        """Return whether a largest mean-squared error is given; without it, the least one is sought."""
+        return self.mean_squared_error is not None and self.mean_squared_error.target is not None

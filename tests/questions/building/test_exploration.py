@@ -6,6 +6,7 @@ import yaml
 
 from inputdesign_cli.explore.structures import Process, process_models
 from inputdesign_cli.outcome.model_words import blocks_of
+from inputdesign_cli.plant import noise_gradients
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import parse_spec
 
@@ -28,4 +29,6 @@ def test_words_of_a_process_are_read_as_the_same_model(order, zero, noise, outpu
     np.testing.assert_allclose(read.theta, model.theta, rtol=1e-12)
     w = np.array([0.01, 0.5, 2.0])
     np.testing.assert_allclose(read.plant_at(w), model.plant_at(w), rtol=1e-10)
-    np.testing.assert_allclose(read.noise_gradient(w), model.noise_gradient(w), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(
+        noise_gradients([read], w)[0], noise_gradients([model], w)[0], rtol=1e-10, atol=1e-12
+    )

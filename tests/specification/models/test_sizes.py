@@ -13,6 +13,7 @@ from inputdesign_cli.diagnostics import render
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import json_schema, parse_spec
 from inputdesign_cli.specification.models.sizes import SIZES
+from tests.support.refusals import refused
 
 PAGE = Path(__file__).parents[3] / "docs" / "sizes.md"
 BASE = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
@@ -129,9 +130,8 @@ def test_long_lists_are_answered_soon_and_briefly(extra):
 
 def test_many_named_parameters_are_refused_at_once():
     names = ", ".join(f"p{i}: 1" for i in range(MANY))
-    with pytest.raises(SpecError) as refused:
-        parse_spec(BASE.replace("plant: {", f"plant: {{parameters: {{{names}}}, "))
-    assert "too-large" in {one.code for one in refused.value.diagnostics}
+    found = refused(parse_spec, BASE.replace("plant: {", f"plant: {{parameters: {{{names}}}, "))
+    assert "too-large" in {one.code for one in found}
 
 
 @pytest.mark.parametrize(
@@ -146,8 +146,6 @@ def test_many_named_parameters_are_refused_at_once():
     ],
 )
 def test_what_is_too_large_is_refused_with_what_would_fit(key, extra):
-    with pytest.raises(SpecError) as refused:
-        parse_spec(BASE + extra)
-    (found,) = refused.value.diagnostics
+    (found,) = refused(parse_spec, BASE + extra)
     assert (found.code, found.key) == ("too-large", key)
     assert re.search(r"write at most [0-9]+", found.hint)

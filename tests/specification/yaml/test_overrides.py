@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import Spec, load_spec, parse_spec, read_template
 from inputdesign_cli.specification.yaml import reader
+from tests.support.refusals import refused
 
 GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
 
@@ -83,9 +83,7 @@ def test_places_point_at_the_override():
 )
 def test_complaints_name_the_override(override, code, column, words):
     base = GOOD + "spectrum: {type: fir}\n" if override.startswith("spectrum") else GOOD
-    with pytest.raises(SpecError) as caught:
-        parse_spec(base, "x.yaml", overrides=[override])
-    (diagnostic,) = caught.value.diagnostics
+    (diagnostic,) = refused(parse_spec, base, "x.yaml", overrides=[override])
     assert diagnostic.code == code
     assert diagnostic.location.file == f"--set {override}"
     assert (diagnostic.location.line, diagnostic.location.column) == (1, column)
@@ -94,9 +92,10 @@ def test_complaints_name_the_override(override, code, column, words):
 
 
 def test_complaints_of_file_and_overrides_come_together():
-    with pytest.raises(SpecError) as caught:
-        parse_spec(GOOD + "sampletime: 1\n", "x.yaml", overrides=["nonsense", "noise.variance=-1"])
-    assert [(c.location.file, c.code) for c in caught.value.diagnostics] == [
+    found = refused(
+        parse_spec, GOOD + "sampletime: 1\n", "x.yaml", overrides=["nonsense", "noise.variance=-1"]
+    )
+    assert [(c.location.file, c.code) for c in found] == [
         ("x.yaml", "unknown-key"),
         ("--set noise.variance=-1", "out-of-range"),
         ("--set nonsense", "bad-override"),
@@ -134,9 +133,7 @@ def test_places_of_other_keys_stay_and_new_values_name_their_source():
     assert (place.file, place.line) == ("s.yaml", 3)
     assert revised.locate("noise.variance").file == "the estimate"
     assert (spec.noise.variance, spec.locate("noise.variance").file) == (0.4, "s.yaml")
-    with pytest.raises(SpecError) as caught:
-        spec.revised({"noise.variance": -1.0}, file="the estimate")
-    (found,) = caught.value.diagnostics
+    (found,) = refused(spec.revised, {"noise.variance": -1.0}, file="the estimate")
     assert (found.code, found.key, found.location.file) == ("out-of-range", "noise.variance", "the estimate")
 
 
@@ -149,9 +146,8 @@ def test_no_text_is_parsed(monkeypatch):
 
 @pytest.mark.parametrize("text", ["a\x00b", "\x1b[31m"])
 def test_unprintable_texts_are_refused(text):
-    with pytest.raises(SpecError) as caught:
-        parse_spec(TEXT).with_(title=text)
-    assert [(d.code, d.key) for d in caught.value.diagnostics] == [("bad-argument", "title")]
+    found = refused(parse_spec(TEXT).with_, title=text)
+    assert [(d.code, d.key) for d in found] == [("bad-argument", "title")]
 
 
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\n"
@@ -166,9 +162,7 @@ def written(folder, text, **files):
 
 
 def complaints(path, *overrides):
-    with pytest.raises(SpecError) as caught:
-        load_spec(path, overrides)
-    return caught.value.diagnostics
+    return refused(load_spec, path, overrides)
 
 
 def test_blocks_stand_as_if_they_were_pasted(tmp_path):
