@@ -12,3 +12,9 @@ def refusals(ask: Callable[[], object], kind: type[IdesignError] = SpecError) ->
     with pytest.raises(kind) as caught:
         ask()
     return caught.value.diagnostics
+
+
+def refusal(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> Diagnostic:
+    """The only complaint with which `ask` ends."""
+    (found,) = refusals(ask, kind)
+    return found
