@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
+from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions import finite, most_extreme, sound_arithmetic
 from tests.support.outcomes import typed
+from tests.support.refusals import refusal
 
 BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}"
 CRITERION = "accuracy: {criterion: D}\nlimits: {input_power: 1}"
@@ -55,9 +56,7 @@ def test_designs_follow_their_units_over_eighty_powers_of_ten(power):
 def test_a_number_out_of_range_is_refused_by_its_key(key, text):
     base = {"plant": "plant: {B: [0, 1], F: [1, -0.7]}", "noise": "noise: {variance: 1}", "accuracy": BOUND}
     lines = [line for name, line in base.items() if not text.startswith(name)]
-    with pytest.raises(SpecError) as found:
-        solve(parse_spec("\n".join([*lines, text, "spectrum: {type: white}"])))
-    (diagnostic,) = found.value.diagnostics
+    diagnostic = refusal(lambda: solve(parse_spec("\n".join([*lines, text, "spectrum: {type: white}"]))))
     assert (diagnostic.code, diagnostic.key) == ("out-of-range", key)
 
 

@@ -92,10 +92,6 @@ def test_the_loop_of_the_experiment_has_discs_of_its_own_error():
     np.testing.assert_allclose(radius, 0.1 * bound["r_u"], rtol=1e-3)
 
 
-def test_without_a_loop_there_is_none():
-    assert "nyquist" not in solve(parse_spec(SPEC % "")).curves
-
-
 def shown(outcome):
     return [pair.names for pair in outcome.curves["ellipses"].pairs]
 
@@ -110,14 +106,8 @@ def test_chosen_pairs_have_the_blocks_of_the_covariance():
     ellipse = outcome.curves["ellipses"].pairs[0]
     np.testing.assert_allclose(ellipse.covariance, P[np.ix_(at, at)], rtol=1e-12)
     np.testing.assert_allclose(ellipse.center, [0.2, 0.4])
-
-
-def test_one_channel_shows_ellipses_when_they_are_asked_for():
-    plain = solve(load_spec(SPECS / "first_order.yaml"))
-    assert "ellipses" not in plain.curves
-    asked = ["report.ellipses=[[b1, f1]]"]
-    assert shown(solve(load_spec(SPECS / "first_order.yaml", asked))) == [("b1", "f1")]
-    assert shown(analyse(load_spec(SPECS / "first_order_given.yaml", asked))) == [("b1", "f1")]
+    one = solve(load_spec(SPECS / "first_order.yaml", ["report.ellipses=[[b1, f1]]"]))
+    assert shown(one) == [("b1", "f1")]
 
 
 @pytest.mark.parametrize("apart", [1.0, 1e-9, 0.0, -1e-17])
@@ -142,74 +132,53 @@ PRIOR = ", prior: {information: [[30.0, 2.0], [2.0, 20.0]]}"
 SHORTEST = ["objective=shortest_experiment", "limits={input_power: 0.7}"]
 
 
-def error_of_white(text, power, samples):
+@pytest.mark.parametrize(("more", "asked"), [("", []), (LOOP, []), (PRIOR, []), ("", SHORTEST)])
+def test_white_beside_a_design_has_its_cost_or_its_length(more, asked):
+    found = solve(parse_spec(SPEC % more, overrides=asked))
+    white, samples = found.result["baseline"]["white"], found.result["samples"]
+    power = white["power"]["excitation"][0] / (1.0 if asked else white["ratio"])
     given = f"spectrum={{given: {{type: white, power: {power!r}}}}}"
-    told = ["limits=null", "objective=null", f"experiment.samples={samples}", given]
-    return np.array(analyse(parse_spec(text, overrides=told)).bound["r_u"])
-
-
-@pytest.mark.parametrize("more", ["", LOOP, PRIOR])
-def test_of_the_cheapest_experiment_at_its_cost(more):
-    found = solve(parse_spec(SPEC % more))
-    white = found.result["baseline"]["white"]
-    expected = error_of_white(SPEC % more, white["power"]["excitation"][0] / white["ratio"], 100)
+    plain = ["limits=null", "objective=null", f"experiment.samples={samples}", given]
+    expected = np.array(analyse(parse_spec(SPEC % more, overrides=plain)).bound["r_u"])
     np.testing.assert_allclose(found.bound["r_u_equal"][[0, -1]], expected[[0, -1]], rtol=1e-6)
-    assert (found.bound["r_u_equal"] / found.bound["r_adm"]).max() > 1.0
-
-
-def test_of_the_shortest_experiment_at_its_length():
-    found = solve(parse_spec(SPEC % "", overrides=SHORTEST))
-    samples = found.result["samples"]
-    expected = error_of_white(SPEC % "", found.result["baseline"]["white"]["power"]["excitation"][0], samples)
-    np.testing.assert_allclose(found.bound["r_u_equal"][[0, -1]], expected[[0, -1]], rtol=1e-6)
-
-
-def test_of_the_best_experiment_within_limits_there_is_none():
-    limited = ["objective=best_accuracy", "limits={input_power: 0.7}"]
-    assert "r_u_equal" not in solve(parse_spec(SPEC % "", overrides=limited)).bound
+    if not asked:
+        assert (found.bound["r_u_equal"] / found.bound["r_adm"]).max() > 1.0
 
 
 NOISE = "noise={C: [1, -0.4], D: [1, -0.9], variance: 0.25}"
+# y = S H e with S = (1 - 0.5 q^-1) / (1 - 0.4 q^-1).
+DRAWS = np.random.default_rng(3).standard_normal((4000, 300)) * 0.5
+LEFT = scipy.signal.lfilter(np.convolve([1, -0.5], [1, -0.4]), np.convolve([1, -0.4], [1, -0.9]), DRAWS)
 
 
-def predicted(more="", *overrides):
-    found = solve(parse_spec(SPEC % more, overrides=list(overrides)))
-    table = found.tables["predicted_output"]
+@pytest.mark.parametrize(
+    ("more", "noise", "pole", "expected", "rtol"),
+    [
+        # An ARMA(1, 1): variance (1 + c^2 + 2 a c) / (1 - a^2), here with pole 0.9 and zero 0.4.
+        ("", NOISE, 0.5, np.sqrt(0.25 * (1 + 0.4**2 - 2 * 0.9 * 0.4) / (1 - 0.9**2)), 1e-6),
+        (LOOP, NOISE, 0.4, np.std(LEFT[:, -1]), 0.05),
+        ("", "noise={drift: true, variance: 0.04}", 0.5, 0.2 * np.sqrt(np.arange(1.0, 101.0)), 1e-9),
+    ],
+    ids=["settled", "in a loop", "drifting"],
+)
+def test_the_output_is_that_of_the_plant_from_rest_with_noise_about_it(more, noise, pole, expected, rtol):
+    """In a loop it is what r causes, and the noise is what is left of it."""
+    found = solve(parse_spec(SPEC % more, overrides=[noise]))
+    table, u = found.tables["predicted_output"], found.signal[:, 0]
     assert csv_text(table).startswith("time_s,y1,y1_noise_deviation")
-    return found.signal[:, 0], table.columns["y1"], table.columns["y1_noise_deviation"]
-
-
-def test_the_output_is_that_of_the_plant_from_rest():
-    u, y, _ = predicted()
-    np.testing.assert_allclose(y, scipy.signal.lfilter([0, 1], [1, -0.5], u), atol=1e-12)
-
-
-def test_in_a_loop_it_is_what_r_causes():
-    r, y, _ = predicted(LOOP)
-    np.testing.assert_allclose(y, scipy.signal.lfilter([0, 1], [1, -0.4], r), atol=1e-12)
-
-
-def test_noise_that_settles_has_its_variance_from_the_start():
-    _, _, deviation = predicted("", NOISE)
-    # An ARMA(1, 1): variance (1 + c^2 + 2 a c) / (1 - a^2), here with pole 0.9 and zero 0.4.
-    expected = 0.25 * (1 + 0.4**2 - 2 * 0.9 * 0.4) / (1 - 0.9**2)
-    np.testing.assert_allclose(deviation**2, expected, rtol=1e-6)
-
-
-def test_noise_in_a_loop_is_what_is_left_of_it():
-    _, _, deviation = predicted(LOOP, NOISE)
-    # y = S H e with S = (1 - 0.5 q^-1) / (1 - 0.4 q^-1).
-    draws = np.random.default_rng(3).standard_normal((4000, 300)) * 0.5
-    left = scipy.signal.lfilter(np.convolve([1, -0.5], [1, -0.4]), np.convolve([1, -0.4], [1, -0.9]), draws)
-    assert np.std(left[:, -1]) == pytest.approx(deviation[-1], rel=0.05)
-
-
-def test_noise_that_drifts_grows_with_the_root_of_time():
-    _, _, deviation = predicted("", "noise={drift: true, variance: 0.04}")
-    np.testing.assert_allclose(deviation, 0.2 * np.sqrt(np.arange(1.0, deviation.size + 1)), rtol=1e-9)
+    np.testing.assert_allclose(table.columns["y1"], scipy.signal.lfilter([0, 1], [1, -pole], u), atol=1e-12)
+    deviation = table.columns["y1_noise_deviation"]
+    last = deviation[-1:] if rtol > 0.01 else deviation
+    np.testing.assert_allclose(last, np.broadcast_to(expected, last.shape), rtol=rtol)
 
 
 @pytest.mark.parametrize(("offset", "levels"), [("40", True), ("0", False), (None, False)])
 def test_only_an_operating_point_makes_the_input_stand_at_levels(offset, levels):
-    found = solve(parse_spec(SPEC % "", overrides=[f"signal.offset={offset}"] if offset else []))
+    """Nor does a design without a loop or within limits show what it does not have."""
+    limited = ["objective=best_accuracy", "limits={input_power: 0.7}"]
+    found = solve(
+        parse_spec(SPEC % "", overrides=[*limited, *([f"signal.offset={offset}"] if offset else [])])
+    )
     assert found.curves["signal"].levels == levels
+    assert not {"nyquist", "ellipses"} & found.curves.keys()
+    assert "r_u_equal" not in found.bound

@@ -222,15 +222,6 @@ def test_whole_campaigns_are_simulated():
     assert {"true_ratio.png", "cost_coverage.png"} <= figures.keys()
 
 
-@pytest.mark.slow
-def test_simulated_campaigns_end_where_the_structure_is_refuted():
-    text = SPEC + "simulation: {runs: 3, seed: 2, plant: {B: [0, 1.4], F: [1, -1.3, 0.42]}}\n"
-    overrides = ["signal.candidates=1", "campaign={block: 20, max_samples: 600, last: nominal}"]
-    told = simulate(parse_spec(text, overrides=overrides)).result["simulation"]["inputs"]["campaign"]
-    assert told["undecided"] == 3
-    assert told["samples"]["mean"] < 300
-
-
 def test_ways_have_the_same_pilot():
     spec = parse_spec(SPEC, overrides=["campaign={block: 50, pilot: {samples: 30, power: 0.1}}"])
     ways = build_campaign(spec).ways

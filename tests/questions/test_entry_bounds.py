@@ -143,27 +143,6 @@ def test_no_model_of_the_ellipsoid_breaks_the_bound_and_one_reaches_it(error, bo
     assert worst == pytest.approx(bound, rel=2e-4)
 
 
-@pytest.mark.slow
-def test_ellipsoid_in_continuous_time():
-    error = "accuracy: {model_error: {relative: 0.3, region: ellipsoid}}\n"
-    result = solve(parse_spec(CONTINUOUS + error)).result
-    names = result["information"]["parameters"]
-    theta = {"b0[1,1]": 2.0, "b0[1,2]": 1.0, "a0[1,1]": 1.0, "a1[1,1]": 0.6, "a0[1,2]": 1.0}
-
-    def entry(j):
-        def at(values, w):
-            p, s = dict(zip(names, values, strict=True)), 1j * w
-            if j == 1:
-                return p["b0[1,1]"] / (s**2 + p["a1[1,1]"] * s + p["a0[1,1]"])
-            return p["b0[1,2]"] / (s + p["a0[1,2]"])
-
-        return at
-
-    values = np.array([theta[name] for name in names])
-    worst = max(largest_error(entry(j), result, values, relative=True) for j in (1, 2))
-    assert worst == pytest.approx(0.3, rel=2e-4)
-
-
 def test_what_is_no_fraction_is_refused():
     error = "accuracy.model_error={relative: 0.1, region: ellipsoid}"
     both = ["plant.F=[[[1, 0.1], [1]], [[1], [1]]]"]

@@ -11,7 +11,6 @@ from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.building.uncertainty import build_foreseen
 from inputdesign_cli.questions.common import foresight, simulation
 from inputdesign_cli.questions.least_cost.build import build_convex
-from tests.support.heater import said
 
 H, SAMPLES, VARIANCE = 4.76, 720, 0.04
 HEATER = (2.1, 180.0, 25.0)
@@ -60,9 +59,7 @@ def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
     for rival in rivals:
         assert min(abs(rival["theta"]["L"] - L) for L in scan) < 3.0
         assert rival["ratio"] > 1.0
-    (note,) = [note for note in result["notes"] if "nearly as well" in note]
-    assert "spectrum: {type: fir, order: 12}" in note
-    assert "plant.known: [L]" in note
+    assert "other-minimum-foreseen" in {one["code"] for one in result["findings"]}
 
 
 @pytest.mark.slow
@@ -81,8 +78,6 @@ def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undeci
     assert (found.verdict == "undecided") == undecided
     assert assessment["verdict"] == found.verdict
     assert assessment.get("causes", []) == (["undetermined"] if undecided else [])
-    assert ("do not determine the model" in said(found.results)) == undecided
-    assert "contradict the model" not in said(found.results)
 
 
 @pytest.mark.parametrize(

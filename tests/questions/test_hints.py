@@ -7,7 +7,8 @@ import re
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.errors import InfeasibleError
+from tests.support.refusals import refusal
 
 PLANTS = {
     "open": "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.9], variance: 1.0}\n"
@@ -46,9 +47,7 @@ ADVICE = {
 @pytest.mark.parametrize(("plant", "limit", "relative", "level"), TRIED)
 def test_who_follows_a_hint_succeeds(plant, limit, relative, level):
     text = PLANTS[plant] + LIMITS[limit] % level + COMMON % relative
-    with pytest.raises(InfeasibleError) as refused:
-        solve(parse_spec(text))
-    (told,) = refused.value.diagnostics
+    told = refusal(lambda: solve(parse_spec(text)), InfeasibleError)
     followed = 0
     for sentence, changes in ADVICE.items():
         for number in re.findall(sentence, f"{told.message}; {told.hint}"):
@@ -71,9 +70,7 @@ accuracy: {model_error: {relative: 0.1}}
 
 @pytest.mark.parametrize("spectrum", [[], ["spectrum={type: fir, order: 6}"], ["spectrum={type: free}"]])
 def test_both_ways_around_a_pole_at_zero_can_be_gone(spectrum):
-    with pytest.raises(SpecError) as raised:
-        solve(parse_spec(INTEGRATING, overrides=spectrum))
-    (told,) = raised.value.diagnostics
+    told = refusal(lambda: solve(parse_spec(INTEGRATING, overrides=spectrum)))
     assert told.code == "infinite-information"
     found = re.findall(r"(limits|spectrum): (\{[^}]*\})", told.hint)
     lines, *band = [f"{key}={value}" for key, value in found]
@@ -125,10 +122,7 @@ def test_what_would_do_is_looked_for_within_seconds(monkeypatch):
     text = PLANTS["open"] + LIMITS["peaks"] % 0.3 + COMMON % 0.05
 
     def refused():
-        with pytest.raises(InfeasibleError) as error:
-            solve(parse_spec(text))
-        (told,) = error.value.diagnostics
-        return told
+        return refusal(lambda: solve(parse_spec(text)), InfeasibleError)
 
     whole = refused()
     monkeypatch.setattr("inputdesign_cli.compute.time_limit.HINT_SECONDS", 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli import analyse, load_spec, parse_spec, solve
+from inputdesign_cli import analyse, load_spec, parse_spec
 from inputdesign_cli.errors import DataError, SpecError
 
 SPECS = Path(__file__).parents[2] / "specs"
@@ -85,6 +85,7 @@ def test_sinusoids_are_in_phase_and_give_what_a_long_record_gives():
 def test_white_of_each_channel_is_a_sum_over_the_circle():
     """M = N/L sum over L points of the circle: exact for an ARX plant."""
     result = analyse(changed("spectrum={given: {type: white, power: [3.0, 5.0]}}")).result
+    assert result["information"]["parameters"] == NAMES
     z = np.exp(-2j * np.pi * np.arange(256) / 256)
     F = np.zeros((256, 10, 2, 2), dtype=complex)
     for i in (0, 1):
@@ -96,18 +97,11 @@ def test_white_of_each_channel_is_a_sum_over_the_circle():
     M = 500 / 256 * np.einsum("nkpa,pq,nlqa,a->kl", F, inverse, F.conj(), [3.0, 5.0], optimize=True).real
     i, j = np.indices((2, 2))
     M[:2, :2] += 500 * inverse * NOISE / (1 - A[i] * A[j])
-    order = [result["information"]["parameters"].index(n) for n in NAMES]
-    np.testing.assert_allclose(
-        np.asarray(result["information"]["matrix"])[np.ix_(order, order)], M, rtol=1e-9, atol=1e-7
-    )
+    np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-9, atol=1e-7)
     assert result["cost"] == pytest.approx(8.0)
 
 
 NAMES = ["a1[1]", "a1[2]"] + [f"b{lag}[{i},{j}]" for i in (1, 2) for j in (1, 2) for lag in (1, 2)]
-
-
-def test_names_are_in_the_order_of_the_simulation():
-    assert analyse(changed()).result["information"]["parameters"] == NAMES
 
 
 def test_a_power_is_spread_evenly_over_the_channels():
@@ -175,23 +169,6 @@ def test_sinusoids_of_several_inputs_given_as_a_table(tmp_path):
     np.testing.assert_allclose(result["power"]["input"], [1.6, 1.6], rtol=1e-12)
     M = by_finite_differences(result["information"]["parameters"], lines)
     np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
-
-
-@pytest.mark.slow
-def test_the_spectrum_of_a_design_given_back_as_a_table(tmp_path):
-    design = solve(load_spec(SPECS / "two_by_two.yaml", ["spectrum.order=3"]))
-    columns = design.tables["spectrum"].columns
-    table = tmp_path / "phi.csv"
-    rows = "\n".join(",".join(f"{v:.17g}" for v in row) for row in zip(*columns.values(), strict=True))
-    table.write_text(",".join(columns) + "\n" + rows + "\n", encoding="utf-8")
-    given = f"spectrum={{given: {{type: table, file: {table}}}}}"
-    outcome = analyse(parse_spec(CONTINUOUS, overrides=[given, "limits={band: [0, 2]}"]))
-    np.testing.assert_allclose(outcome.result["power"]["input"], design.result["power"]["input"], rtol=1e-4)
-    value = np.linalg.slogdet(np.asarray(outcome.result["information"]["matrix"]))[1]
-    assert value == pytest.approx(design.result["objective"]["value"], abs=1e-3)
-    table.write_text(",".join(columns) + "\n0,1,2,0,1\n1,1,2,0,1\n", encoding="utf-8")
-    with pytest.raises(DataError, match="positive semidefinite"):
-        analyse(parse_spec(CONTINUOUS, overrides=[given, "limits={band: [0, 2]}"]))
 
 
 def test_one_sampled_channel_reads_the_column_of_one_channel(tmp_path):

@@ -68,18 +68,6 @@ def test_record_has_two_channels_and_keeps_the_smallest_eigenvalue(design):
 
 
 @pytest.mark.slow
-def test_bases_agree_and_print_their_own_coefficients():
-    results = [
-        solve(changed(CONTINUOUS, f"spectrum.basis={basis}")).result for basis in ("chebyshev", "monomial")
-    ]
-    values = [result["objective"]["value"] for result in results]
-    assert values[0] == pytest.approx(values[1], rel=1e-9)
-    S = [np.array(result["spectrum"]["coefficients"]) for result in results]
-    assert S[0].shape == (10, 10)
-    assert np.abs(S[0] - S[1]).max() > 1e-3 * np.abs(S[0]).max()
-
-
-@pytest.mark.slow
 def test_few_columns_have_a_lower_value_under_the_same_bound():
     full = solve(changed(CONTINUOUS)).result["objective"]
     few = solve(changed(CONTINUOUS, "spectrum.factor_columns=1")).result

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import solve
-from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
@@ -73,24 +72,6 @@ def test_decoupled_loops_cost_as_much_as_each_alone():
         costs.append(build_convex(spec).designed().design.result.objective)
     assert design.gap < 1e-6
     assert design.objective == pytest.approx(sum(costs), rel=2e-6)
-
-
-@pytest.mark.slow
-def test_what_a_design_writes_is_what_an_analysis_reads(tmp_path):
-    """The powers and the accuracy of spectrum.csv, and of signal.csv, as given excitations."""
-    outcome = solve(changed("signal={samples: 2000, seed: 1, scale: design}"))
-    write_run(outcome, tmp_path)
-    result = outcome.result
-    spec = changed(f"spectrum={{given: {{type: table, file: {tmp_path / 'spectrum.csv'}}}}}")
-    table = solve(spec).result
-    for kind in ("input", "output", "excitation"):
-        np.testing.assert_allclose(table["power"][kind], result["power"][kind], rtol=1e-4)
-    found = [np.array(r["information"]["matrix"]) for r in (table, result)]
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-3, atol=1e-4 * np.abs(found[1]).max())
-    signal = solve(changed(f"spectrum={{given: {{signal: {tmp_path / 'signal.csv'}}}}}")).result
-    np.testing.assert_allclose(signal["power"]["input"], result["signal"]["input_power"], rtol=1e-9)
-    assert list(outcome.tables["signal"].columns) == ["time_s", "r1", "r2"]
-    np.testing.assert_allclose(result["signal"]["input_power"], result["power"]["input"], rtol=0.1)
 
 
 def test_limits_bind_what_r_causes():

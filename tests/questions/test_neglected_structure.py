@@ -63,15 +63,11 @@ def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole
     model = scipy.signal.freqz([0, 0, 0, 0, theta["b4"]], [1, theta["f1"]], w)[1]
     true = scipy.signal.freqz([0, 0, 0, 0, 0.02], np.convolve([1, -0.95], [1, -0.5]), w)[1]
     assert np.max(np.abs(true - model) / np.abs(model)) / 0.1 > assessment["requirements"][0]["worst_ratio"]
-    told = said(found.results)
-    assert f"after both the error is {assessment['left']:.4g} of the admissible error if the" in told
-    worst = max(assessment["neglected"], key=lambda entry: entry["may_move"])
-    assert f"another parameter ({worst['parameter']}), which these data do not rule out" in told
     pole = assessment["neglected"][0]
     size, deviation = pole["moves"], (pole["may_move"] - pole["moves"]) / 1.96
     moves = Moves(*(np.array([x]) for x in (size, deviation, 1.0 / 2.4477)))
     assert moves.odds(pole["probability"]) == pytest.approx(of_the_pole, abs=0.02)
-    assert ("Estimate this parameter too" in told) == (of_the_pole > 0.7)
+    assert ("Estimate this parameter too" in said(found.results)) == (of_the_pole > 0.7)
 
 
 def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
@@ -93,24 +89,3 @@ def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
     own, more = plant([]), plant(["plant.B=[0, 0, 0, 0.001, 0.04]"])
     to_first_order = np.max(np.abs(more - own) / np.abs(own)) / 0.1
     assert entries["b3"]["moves"] == pytest.approx(to_first_order, rel=0.05)
-
-
-RISING = """
-plant: {B: [0, 0.2], F: [1, -0.8]}
-noise: {variance: 1.0}
-experiment: {samples: 400}
-accuracy: {model_error: {relative: 0.3}}
-spectrum: {type: white}
-"""
-
-
-def test_a_gain_that_rises_by_half_during_the_record_is_not_met(tmp_path):
-    rng = np.random.default_rng(1)
-    u, e = rng.standard_normal(400), 0.3 * rng.standard_normal(400)
-    verdicts = []
-    for half in (0.0, 0.25):
-        y = scipy.signal.lfilter([0, 0.2], [1, -0.8], np.linspace(1 - half, 1 + half, 400) * u) + e
-        columns = np.column_stack([u, y])
-        np.savetxt(tmp_path / "a.csv", columns, delimiter=",", header="u,y", comments="")
-        verdicts.append(assess(parse_spec(RISING), tmp_path / "a.csv").verdict)
-    assert verdicts == ["met", "undecided"]

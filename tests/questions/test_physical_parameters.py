@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli import identify as estimated, parse_spec, simulate, solve
+from inputdesign_cli import identify as estimated, parse_spec, solve
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import identify
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import input_gradients, noise_gradients
 from inputdesign_cli.questions import assess
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import Spec
-from tests.support.words import largest_errors
 
 REST = """
 sample_time: 0.5
@@ -34,40 +31,10 @@ WORDS = {
     "continuous: {numerator: [exp(lnK)*r], denominator: [1, r], delay: L/10}}",
     "coefficients": "{continuous: {numerator: [2.0], denominator: [3.0, 1], delay: 1.685}, sample: zoh}",
 }
-SECOND = {
-    "process": "{continuous: {gain: 2, damping: 0.4, natural_frequency: 0.8, dead_time: 1}, sample: zoh}",
-    "coefficients": "{continuous: {numerator: [1.28], denominator: [1, 0.64, 0.64], delay: 1}, sample: zoh}",
-}
-IN_Q = {
-    "named": "{parameters: {g: 0.3, p: 0.8}, B: [0, 0, g], F: [1, -p]}",
-    "logarithms": "{parameters: {g: 0.3, T: 4.481420117724551}, B: [0, 0, g], F: [1, -exp(-1/T)]}",
-    "coefficients": "{B: [0, 0, 0.3], F: [1, -0.8]}",
-}
 
 
 def spec_of(plant, rest=REST) -> Spec:
     return parse_spec(f"plant: {plant}\n{rest}")
-
-
-def designed(plant):
-    found = solve(spec_of(plant))
-    bound = found.tables["bound"]
-    return found.result, np.array(bound.columns["r_u"] if hasattr(bound, "columns") else bound["r_u"])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("words", [WORDS, SECOND, IN_Q], ids=["first order", "second order", "in q"])
-def test_reparametrisation_changes_neither_cost_nor_error(words):
-    first, *others = (designed(plant) for plant in words.values())
-    for result, r_u in others:
-        assert result["cost"] == pytest.approx(first[0]["cost"], rel=1e-9)
-        np.testing.assert_allclose(r_u, first[1], rtol=1e-6)
-
-
-def test_the_error_of_one_spectrum_is_the_same_in_all_words():
-    """Without a solver in between."""
-    found = [largest_errors(Experiment(build_model(spec_of(plant)), 300)) for plant in WORDS.values()]
-    np.testing.assert_allclose(found, np.broadcast_to(found[0], np.shape(found)), rtol=1e-9)
 
 
 def test_information_of_a_dead_time_is_that_of_the_closed_form():
@@ -113,39 +80,6 @@ def test_what_is_known_keeps_its_value():
     fitted = model.at(found.theta).coefficients
     assert (fitted.B[0][0][2], fitted.C[0][1]) == (0.5, 0.4)
     assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
-
-
-@pytest.mark.parametrize(
-    "plant",
-    [
-        *WORDS.values(),
-        *IN_Q.values(),
-        "{B: [0, 1, 0.5], F: [1, -0.5], known: [f1]}",
-        "{continuous: {gain: [[1, 0], [2, 3]], time_constant: [[1, 1], [2, 3]], "
-        'dead_time: [[1, 0], [0, 3]]}, sample: zoh, known: ["gain[2,1]"]}',
-        "{continuous: {numerator: [[[1]], [[2]]], denominator: [2, 1], delay: 0.7}, sample: zoh}",
-    ],
-)
-def test_the_words_of_a_model_are_read_back(plant):
-    """What `identify` writes is the model that it found."""
-    rest = "noise: {variance: 0.1}\nsample_time: 0.5\n"
-    model = build_model(parse_spec(f"plant: {plant}\n{rest}", design=False))
-    moved = model.at(1.01 * model.theta)
-    text = "\n".join(f"{key}: {json.dumps(block)}" for key, block in blocks_of(moved).items())
-    again = build_model(parse_spec(f"{text}\nsample_time: 0.5", design=False))
-    assert again.names == model.names
-    np.testing.assert_allclose(again.theta, moved.theta, rtol=1e-12)
-    w = np.array([0.1, 1.0])
-    np.testing.assert_allclose(again.plant_at(w), moved.plant_at(w), rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_a_study_estimates_the_named_parameters():
-    spec = spec_of(WORDS["process"], REST + "simulation: {runs: 20, seed: 1}\n")
-    found = simulate(spec).result["simulation"]["inputs"]["design"]
-    assert set(found["mean_estimate"]) == {"gain", "time_constant", "dead_time"}
-    low, high = found["covariance_eigenvalues"][0], found["covariance_eigenvalues"][-1]
-    assert 0.2 < low < high < 4.0
 
 
 COLOURED = (

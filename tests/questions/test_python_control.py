@@ -7,6 +7,7 @@ import pytest
 from inputdesign_cli import Spec, figure, from_control, parse_spec, solve, to_control
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.building.system import build_model
+from tests.support.refusals import refusals
 
 W = np.array([0.05, 0.4, 1.3])
 
@@ -44,9 +45,7 @@ def test_it_may_stay_in_continuous_time():
     expected = np.moveaxis(system(1j * W), -1, 0)
     np.testing.assert_allclose(response(build_model(spec), W), expected, rtol=1e-12)
     np.testing.assert_allclose(np.moveaxis(to_control(spec)(1j * W), -1, 0), expected, rtol=1e-12)
-    with pytest.raises(SpecError) as caught:
-        to_control(from_control(system, delay=[[0.1, 0]]))
-    assert caught.value.diagnostics[0].code == "not-supported"
+    assert refusals(lambda: to_control(from_control(system, delay=[[0.1, 0]])))[0].code == "not-supported"
 
 
 def test_states_by_their_transfer_functions_or_by_entries():
@@ -77,9 +76,8 @@ def test_an_entry_has_no_poles_that_do_not_reach_it():
     ],
 )
 def test_what_cannot_be_a_plant_is_refused(system, code, key):
-    with pytest.raises(SpecError) as caught:
-        from_control(system)
-    assert (caught.value.diagnostics[0].code, caught.value.diagnostics[0].key) == (code, key)
+    found = refusals(lambda: from_control(system))[0]
+    assert (found.code, found.key) == (code, key)
 
 
 DATA = {

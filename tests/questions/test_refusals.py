@@ -9,12 +9,12 @@ import re
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, validate
-from tests.questions.test_coloured_noise import IN_S, REST
 from tests.questions.test_controllers import ONE, REST as CONTROLLED, TWO
 from tests.questions.test_durations_and_channels import HEATER
 from tests.questions.test_loop_error_parameters import REST as LOOP_ERROR
 from tests.questions.test_loop_margins import TEXT as MARGINS
 from tests.questions.test_matrix_loops import SPEC as MATRIX_LOOP
+from tests.questions.test_plants_in_words import REST, WORDS
 from tests.questions.test_response import SINGLE as RESPONSE
 from tests.questions.test_sensitivity import SPEC as SENSITIVITY
 from tests.questions.test_vanishing_coefficients import REST as VANISHING
@@ -24,7 +24,7 @@ from tests.support.matrix_specs import CONTINUOUS
 from tests.support.refusals import refusals
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS
 
-HELD = f"plant: {IN_S}\nnoise: {{variance: 0.1}}{REST}"
+HELD = f"plant: {WORDS['in s and in q'][0]}\n{REST}"
 ONE_INPUT = PLANT + ERROR + FIR
 
 TABLES = {
@@ -44,7 +44,6 @@ needs-limits accuracy.model_error | objective=best_accuracy
 not-supported solver.method | solver={method: lmi} | limits={input_power: 1}
 conflicting-keys signal.periods | signal={periods: 3}
 conflicting-keys signal.hold | signal={hold: 7}
-conflicting-keys signal.periods | signal={periods: 500}
 unsuitable-key signal.ramp | signal={ramp: 10, bits: 5}
 out-of-range signal.ramp | signal={ramp: 251}
 out-of-range signal.lines | signal={lines: [1, 251]}
@@ -69,7 +68,6 @@ unstable-loop experiment.controller | experiment.controller={numerator: [-2], de
 admissible-not-positive accuracy.model_error | plant.B=[0, 1, 1]
 not-identifiable plant | plant={B: [0, 1, -0.7], F: [1, -0.7]}
 not-supported limits.energy | limits={energy: 1}
-not-supported signal.order | signal={order: 4}
 """),
     "held": (HELD, """
 unstable-polynomial noise.D | noise={D: [1, -1], variance: 1}
@@ -207,7 +205,6 @@ admissible-not-positive accuracy.loop | accuracy.loop.max_sensitivity_db=3
 needs-controller accuracy.loop | accuracy={loop: {max_sensitivity_db: 6}}
 missing-key accuracy.loop | accuracy={loop: {tuning: {simc: {}}}}
 out-of-range accuracy.loop.max_sensitivity_db | accuracy.loop.max_sensitivity_db=100.1
-out-of-range accuracy.loop.max_sensitivity_db | accuracy.loop.max_sensitivity_db=1e9
 conflicting-keys accuracy.loop.gain_margin | accuracy.loop.gain_margin=2
 out-of-range accuracy.loop.gain_margin | accuracy={loop: {gain_margin: 1, tuning: {simc: {}}}}
 out-of-range accuracy.loop.phase_margin | accuracy={loop: {phase_margin: 60, tuning: {simc: {}}}}
@@ -219,17 +216,14 @@ not-supported accuracy.loop.tuning | plant={continuous: {gain: 2, damping: 0.5, 
     "heater": (HEATER, """
 conflicting-keys experiment.duration | experiment={duration: 3600, samples: 700}
 out-of-range experiment.duration | experiment={duration: 3}
-out-of-range experiment.duration | experiment={duration: -3}
 not-a-number experiment.duration | experiment={duration: long}
 out-of-range limits.duration | limits={duration: 1}
 unknown-name channels.u2 | channels={u2: {unit: V}}
 not-a-text channels.u1.unit | channels={u1: {unit: 3}}
 bad-name channels.u1.unit | channels={u1: {unit: 'a, b'}}
-unknown-key channels.u1.units | channels={u1: {units: V}}
 """),
     "uncertain": (FIRST, """
 unknown-parameter uncertainty.scenarios[1] | uncertainty={scenarios: [{f1: -0.6}, {a1: 0.3}]}
-no-stable-plant uncertainty.scenarios[0] | uncertainty={scenarios: [{f1: -1.6}]}
 no-stable-plant uncertainty.scenarios[0] | uncertainty={scenarios: [{f1: -1.0}]}
 no-stable-plant uncertainty.scenarios[0] | uncertainty={scenarios: [{c1: 1.0}]}
 not-a-plant uncertainty.scenarios[1] | uncertainty={scenarios: [{b1: 3}, {b1: 0}]}
@@ -326,7 +320,6 @@ out-of-range accuracy.frequency_response.frequencies[0] | accuracy.frequency_res
 out-of-range accuracy.frequency_response.frequencies[0] | accuracy.frequency_response={relative: 0.05,
   frequencies: [3.14]}
 out-of-range accuracy.frequency_response.detection | accuracy.frequency_response.detection=1
-out-of-range accuracy.frequency_response.detection | accuracy.frequency_response.detection=-1
 """),
     "campaign": (CAMPAIGN, """
 conflicting-keys campaign.stages | campaign.stages=[100, 50] | campaign.block=null
@@ -335,12 +328,14 @@ conflicting-keys campaign.max_samples | campaign.max_samples=100
 conflicting-keys campaign.block | campaign.stages=[100, 100]
 not-supported campaign | spectrum={given: {type: white, power: 1}}
 not-supported campaign | objective=best_accuracy | limits.input_power=1
-unknown-key campaign.blok | campaign.blok=3
+not-supported signal.least_move | signal.least_move=1 | limits.rate=2
+not-supported signal.least_move | signal.least_move=1 | limits.amplitude={output: 2}
+not-supported signal.least_move | signal.least_move=1 | campaign=null
+conflicting-keys signal.least_move | signal.least_move=3 | limits.amplitude=2
 """),
     "two_by_two_arx": (None, """
 unknown-parameter report.ellipses[0][1] | report={ellipses: [["b1[1,1]", "a1"]]}
 conflicting-keys signal.periods | signal.periods=3
-conflicting-keys signal.periods | signal.periods=50
 conflicting-keys signal.hold | signal.hold=7
 out-of-range signal.bits | signal.bits=3 | signal.type=prbs
 out-of-range signal.lines | signal.lines=[1, 200]
@@ -365,8 +360,6 @@ out-of-range accuracy.model_error.confidence.draws | accuracy={model_error: {abs
   {exact: 0.99, draws: 100}}}
 out-of-range accuracy.model_error.confidence.runs | accuracy={model_error: {absolute: 0.1, confidence: {exact:
   0.99, runs: 100}}}
-out-of-range accuracy.model_error.confidence.runs | accuracy={model_error: {absolute: 0.1, confidence: {exact:
-  0.99, runs: -1}}}
 too-large accuracy.model_error.confidence.draws | accuracy={model_error: {absolute: 0.1, confidence: {exact:
   0.9, draws: 1.0e9}}}
 missing-key accuracy.model_error.confidence | accuracy={model_error: {absolute: 0.1, confidence: {draws: 10}}}
@@ -426,13 +419,10 @@ not-supported limits.energy | limits={energy: 5}
     "regression_fir": (None, """
 wrong-shape accuracy.mean_squared_error.estimated | accuracy.mean_squared_error.estimated=[1, 2]
 wrong-shape accuracy.mean_squared_error.neglected | accuracy.mean_squared_error.neglected=[1, 2]
-out-of-range accuracy.mean_squared_error.target | accuracy.mean_squared_error.target=-1
 out-of-range accuracy.mean_squared_error.target | accuracy.mean_squared_error.target=0
 out-of-range accuracy.mean_squared_error.neglected_norm | accuracy.mean_squared_error.neglected_norm=-0.1
-out-of-range noise.variance | noise.variance=-1
 out-of-range noise.variance | noise.variance=0
 out-of-range limits.energy | accuracy.mean_squared_error.target=null | limits.energy=0
-out-of-range limits.energy | accuracy.mean_squared_error.target=null | limits.energy=-3
 needs-limits accuracy.mean_squared_error | accuracy.mean_squared_error.target=null
 not-supported limits.energy | limits.energy=3
 zero-weights accuracy.mean_squared_error.estimated | accuracy.mean_squared_error.estimated=[0]

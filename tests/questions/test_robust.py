@@ -18,7 +18,6 @@ from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.common.robust import tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
-from inputdesign_cli.report.facts import facts
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
 
 
@@ -58,19 +57,24 @@ def test_a_plant_that_asks_for_more_sets_the_cost():
     assert "fresh" not in both["robust"]
 
 
-def test_limits_hold_at_every_plant():
-    """The power of the output is that of the plant that answers most."""
-    asked = ("limits={output_power: 5}", "objective=best_accuracy")
-    robust = solve(parse_spec(FIRST, overrides=[*asked, "uncertainty={scenarios: [{f1: -0.9}]}"]))
-    design = build_convex(
-        parse_spec(FIRST, overrides=[*asked, "uncertainty={scenarios: [{f1: -0.9}]}"])
-    ).designed()
+def test_limits_on_powers_bind_design_and_record_at_every_plant():
+    """The output answers most at the slower plant; records of several seeds, of the power of the design."""
+    asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
+    design = build_convex(parse_spec(FIRST, overrides=asked)).designed()
     powers = [design.problem.power("output", None, s).at(design.design.result.x) for s in (0, 1)]
     assert powers[1] == pytest.approx(5.0, rel=1e-6)
     assert powers[0] < 4.0
+    found = []
+    for seed in range(4):
+        robust = solve(parse_spec(FIRST, overrides=[*asked, f"signal.seed={seed}"]))
+        u = robust.tables["signal"].columns["u1"]
+        found.append([np.mean(lfilter([0, 3.6], [1, pole], u) ** 2) for pole in (-0.7, -0.9)])
     (limit,) = robust.result["limits"]
     assert limit["binding"]
     assert limit["value"] == pytest.approx(5.0, rel=1e-6)
+    assert max(found)[0] < 4.0
+    assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
+    assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
 
 
 def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
@@ -82,18 +86,6 @@ def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
         paid = [sum(at.power(kind, None, s).at(x) for kind in ("input", "output")) for s in range(3)]
         assert found.design.result.objective == pytest.approx(of(paid), rel=1e-9)
     assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
-
-
-@pytest.mark.slow
-def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
-    found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
-    robust = found["robust"]
-    assert robust["worst_share"] == pytest.approx(1.0, abs=1e-6)
-    assert robust["fresh"]["draws"] == 120
-    low, high = robust["fresh"]["limits"]
-    assert low <= robust["fresh"]["share"] <= high
-    assert robust["fresh"]["share"] <= robust["risk"]["after"] <= robust["risk"]["before"]
-    assert found["cost"] > 1.05 * solved(FIRST)["cost"]
 
 
 @pytest.mark.slow
@@ -128,10 +120,6 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     told = solved.result["robust"]["fresh"]
     assert (told["less"], told["dearer"], told["missed"]) == (len(less), len(dearer), len(less | dearer))
     assert less > dearer > set()
-    (words,) = (text for name, text, _ in facts(solved.outcome, "s") if name == "fresh plants")
-    both = len(less & dearer)
-    assert f"{len(less)} get less than that, {len(dearer)} cost more ({both} of them both)" in words
-    assert f"{len(less | dearer)} in all" in words
 
 
 def test_leaving_out_the_dearest_plants_makes_it_cheaper():
@@ -215,18 +203,6 @@ def test_the_fan_shows_every_plant_and_names_those_that_bind():
     names = {f"plant {item['scenario']}" for item in found.result["robust"]["active"] if item["scenario"]}
     assert set(curves.active) == names
     assert draw_all(found)["fan.png"].startswith(b"\x89PNG")
-
-
-def test_limits_on_powers_bind_the_record_at_every_plant():
-    """The output answers most at the slower plant; records of several seeds, of the power of the design."""
-    asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
-    found = []
-    for seed in range(4):
-        u = solve(parse_spec(FIRST, overrides=[*asked, f"signal.seed={seed}"])).tables["signal"].columns["u1"]
-        found.append([np.mean(lfilter([0, 3.6], [1, pole], u) ** 2) for pole in (-0.7, -0.9)])
-    assert max(found)[0] < 4.0
-    assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
-    assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
 
 
 @pytest.mark.slow
@@ -393,8 +369,6 @@ def test_drawn_plants_keep_limits_and_others_are_counted():
     told = found.result["robust"]["fresh"]["beyond_limits"]
     assert told["largest"] == pytest.approx(max(others), rel=1e-9)
     assert told["draws"] == sum(size > 1.0 + 1e-6 for size in others) > 0
-    lines = {name: text for name, text, _ in facts(found.outcome, "s")}
-    assert f"of 60 more {told['draws']} go beyond, up to {100 * max(others):.3g} %" in lines["limits there"]
 
 
 @pytest.mark.slow
@@ -488,14 +462,6 @@ def test_every_plant_whose_sensitivity_exceeds_what_is_asked_is_told_and_no_othe
     assert len(said) == bool(beyond)
 
 
-def test_a_plant_that_the_controller_does_not_fit_is_told_by_all_that_tells_of_it():
-    text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 7.5}")
-    found = solve(parse_spec(text, overrides=["uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]}"])).outcome
-    assert found.robust.floor.lost == (1,)
-    lines = {name: value for name, value, _ in facts(found, "s")}
-    assert lines["floor"].endswith("at 1 of them no model keeps what is asked")
-
-
 REGION = "uncertainty={intervals: {b1: [0.3, 0.9]}, scenarios: 2, fresh: %s}"
 
 
@@ -515,9 +481,3 @@ def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
     ]
     assert found["lost"]
     assert found["peak"] == pytest.approx(peak(found["parameters"]["b1"], -0.8, 0.4, 0.95), rel=1e-3)
-
-
-def test_nothing_is_told_where_every_plant_has_an_r_adm_of_its_own():
-    found = solve(parse_spec(LOOP, overrides=["uncertainty={scenarios: [{f1: -0.75}]}"])).result
-    assert "floor" not in found["robust"]
-    assert "lost" not in found["robust"].get("fresh", {})

@@ -8,11 +8,10 @@ import pytest
 import scipy.io
 import scipy.io.wavfile
 
-from inputdesign_cli import parse_spec, solve
+from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
-from inputdesign_cli.report.facts import facts
 
 BASE = """
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -116,13 +115,6 @@ def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not
 
 
 @pytest.mark.slow
-def test_where_noise_does_not_fit_ramps_between_two_levels_are_named():
-    with pytest.raises(InfeasibleError) as error:
-        solve(parse_spec(SLOW + "signal: {type: filtered_noise}\n"))
-    assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
-
-
-@pytest.mark.slow
 def test_a_converter_of_too_small_a_range_is_named():
     text = "signal: {candidates: 1, quantisation: {bits: 8, range: 0.45}}\n"
     with pytest.raises(InfeasibleError) as error:
@@ -137,29 +129,6 @@ def test_limits_that_no_length_makes_up_for():
         solve(parse_spec(BASE + "limits: {rate: 0.003}\nsignal: {candidates: 1}\n"))
     assert error.value.diagnostics[0].code == "infeasible"  # by the power of the moves
     assert "a spectrum can" in error.value.diagnostics[0].hint
-
-
-def test_files_and_plots(tmp_path):
-    """CSV, MAT and WAV hold the same values; the limits and the record are drawn."""
-    text = BASE + "sample_time: 0.5\nlimits: {amplitude: 1.2}\n"
-    text += "signal: {offset: 2, quantisation: {bits: 12, range: 5}, also: [mat, wav], candidates: 2}\n"
-    outcome = solve(parse_spec(text))
-    applied = outcome.tables["signal"].columns["u1"]
-    steps = applied / (10 / 2**12)
-    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
-    content = scipy.io.loadmat(io.BytesIO(outcome.files["signal.mat"]))
-    np.testing.assert_array_equal(content["u1"][:, 0], applied)
-    assert content["time_s"][1, 0] == 0.5
-    rate, wave = scipy.io.wavfile.read(io.BytesIO(outcome.files["signal.wav"]))
-    assert rate == 2
-    np.testing.assert_allclose(wave * outcome.result["signal"]["wav_full_scale"], applied, rtol=1e-6)
-    low, high = outcome.curves["signal"].limits["u1"]
-    assert low <= applied.min() < applied.max() <= high
-    (bound,) = outcome.curves["bound"].panels
-    assert np.all(bound.r_u_record <= bound.r_adm * (1 + 1e-9))
-    assert solve(parse_spec(text)).files == outcome.files
-    names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
-    assert {"signal.mat", "signal.wav", "signal.csv", "signal.png"} <= names
 
 
 def test_a_missed_accuracy_is_noted():
@@ -196,8 +165,68 @@ def test_the_share_of_each_limit_that_single_samples_take():
     assert shares["rate"] == pytest.approx(2.0 * shares["amplitude.input"])
     assert 0.98 < shares["rate"] <= 1.0 + 1e-9
     (longer,) = [one for one in outcome.result["findings"] if one["code"] == "record-longer"]
-    rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
-    assert f"{rate} of limits.rate" in longer["message"]
-    (said,) = [value for name, value, _ in facts(outcome.outcome, "s") if name == "limits"]
-    assert said.endswith(f"single samples take {rate} of rate, {values} of input amplitude")
+    assert f"{100 * shares['rate']:.3g} % of limits.rate" in longer["message"]
     assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))
+
+
+TWO = "specs/two_by_two_arx.yaml"
+
+
+@pytest.mark.slow
+def test_limits_on_each_channel():
+    changes = [
+        "spectrum.order=4",
+        "limits.amplitude={input: [14, 35], output: [70, 70]}",
+        "signal.offset=[1, 2]",
+    ]
+    outcome = solve(load_spec(TWO, [*changes, "signal.candidates=2"]))
+    signal = outcome.result["signal"]
+    assert signal["worst_ratio"] == pytest.approx(1.0, abs=1e-8)
+    assert np.all(np.array(signal["input_peak"]) <= [14, 35])
+    assert np.all(np.array(signal["output_peak"]) <= 70)
+    assert signal["phases"] == "optimised"
+    record = outcome.tables["signal"].columns
+    np.testing.assert_allclose(np.abs(record["u1"] - 1).max(), signal["peak"][0])
+    assert outcome.curves["signal"].limits["u2"] == (-33, 37)
+
+
+def test_what_is_applied_to_several_inputs(tmp_path):
+    """Converters of a range each, offsets, periods, all files, and the record in every plot."""
+    changes = [
+        "spectrum.order=4",
+        "signal.type=binary",
+        "signal.candidates=2",
+        "signal.periods=2",
+        "signal.offset=[1, -20]",
+        "signal.quantisation={bits: 10, range: [20, 100]}",
+        "signal.also=[mat, wav]",
+        "limits.amplitude=[19, 60]",
+        "sample_time=0.5",
+    ]
+    outcome = solve(load_spec(TWO, changes))
+    signal = outcome.result["signal"]
+    assert signal["type"] == "binary"
+    assert signal["crest_factor"] == pytest.approx([1, 1])
+    assert 0.99 <= signal["worst_ratio"] <= 1 + 1e-9
+    designed = sum(outcome.result["power"]["input"])
+    assert signal["extra_power"] == pytest.approx(sum(signal["power"]) / designed - 1)
+    assert signal["extra_power"] < 0.25
+    columns = outcome.tables["signal"].columns
+    applied = np.stack([columns["u1"], columns["u2"]], axis=1)
+    steps = applied / (np.array([40.0, 200.0]) / 2**10)
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+    np.testing.assert_array_equal(applied[:250], applied[250:])
+    np.testing.assert_allclose(np.mean((applied - signal["operating_point"]) ** 2, axis=0), signal["power"])
+    content = scipy.io.loadmat(io.BytesIO(outcome.files["signal.mat"]))
+    np.testing.assert_array_equal(content["u2"][:, 0], applied[:, 1])
+    rate, wave = scipy.io.wavfile.read(io.BytesIO(outcome.files["signal.wav"]))
+    assert (rate, content["time_s"][1, 0]) == (2, 0.5)
+    np.testing.assert_allclose(wave * signal["wav_full_scale"], applied, rtol=1e-6)
+    assert {"phi_record_11", "phi_record_22"} <= set(outcome.tables["spectrum"].columns)
+    for entry in outcome.curves["bound"].panels:
+        assert np.all(entry.r_u_record <= entry.r_adm * (1 + 1e-9))
+    low, high = outcome.curves["signal"].limits["u1"]
+    assert low <= columns["u1"].min() < columns["u1"].max() <= high
+    assert solve(load_spec(TWO, changes)).files == outcome.files
+    names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
+    assert {"signal.mat", "signal.wav", "signal.csv", "signal.png"} <= names

@@ -75,12 +75,6 @@ def test_sample_time_scales_frequencies_and_nothing_else():
     assert fast.tables["signal"].columns["time_s"][1] == pytest.approx(0.1)
 
 
-def test_confidence_sets_alpha():
-    """Two parameters in G: the 95 % quantile of chi-squared with two degrees of freedom is 5.991."""
-    spec = parse_spec(SMALL.replace("alpha: 2.45", "confidence: 0.95"))
-    assert solve(spec).result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)), rel=1e-12)
-
-
 def test_equal_seeds_give_equal_signals():
     one, two, other = (
         solve(spec_of(SMALL, signal__seed=seed)).tables["signal"].columns["u1"] for seed in (4, 4, 5)
@@ -124,6 +118,16 @@ spectrum: {type: fir, order: 6}
     assert on_grid["model_error"]["worst_ratio"] <= 1.0 + 1e-5
 
 
+def test_table_equal_to_a_relative_bound_gives_its_design(tmp_path):
+    """r_adm = 0.01 |G| tabulated finely enough is the relative bound."""
+    w = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 4000)])
+    r = 0.01 * np.abs(3.6 / (1 - 0.7 * np.exp(-1j * w)))
+    lines = "\n".join(f"{a:.17g},{b:.17g}" for a, b in zip(w, r, strict=True))
+    (tmp_path / "r.csv").write_text("frequency_rad_per_s,r_adm\n" + lines + "\n", encoding="utf-8")
+    tabulated = solve(parse_spec(SMALL.replace("relative: 0.01", f"table: {tmp_path / 'r.csv'}")))
+    assert tabulated.result["cost"] == pytest.approx(solve(parse_spec(SMALL)).result["cost"], rel=1e-5)
+
+
 @pytest.mark.parametrize("kind", ["fir, order: 3", "free"])
 def test_the_bound_over_every_spectrum_can_be_left_out(kind):
     whole, fast = (
@@ -159,16 +163,6 @@ def test_bad_tables(tmp_path, content, code, words):
         validate(spec)
     assert error.value.diagnostics[0].code == code
     assert words in error.value.diagnostics[0].message
-
-
-def test_table_equal_to_a_relative_bound_gives_its_design(tmp_path):
-    """r_adm = 0.01 |G| tabulated finely enough is the relative bound."""
-    w = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 4000)])
-    r = 0.01 * np.abs(3.6 / (1 - 0.7 * np.exp(-1j * w)))
-    lines = "\n".join(f"{a:.17g},{b:.17g}" for a, b in zip(w, r, strict=True))
-    (tmp_path / "r.csv").write_text("frequency_rad_per_s,r_adm\n" + lines + "\n", encoding="utf-8")
-    tabulated = solve(parse_spec(SMALL.replace("relative: 0.01", f"table: {tmp_path / 'r.csv'}")))
-    assert tabulated.result["cost"] == pytest.approx(solve(parse_spec(SMALL)).result["cost"], rel=1e-5)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "specs").glob("*.yaml")), ids=lambda p: p.stem)

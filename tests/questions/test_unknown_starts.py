@@ -9,13 +9,9 @@ import scipy
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_begun_anywhere
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.outcome.design import RequirementMet, Signal
-from inputdesign_cli.outcome.estimate import Assessment
-from inputdesign_cli.outcome.results import Outcome
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.common.task import growth_by_start
 from inputdesign_cli.questions.least_cost.build import build_convex
-from inputdesign_cli.report.facts import said
 
 N = 500
 DOUBLE = """
@@ -90,25 +86,6 @@ def test_an_unknown_start_costs_what_its_information_shows():
     anywhere = information_begun_anywhere(experiment.model, record, plant.signals("output", record), 1.0)
     (exact,) = np.sqrt(np.diag(plant.information(record)) / np.diag(plant.known + anywhere))
     assert 1.0 < exact <= found < 1.2  # a bound is enough where nothing is said
-
-
-@pytest.mark.parametrize(
-    ("signal", "words"),
-    [
-        ({}, "if the structure of the model is right; assess"),
-        (
-            {"begun_anywhere": 4.44},
-            "right and the record begins at rest, its levels known (--operating-point; ",
-        ),
-        ({"begun_anywhere": 4.44}, "else 4.44 times as much); assess"),
-        ({"begun_anywhere": None}, "else nothing is promised); assess"),
-    ],
-)
-def test_a_top_up_says_what_its_promise_rests_on(signal, words):
-    missed = (RequirementMet(name="model_error", worst_ratio=3.0, frequency=None),)
-    assessment = Assessment(verdict="missed", met=False, requirements=missed, left=0.99)
-    outcome = Outcome(assessment=assessment, signal=Signal(samples=N, details=signal))
-    assert words in " ".join(said("verdict", outcome))
 
 
 @pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])

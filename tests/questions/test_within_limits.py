@@ -1,16 +1,13 @@
 """Limits that are too tight: what they do buy, and what a record within them reaches."""
 
-import json
 import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.cli import app
 from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.report.facts import facts
+from tests.support.refusals import refusal, refusals
 
 FIRST = """
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -33,9 +30,7 @@ limits: {input_power: [1.0, 0.02]}
 
 
 def refused(text, code="infeasible"):
-    with pytest.raises(InfeasibleError) as caught:
-        solve(parse_spec(text))
-    (diagnostic,) = caught.value.diagnostics
+    diagnostic = refusal(lambda: solve(parse_spec(text)), InfeasibleError)
     assert diagnostic.code == code
     return diagnostic
 
@@ -61,10 +56,6 @@ accuracy: {standard_deviation: {b1: 0.01}}
     (limit,) = details["limits"]
     assert (limit["name"], limit["max"]) == ("input_power", 0.5)
     assert limit["share"] == pytest.approx(1.0, rel=1e-6)
-    assert (
-        f"buy standard_deviation of b1 {np.ceil(deviation * 1e5) / 1e5:.4g} (asked: 0.01)"
-        in diagnostic.message
-    )
 
 
 @pytest.mark.first(1)
@@ -92,22 +83,6 @@ def test_what_is_bought_can_be_had_and_no_more(head, accuracy, fraction):
     assert still.details["factor"] == pytest.approx(1 / (1 - 1e-3), rel=1e-5)
 
 
-@pytest.mark.slow
-def test_several_channels_name_the_entry_and_the_input():
-    diagnostic = refused(TWO + ERROR.format(0.1))
-    details = diagnostic.details
-    worst = details["worst"][0]
-    assert worst["entry"] in ("[1,1]", "[1,2]", "[2,1]", "[2,2]")
-    assert worst["worst_ratio"] == pytest.approx(details["factor"], rel=1e-4)
-    assert f"worst in entry {worst['entry']} at " in diagnostic.message
-    assert {item["channel"] for item in details["limits"]} <= {1, 2}
-    tightest = max(details["limits"], key=lambda item: item["share"])
-    assert tightest["channel"] == 2
-    assert (
-        "needs input 2 power >= " in diagnostic.message or "input 2 power is exhausted" in diagnostic.message
-    )
-
-
 def test_an_experiment_that_is_too_short_says_what_it_buys():
     text = FIRST + "objective: shortest_experiment\n" + ERROR.format(0.01)
     limits = "limits: {{input_power: 0.2, samples: {}}}\n"
@@ -116,15 +91,6 @@ def test_an_experiment_that_is_too_short_says_what_it_buys():
         FIRST + "objective: shortest_experiment\n" + ERROR.format(0.01 * details["factor"] * (1 + 1e-6))
     )
     assert solve(parse_spec(loosened + limits.format(400))).result["samples"] == 400
-
-
-def test_data_of_the_error_reach_the_terminal(tmp_path):
-    spec = tmp_path / "tight.yaml"
-    spec.write_text(FIRST + "limits: {input_power: 0.2}\n" + ERROR.format(0.01))
-    run = CliRunner().invoke(app, ["solve", str(spec), "--no-output", "--json"])
-    assert run.exit_code == 3
-    (error,) = json.loads(run.stdout)["errors"]
-    assert error["details"]["factor"] >= error["details"]["factor_bound"] > 1.0
 
 
 @pytest.mark.slow
@@ -221,12 +187,8 @@ def test_a_record_of_another_spectrum_is_delivered_where_that_of_the_cheapest_do
 @pytest.mark.slow
 def test_a_kind_of_signal_that_is_asked_for_is_not_replaced():
     stated = DEAR_OUTPUT + "signal: {type: ternary, candidates: 8}\n"
-    with pytest.raises(InfeasibleError) as caught:
-        solve(parse_spec(stated % "amplitude: 2"))
-    told = caught.value.diagnostics[0]
+    told = refusals(lambda: solve(parse_spec(stated % "amplitude: 2")), InfeasibleError)[0]
     assert told.code == "limits-too-tight"
-    assert "was found" in told.message
-    assert "; tried besides: a signal of three levels of 5 spectra" in told.message
     kind, power = told.hint.split("signal.type: ")[1].split(" with limits.input_power: ")
     as_told = DEAR_OUTPUT + f"signal: {{type: {kind}, candidates: 8}}\n"
     found = solve(parse_spec(as_told % f"amplitude: 2, input_power: {power}"))
@@ -259,9 +221,5 @@ signal: {type: multisine, candidates: 1}
     result = outcome.result
     more = result["signal"]["worst_ratio"] / result["objective"]["value"] - 1
     assert more > 0.01
-    line = next(text for name, text, _ in facts(outcome.outcome, "s") if name == "signal")
-    assert f"errors {100 * more:.3g} % larger than by the design" in line
-    assert "cost" not in line
     (found,) = [one for one in result["findings"] if one["code"] == "record-less-accurate"]
     assert found["figures"]["reached"] / found["figures"]["designed"] - 1 == pytest.approx(more)
-    assert f"{100 * more:.3g} % more" in found["message"]

@@ -19,3 +19,9 @@ def refused(
     with pytest.raises(kind) as caught:
         call(*given, **named)
     return caught.value.diagnostics
+
+
+def refusal(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> Diagnostic:
+    """The only complaint with which `ask` ends."""
+    (found,) = refusals(ask, kind)
+    return found

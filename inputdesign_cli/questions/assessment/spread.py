@@ -2,10 +2,12 @@
 
 First-order theory states a covariance of the estimate. A short record may hold too little noise to average,
 and the likelihood may be no parabola. Then records of the estimated model are simulated and estimated again.
+How far they scatter depends on the plant, so that plants of the confidence region are simulated as well.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +22,10 @@ from inputdesign_cli.plant import Model
 # Runs, and the samples a parameter beyond which theory is good to a few per cent.
 _RUNS, _PLENTY = 200, 60
 _LEVEL = 0.95
+# Other plants and the runs of each; a quarter of them may scatter more than is stated.
+_OTHERS, _EACH, _MOST_OF_THEM = 8, 100, 0.75
+_TRIES = 10  # draws for each of the other plants, of which some are unstable
+_WIDEST = 6.0  # plants are drawn from the region as simulated, no wider than by this factor
 # Smaller factors are luck of the runs; a record without an estimate as a rule has the largest.
 _LUCK, _MOST = 1.05, 1e4
 _SETTLED = 0.5
@@ -37,24 +43,41 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     """
     if estimate.errors.size >= _PLENTY * estimate.theta.size or not estimate.search.converged:
         return estimate, []
-    factor = _scatter(model, u, step, free=estimate.start.free)
+    factor = _scatter(model, u, step, _RUNS, free=estimate.start.free)
     if factor <= _LUCK:
         return estimate, []
+    each = [factor]
+    for other in _possible(model, min(factor, _WIDEST) * estimate.covariance):
+        with suppress(ArithmeticError, RuntimeWarning):  # a plant whose numbers have no end
+            each.append(_scatter(other, u, step, _EACH, free=estimate.start.free))
+    factor = max(factor, float(np.quantile(each, _MOST_OF_THEM)))
     wider = replace(estimate, factor=estimate.factor / np.sqrt(factor))
     return wider, scattered(float(np.sqrt(factor)), _RUNS, none=factor >= _MOST)
 
 
-def _scatter(model: Model, u: Array, step: float, *, free: bool) -> float:
+def _possible(model: Model, covariance: Array) -> list[Model]:
+    """Return plants of this structure about a model, drawn with the covariance (k, k); none is unstable."""
+    rng, root, found = np.random.default_rng(1), np.linalg.cholesky(covariance), list[Model]()
+    for _ in range(_TRIES * _OTHERS):
+        drawn = model.at(model.theta + root @ rng.standard_normal(len(root)))
+        if drawn.flaw is None and drawn.radius < 1.0:
+            found.append(drawn)
+        if len(found) == _OTHERS:
+            break
+    return found
+
+
+def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> float:
     """Return the 95 % quantile of squared distances from the model over that of first-order theory."""
     rng = np.random.default_rng(0)
-    e = rng.standard_normal((_RUNS, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
     try:
         found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free)
     except np.linalg.LinAlgError:  # records as short as this determine no estimate
         return _MOST
     away = (found.theta - model.theta)[found.converged]
-    if len(away) < _SETTLED * _RUNS:
+    if len(away) < _SETTLED * runs:
         return _MOST
     squares = np.einsum("ri,rij,rj->r", away, found.information[found.converged], away)
     factor = float(np.quantile(squares, _LEVEL) / scipy.stats.chi2.ppf(_LEVEL, model.theta.size))

@@ -85,18 +85,9 @@ def test_where_files_are_gone_the_records_are_not_given_up(run, once, tmp_path):
         (once / name).unlink()
         for command in (("next", "c", record), ("next", "c"), ("status", "c")):
             code, _, err = run(*command)
-            assert (code, error in err, "put it back" in err, "idesign identify" in err) == (
-                2,
-                True,
-                True,
-                True,
-            )
-            assert "run the spec again" not in err
-            assert "solve SPEC" not in err
+            assert (code, error in err) == (2, True)
         (once / name).write_bytes(kept)
     assert run("next", "c", record, "--no-figures")[0] == 0
-    told = run("next", "nowhere", record)[2]
-    assert ("run-missing" in told, "idesign campaign SPEC" in told) == (True, True)
 
 
 def written(content):
@@ -143,9 +134,7 @@ def test_every_file_that_decides_is_known_by_its_digest(run, once, tmp_path):
             code, _, err = run("status", "c")
             if code:
                 told.add(path.name)
-                assert ("campaign-changed" in err, f"c/{path.name}" in err, "put it back" in err) == (
-                    True,
-                ) * 3
+                assert ("campaign-changed" in err, f"c/{path.name}" in err) == (True, True)
                 changed = (once / "result.json").read_bytes()
                 assert run("next", "c", record, "--no-figures")[0] == 2
                 assert (once / "result.json").read_bytes() == changed
