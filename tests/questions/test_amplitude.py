@@ -144,20 +144,6 @@ def test_a_record_has_no_more_moves_than_allowed(limit, most):
         assert ratio(u) == pytest.approx(signal["worst_ratio"], rel=1e-4)
 
 
-def test_the_cheapest_record_of_few_moves_is_as_high_as_it_must_be():
-    limits, accuracy = (
-        "{amplitude: 3, moves: 12}",
-        "{model_error: {relative: 0.4, band: [0.02, 2.5], alpha: 3}}",
-    )
-    least = solve(asked(objective="least_cost", cost="{input_power: 1}", limits=limits, accuracy=accuracy))
-    best = solve(asked(limits=limits, accuracy=accuracy))
-    u = least.signal[:, 0]
-    assert moves(u) <= 12
-    assert ratio(u, 0.4) == pytest.approx(1.0, abs=1e-5)
-    needed = 9.0 * best.result["signal"]["worst_ratio"] ** 2
-    assert np.mean(u**2) == pytest.approx(needed, rel=0.1)
-
-
 @pytest.mark.parametrize("returns", [False, True])
 def test_the_best_record_of_few_moves_is_found(returns):
     """Of 12 samples all records of two levels with at most four moves are looked through."""

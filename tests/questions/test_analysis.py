@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import analyse, load_spec, parse_spec, solve
-from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.outcome.text_formats import csv_text
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.spectrum import TabulatedSpectrum
+from tests.support.first_order_specs import PLANT
 
-BASE = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.01, alpha: 1}}
-spectrum: {given: GIVEN}
-"""
+BASE = PLANT + "accuracy: {model_error: {relative: 0.01, alpha: 1}}\nspectrum: {given: GIVEN}\n"
 
 
 def spec_of(given, base=BASE):
@@ -60,31 +55,6 @@ def test_closed_form_of_one_cosine():
     np.testing.assert_allclose([sd["b1"], sd["f1"]], np.sqrt(np.diag(np.linalg.inv(expected))), rtol=1e-9)
 
 
-def test_a_flat_table_is_white_noise(tmp_path):
-    table = tmp_path / "phi.csv"
-    rows = "\n".join(f"{w:.17g},1.7" for w in np.linspace(0.0, np.pi, 40))
-    table.write_text("frequency_rad_per_s,phi\n" + rows + "\n", encoding="utf-8")
-    tabulated = analyse(spec_of(f"{{type: table, file: {table}}}"))
-    white = analyse(spec_of(WHITE))
-    np.testing.assert_allclose(
-        tabulated.result["information"]["matrix"], white.result["information"]["matrix"], rtol=1e-9
-    )
-    assert tabulated.result["power"]["output"] == pytest.approx(white.result["power"]["output"])
-
-
-def test_a_signal_is_judged_by_its_own_samples(tmp_path):
-    """A long cosine gives the information of its line; the length is that of the record."""
-    t = np.arange(20000)
-    record = tmp_path / "u.csv"
-    record.write_text(
-        "time_s,u1\n" + "\n".join(f"{i},{0.75 * np.cos(0.15 * i):.17g}" for i in t) + "\n", encoding="utf-8"
-    )
-    outcome = analyse(spec_of(f"{{signal: {record}}}"))
-    assert outcome.result["samples"] == 20000
-    line = np.asarray(analyse(spec_of(COSINE)).result["information"]["matrix"])
-    np.testing.assert_allclose(outcome.result["information"]["matrix"], 40 * line, rtol=2e-3, atol=1.0)
-
-
 def test_solve_analyses_a_given_excitation():
     solved, analysed = solve(spec_of(COSINE)), analyse(spec_of(COSINE))
     deviations = [found.result["information"]["standard_deviation"] for found in (solved, analysed)]
@@ -115,23 +85,6 @@ def test_a_constant_excites_too_little():
     diagnostic = caught.value.diagnostics[0]
     assert (diagnostic.code, diagnostic.key) == ("not-exciting", "spectrum.given")
     assert diagnostic.location is not None
-
-
-BAD_TABLES = [
-    ("frequency,phi\n0.2,1\n0.1,1\n", "increase"),
-    ("frequency,phi\n0.2,1\n5.0,1\n", "Nyquist"),
-    ("frequency,phi\n0.2,-1\n0.5,1\n", "phi must be nonnegative"),
-    ("frequency,power\n0.3,1\n0.9,-0.2\n", "power must be nonnegative"),
-]
-
-
-@pytest.mark.parametrize(("content", "words"), BAD_TABLES, ids=[w for _, w in BAD_TABLES])
-def test_bad_tables(tmp_path, content, words):
-    table = tmp_path / "phi.csv"
-    table.write_text(content, encoding="utf-8")
-    with pytest.raises(DataError) as caught:
-        analyse(spec_of(f"{{type: table, file: {table}}}"))
-    assert words in caught.value.diagnostics[0].message
 
 
 def test_nothing_to_analyse():

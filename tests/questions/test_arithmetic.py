@@ -1,4 +1,4 @@
-"""A result follows the units it is asked in; what leaves the range of arithmetic is an error with its key."""
+"""What leaves the range of arithmetic, memory or time is an error with its key; units change nothing."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InaccurateError, InfeasibleError
+from inputdesign_cli import parse_spec, solve, validate
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions import finite, most_extreme, sound_arithmetic
+from tests.support.first_order_specs import PLANT as WHOLE
 from tests.support.outcomes import typed
 from tests.support.refusals import refusal
 
@@ -89,13 +90,6 @@ def test_no_result_holds_a_number_that_is_none(value):
         assert found.value.diagnostics[0].code == "beyond-precision"
 
 
-def test_a_record_too_short_to_meet_the_accuracy_says_so():
-    text = f"plant: {{B: [0, 0, 0, 1], F: [1, -0.7]}}\nnoise: {{variance: 1}}\n{BOUND}\n"
-    with pytest.raises(InfeasibleError, match="no record of 3 samples") as found:
-        solve(parse_spec(text + "experiment: {samples: 3}"))
-    assert found.value.diagnostics[0].code == "record-too-short"
-
-
 def test_nothing_asked_needs_nothing():
     text = "plant: {B: [0, 1], F: [1, -0.7]}\nnoise: {variance: 1}\naccuracy: {information: [[0, 0], [0, 0]]}"
     found = solve(parse_spec(text)).result
@@ -117,3 +111,61 @@ accuracy: {criterion: T}
     found = solve(parse_spec(text)).result
     assert min(found["power"]["input"]) >= 0.0
     assert sum(found["power"]["input"]) == pytest.approx(1.0, rel=1e-6)
+
+
+PLANT = WHOLE.replace("experiment: {samples: 500}\n", "")
+ASKED = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}\nspectrum: {type: fir, order: 3}\n"
+
+
+def refused(text):
+    diagnostic = refusal(lambda: validate(parse_spec(text)))
+    assert diagnostic.code == "too-large"
+    return diagnostic
+
+
+def test_samples_scale_information_and_need_no_room():
+    few, many = (solve(parse_spec(f"{PLANT}{ASKED}experiment: {{samples: {n}}}")) for n in (500, 10**15))
+    assert many.result["cost"] * 10**15 == pytest.approx(few.result["cost"] * 500, rel=1e-6)
+    assert "signal" in few.result
+    assert "signal" not in many.result
+    assert "signal.samples" in " ".join(many.result["notes"])
+
+
+def test_a_record_that_is_asked_for_has_to_fit():
+    found = refused(f"{PLANT}{ASKED}experiment: {{samples: {10**15}}}\nsignal: {{seed: 1}}")
+    assert found.key == "experiment.samples"
+    assert "signal.samples: 1000000" in found.hint
+
+
+def test_the_record_of_a_shortest_experiment_may_be_too_long():
+    text = (
+        f"{PLANT}{ASKED}objective: shortest_experiment\nlimits: {{input_power: 1.0e-9}}\nsignal: {{seed: 1}}"
+    )
+    found = solve(parse_spec(text)).result
+    assert found["samples"] > 10**9
+    assert "signal" not in found
+
+
+def test_a_model_of_many_parameters_is_refused_with_what_fits():
+    zeros = ", ".join(["0"] * 150)
+    found = refused(f"plant: {{B: [0, 1], A: [1, {zeros}, 0.5]}}\nnoise: {{variance: 1}}\n{ASKED}")
+    assert found.key == "plant"
+    assert "127 parameters fit" in found.hint
+
+
+@pytest.mark.slow
+def test_a_wide_plant_of_long_polynomials_is_refused():
+    row = ", ".join(["[0" + ", 1" * 100 + "]"] * 20)
+    assert (
+        refused(f"plant: {{B: [{', '.join([f'[{row}]'] * 20)}]}}\nnoise: {{variance: 1}}\n{ASKED}").key
+        == "plant"
+    )
+
+
+def test_the_solver_is_given_what_is_left(slow_solver):
+    text = f"{PLANT}{ASKED}experiment: {{samples: 500}}\n".replace("order: 3", "order: 20")
+    solve(parse_spec(text + "solver: {time_limit: 10000}"))
+    np.testing.assert_allclose(slow_solver, 10000.0 - 3.0 * np.arange(len(slow_solver)))
+    slow_solver.clear()
+    solve(parse_spec(text + "solver: {time_limit: 7}"))
+    assert slow_solver == pytest.approx([7.0, 4.0, 1.0])

@@ -10,14 +10,8 @@ from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.spectrum import FirBasis, PolynomialBasis
+from tests.support.matrix_specs import ARX
 
-ARX = """
-plant:
-  A: [[1, -0.7], [1, 0.4]]
-  B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]]
-noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
-experiment: {samples: 500}
-"""
 FIR = ARX + "accuracy: {criterion: D}\nlimits: {input_power: 8, spectrum: {max: 5, min: 3.6}}\n"
 GRID = np.linspace(0.0, np.pi, 801)
 

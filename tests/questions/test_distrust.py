@@ -1,6 +1,7 @@
 """Logs from which no model deserves trust, with the reason and what to do."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions import explore, identify
 from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.questions.exploration.build import _inside
 from inputdesign_cli.specification import parse_spec
 from tests.support.loops import LAWS, loop
 
@@ -28,30 +30,82 @@ def static_gain(theta):
     return theta.get("K", b / (1.0 + below))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("integral", [0.0, pytest.param(0.1, marks=pytest.mark.slow)], ids=["P", "PI"])
-def test_the_inverse_of_a_controller_is_no_plant(integral, tmp_path):
+RNG = np.random.default_rng
+
+
+def lags(u, plants, rng, noise=0.05):
+    """What first-order plants, a gain, a time constant and a whole delay for each input, make of u (n, r)."""
+    y = noise * rng.standard_normal(len(u))
+    for x, (gain, constant, delay) in zip(u.T, plants, strict=True):
+        pole = np.exp(-1.0 / constant)
+        y += scipy.signal.lfilter(np.append(np.zeros(delay + 1), gain * (1.0 - pole)), [1, -pole], x)
+    return y
+
+
+def in_control(integral):
     """Control without a reference: u = -C y + dither, and y moves by its own noise."""
-    rng = np.random.default_rng(1)
-    u, y, v, total = np.zeros(400), np.zeros(400), 0.0, 0.0
-    x = 0.0
+    rng = RNG(1)
+    u, y, v, total, x = np.zeros(400), np.zeros(400), 0.0, 0.0, 0.0
     for t in range(400):
         x = 0.8 * x + 0.2 * u[t - 1] if t else 0.0
         v = 0.9 * v + 0.3 * rng.standard_normal()
         y[t] = x + v
         total += integral * y[t]
         u[t] = -0.5 * y[t] - total + 0.05 * rng.standard_normal()
-    (told,) = [reason for reason in explore(stored(tmp_path / "log.csv", u, y)).reasons if "-1/C" in reason]
-    assert told.endswith("Move the reference of the loop, or add dither to the input.")
+    return u, y
+
+
+def together():
+    """The second input is twice the first."""
+    rng = RNG(2)
+    u = np.repeat(rng.choice([-1.0, 1.0], 30), 5)
+    y = scipy.signal.lfilter([0, 0.3], [1, -0.7], 3.0 * u) + 0.1 * rng.standard_normal(150)
+    return np.column_stack([u, 2.0 * u]), y
+
+
+def exchangeable():
+    """The second input is half of the first but for little."""
+    rng = RNG(0)
+    one = np.repeat(rng.choice([-1.0, 1.0], 40), 8)
+    u = np.column_stack([one, 0.5 * one + 0.003 * rng.standard_normal(320)])
+    return u, lags(u, [(1.0, 8.0, 3), (2.0, 15.0, 1)], rng)
+
+
+def a_share():
+    """u = -0.6 y explains y to the last digit: not for want of noise."""
+    y = scipy.signal.lfilter([1.0], [1.0, -0.66], RNG(0).standard_normal(200))  # 0.9 y - 0.4 * 0.6 y
+    return -0.6 * y, y
+
+
+def a_sinusoid():
+    """Amplitude and phase at 0.3 rad/sample are all that the record has, for three parameters."""
+    u = np.sin(0.3 * np.arange(1400.0))
+    y = scipy.signal.lfilter([0, 0, 0, 0.06], [1, -1.5, 0.56], u) + 0.05 * RNG(21).standard_normal(1400)
+    return u[600:], y[600:]
+
+
+LOGS = {
+    "of a P controller": (partial(in_control, 0.0), "like-inverse-controller"),
+    "of a PI controller": (partial(in_control, 0.1), "like-inverse-controller"),
+    # What moves the reference are eight steps; they look like spikes to a model of -1/C.
+    "of a reference that hardly moves": (partial(loop, 2, LAWS["PI"], steps=0.3), "input-only-answers"),
+    "of inputs that move together": (together, "excitation-too-simple"),
+    "of inputs that may be exchanged": (exchangeable, "excitation-too-simple"),
+    "of an input that is a share of the output": (a_share, "input-only-answers"),
+    "of a steady sinusoid": (a_sinusoid, "excitation-too-simple"),
+}
 
 
 @pytest.mark.slow
-def test_the_plant_of_a_loop_whose_reference_hardly_moves_is_not_the_inverse_of_its_controller(tmp_path):
-    """What moves the reference are eight steps; they look like spikes to a model of -1/C."""
-    u, y = loop(2, LAWS["PI"], steps=0.3)
-    found = explore(stored(tmp_path / "log.csv", u, y))
+@pytest.mark.parametrize("name", LOGS)
+def test_a_log_earns_no_trust_and_its_code_says_why(name, tmp_path):
+    made, code = LOGS[name]
+    u, y = made()
+    names = "u,y" if np.ndim(u) == 1 or u.shape[1] == 1 else "u1,u2,y"
+    found = explore(stored(tmp_path / "log.csv", u, y, names))
+    codes = {one.code: one.message for one in found.results.outcome.findings}
     assert found.reasons
-    assert "input-only-answers" in {one["code"] for one in found.results.result["findings"]}
+    assert codes[code].startswith("no trust: ")
 
 
 @pytest.mark.slow
@@ -71,36 +125,6 @@ def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
     theta, deviation = (found["identification"][key] for key in ("theta", "standard_deviation"))
     assert theta["a1"] == pytest.approx(-1.1, abs=4.0 * deviation["a1"])
     assert theta["b1"] == pytest.approx(0.2, abs=4.0 * deviation["b1"])
-
-
-@pytest.mark.slow
-def test_inputs_that_move_together_are_told_apart_by_nothing(tmp_path):
-    rng = np.random.default_rng(2)
-    u = np.repeat(rng.choice([-1.0, 1.0], 30), 5)
-    y = scipy.signal.lfilter([0, 0.3], [1, -0.7], 3.0 * u) + 0.1 * rng.standard_normal(150)
-    found = explore(stored(tmp_path / "log.csv", np.column_stack([u, 2.0 * u]), y, "u1,u2,y"))
-    assert any("the inputs move together" in reason for reason in found.reasons)
-
-
-def lags(u, plants, rng, noise=0.05):
-    """What first-order plants, a gain, a time constant and a whole delay for each input, make of u (n, r)."""
-    y = noise * rng.standard_normal(len(u))
-    for x, (gain, constant, delay) in zip(u.T, plants, strict=True):
-        pole = np.exp(-1.0 / constant)
-        y += scipy.signal.lfilter(np.append(np.zeros(delay + 1), gain * (1.0 - pole)), [1, -pole], x)
-    return y
-
-
-@pytest.mark.slow
-def test_inputs_between_which_what_they_do_may_be_exchanged_earn_no_trust(tmp_path):
-    """The second input is half of the first but for little."""
-    rng = np.random.default_rng(0)
-    one = np.repeat(rng.choice([-1.0, 1.0], 40), 8)
-    u = np.column_stack([one, 0.5 * one + 0.003 * rng.standard_normal(320)])
-    y = lags(u, [(1.0, 8.0, 3), (2.0, 15.0, 1)], rng)
-    found = explore(stored(tmp_path / "log.csv", u, y, "u1,u2,y"))
-    assert found.reasons
-    assert "excitation-too-simple" in {one["code"] for one in found.results.result["findings"]}
 
 
 @pytest.mark.slow
@@ -152,3 +176,37 @@ def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples)
     first, second = ([(u[part, None], y[part, None])] for part in (slice(0, at), slice(at, None)))
     found = explore_structure(first, second, physical=False)
     assert abs(found.best.orders.delays[0] - delay) <= 1
+
+
+@pytest.mark.slow
+def test_a_walk_that_hides_the_gain_earns_no_trust(tmp_path):
+    """The output wanders as a random walk; a lag of nine samples is 2.3 samples late, on a finer grid."""
+    rng, pole = RNG(1), np.exp(-1.0 / 20 / 9.0)
+    u = np.resize(np.repeat([0.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0], 35), 300)
+    fine = np.concatenate([np.zeros(46), np.repeat(u, 20)])[:6000]
+    y = 60.0 + 2.0 * scipy.signal.lfilter([0.0, 1.0 - pole], [1.0, -pole], fine)[::20]
+    y += 0.06 * np.cumsum(rng.standard_normal(300)) + 0.04 * rng.standard_normal(300)
+    found = explore(stored(tmp_path / "log.csv", np.c_[np.arange(300), 45.0 + u], y, "time,u,y"))
+    assert found.reasons or static_gain(found.results.result["identification"]["theta"]) == pytest.approx(
+        2.0, rel=0.1
+    )
+
+
+@pytest.mark.parametrize("radius", [1.0, 1.0 - 1e-9, 0.9995, 0.99, 0.5])
+def test_the_noise_of_the_next_experiment_fades_as_fast_as_the_record_tells(radius):
+    """Estimates may have poles of the noise on the circle: there, information has no end."""
+    D = np.real(np.poly([radius * np.exp(0.04j), radius * np.exp(-0.04j), 0.3])).tolist()
+    noise = {"C": [1.0, -0.2], "D": D, "variance": 2.0, "drift": False}
+    inside, drawn = _inside(noise, 200)
+    roots = np.abs(np.roots(inside["D"]))
+    assert roots.max() <= 1.0 - 1.0 / 200 + 1e-12
+    if radius < 0.995:
+        assert (inside, drawn) == (noise, [])
+    else:
+        assert drawn == ["D"]
+        assert {**inside, "D": D} == noise
+        # Frequencies stay; a root is moved by a two-hundredth at most.
+        np.testing.assert_allclose(np.angle(np.roots(inside["D"])[:2]), np.angle(np.roots(D)[:2]), atol=1e-9)
+        assert np.abs(np.sort(roots) - np.sort(np.abs(np.roots(D)))).max() <= 1.0 / 200 + 1e-12
+    several, _ = _inside({"C": [[1.0, -0.2], [1.0]], "D": [D, [1.0, -0.5]]}, 200)
+    assert several == {"C": [[1.0, -0.2], [1.0]], "D": [inside["D"], [1.0, -0.5]]}

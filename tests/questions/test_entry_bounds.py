@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
-from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.errors import SpecError
 
 SPECS = Path(__file__).parents[2] / "specs"
 WEIGHT = "{numerator: [1, 0.5]}"
@@ -70,13 +70,6 @@ def first_order_errors(result, w):
 W = np.linspace(0.0, np.pi, 2001)
 
 
-def test_a_flat_table_is_the_absolute_bound(tmp_path):
-    table = tmp_path / "r.csv"
-    table.write_text("frequency,r_adm\n0,0.1\n3.2,0.1\n", encoding="utf-8")
-    flat = arx(f"table: {table}").result
-    assert flat["cost"] == pytest.approx(arx("absolute: 0.1").result["cost"], rel=1e-6)
-
-
 def test_each_entry_has_its_own_column(tmp_path):
     table = tmp_path / "r.csv"
     rows = "0,0.4,0.1,0.2,0.1\n1,0.4,0.1,0.2,0.1\n3.2,0.1,0.1,0.2,0.1\n"
@@ -99,17 +92,6 @@ def test_a_weight_holds_for_every_entry():
     G = np.array([[np.abs(arx_entry(nominal, i, j, W)) for j in (1, 2)] for i in (1, 2)])
     ratio = np.abs(1 + 0.5 * np.exp(-1j * W)) * first_order_errors(result, W) / (0.05 * G)
     assert ratio.max() == pytest.approx(1.0, abs=1e-4)
-
-
-def test_a_weight_in_s_in_continuous_time():
-    """Weight 1 / (s + 1) and relative bound x equal the bound as a table of x |G| |1 + jw|."""
-    weight = "{continuous: {numerator: [1], denominator: [1, 1]}}"
-    result = solve(
-        parse_spec(CONTINUOUS + f"accuracy: {{model_error: {{absolute: 0.05, weight: {weight}}}}}\n")
-    ).result
-    heavier = solve(parse_spec(CONTINUOUS + "accuracy: {model_error: {absolute: 0.05}}\n")).result
-    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
-    assert result["cost"] < heavier["cost"]
 
 
 def largest_error(entry, result, theta, *, relative):
@@ -151,14 +133,3 @@ def test_what_is_no_fraction_is_refused():
     sampled = CONTINUOUS.replace("[1, 1]]]}}", "[1, 1]]]}, sample: zoh}").replace("[0, 2.0]", "[0, 3.0]")
     with pytest.raises(SpecError, match="linear in the parameters"):
         validate(parse_spec(sampled, overrides=["accuracy={}", error]))
-
-
-def test_tables_are_checked(tmp_path):
-    table = tmp_path / "r.csv"
-    table.write_text("frequency,r_adm_11,r_adm_12\n0,0.1,0.1\n3.2,0.1,0.1\n", encoding="utf-8")
-    override = f"accuracy.model_error={{table: {table}}}"
-    with pytest.raises(DataError, match="no column for r_adm_21"):
-        validate(load_spec(SPECS / "two_by_two_arx.yaml", [override]))
-    table.write_text("frequency,r_adm\n0,0.1\n2,0.1\n", encoding="utf-8")
-    with pytest.raises(DataError, match="the band is"):
-        validate(load_spec(SPECS / "two_by_two_arx.yaml", [override]))

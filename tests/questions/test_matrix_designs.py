@@ -1,16 +1,15 @@
-"""Specs with several channels and in continuous time: designs against plain programs."""
+"""Specs with several channels, in continuous time and in loops: against their files, alone, in any units."""
 
-import warnings
 from pathlib import Path
 
-import cvxpy as cp
 import numpy as np
 import pytest
 import scipy.integrate
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.questions.least_cost.build import build_convex
-from tests.support.matrix_specs import CONTINUOUS, changed
+from inputdesign_cli.specification import parse_spec
+from tests.support.matrix_specs import ARX, CONTINUOUS, IN_LOOP, changed
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -83,52 +82,6 @@ def test_limits_of_each_channel_bind():
     assert [entry["channel"] for entry in result["limits"]] == [1, 2]
 
 
-def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
-    """A plain program on a grid with the binding frequencies: block Toeplitz positivity by a Gram matrix."""
-    order = 2
-    spec = load_spec(SPECS / "two_by_two_arx.yaml", [f"spectrum.order={order}"])
-    result = solve(spec).result
-    assert result["objective"]["relative_gap"] <= 1e-5
-    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
-    task = build_convex(spec)
-    experiment = task.simulation.nominal.whitened(result["baseline"]["white"]["cost"])
-    basis, k = task.asked.question.basis, experiment.size
-    maps = basis.integrals(experiment.information_density, experiment.singularities)
-    power = basis.integrals(lambda w: experiment.power_density("input", w), experiment.singularities)
-    scale = result["baseline"]["white"]["cost"]
-    r, n = 2, 2 * (order + 1)
-    gram = cp.Variable((n, n), PSD=True)
-    blocks = [
-        sum(gram[r * (s + t) : r * (s + t + 1), r * s : r * (s + 1)] for s in range(order + 1 - t))
-        for t in range(order + 1)
-    ]
-    x = cp.hstack(
-        [
-            blocks[0][0, 0],
-            blocks[0][0, 1],
-            blocks[0][1, 1],
-            *(b[i, j] for b in blocks[1:] for i in range(r) for j in range(r)),
-        ]
-    )
-    M = experiment.baseline_information + cp.reshape(
-        scale * maps.reshape(len(maps), -1).T @ x, (k, k), order="C"
-    )
-    constraints = []
-    grid = np.concatenate(
-        [np.linspace(1e-9, np.pi, 5), np.array(result["model_error"]["active_frequencies"])]
-    )
-    for make in task.asked.question.requirements:
-        requirement = make(experiment)
-        for w in grid:
-            R = requirement.cut(float(w)).matrix
-            constraints.append(0.5 * (M + M.T) - R >> 0)
-    problem = cp.Problem(cp.Minimize(power @ x), constraints)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that it may be inaccurate; four digits are compared
-        problem.solve(solver=cp.CLARABEL)
-    assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
-
-
 @pytest.mark.first(3)
 @pytest.mark.parametrize(
     "overrides",
@@ -164,21 +117,119 @@ def test_weighted_variance_in_continuous_time_holds_for_every_entry():
     assert variance.max() == pytest.approx(0.01, rel=1e-4)
 
 
-@pytest.mark.parametrize("sampled", [False, True])
-def test_one_channel_in_continuous_time(sampled):
-    plant = "{continuous: {numerator: [2.0], denominator: [1, 0.6, 1]}" + (
-        ", sample: zoh}" if sampled else "}"
+GAINS = ARX + "accuracy: {model_error: {relative: 0.1}}\n"
+# u2 in thousandths: its coefficients are a thousand times smaller, its power 1e6 times larger.
+MILLI = "plant.B=[[[0, 1.0, 0.4], [0, -0.0005, 0.0003]], [[0, 0.6, 0.2], [0, 0.0012, -0.0005]]]"
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("spectrum", ["{type: fir, order: 4}", "{type: free}"])
+@pytest.mark.parametrize(
+    ("asked", "same"),
+    [
+        (["cost={input_power: [1, 1]}"], ["cost={input_power: [1, 1.0e-6]}"]),
+        (
+            ["limits={input_power: [2, 1]}", "objective=best_accuracy"],
+            ["limits={input_power: [2, 1.0e6]}", "objective=best_accuracy"],
+        ),
+        (
+            ["limits={input_power: [2, 1]}", "objective=shortest_experiment"],
+            ["limits={input_power: [2, 1.0e6]}", "objective=shortest_experiment"],
+        ),
+    ],
+)
+def test_the_units_of_the_inputs_do_not_matter(spectrum, asked, same):
+    found = []
+    for overrides in (asked, [*same, MILLI]):
+        spec = changed(GAINS, f"spectrum={spectrum}", *overrides)
+        found.append(build_convex(spec).designed().design)
+    assert found[1].result.objective == pytest.approx(found[0].result.objective, rel=1e-6)
+    bounds = [design.any_spectrum.certificate.bound for design in found]
+    assert bounds[1] == pytest.approx(bounds[0], rel=2e-5)
+
+
+def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
+    """Input 1 may have nearly any power: what it is worth is below the accuracy of a solver."""
+    spec = parse_spec(
+        "plant: {A: [[1, -0.35], [1, -0.3]], B: [[[0, 1.4, -0.7], [0, 0.3]], [[0, -0.2], [0, 1.4, -0.2]]]}\n"
+        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
+        "accuracy: {criterion: E}\nspectrum: {type: fir, order: 6}\n"
+        "limits: {input_power: [1000000.0, 2.5]}\n"
     )
-    text = f"""
-plant: {plant}
-noise: {{variance: 0.1}}
-experiment: {{samples: 400}}
-accuracy: {{criterion: D}}
-limits: {{input_power: 1}}
-spectrum: {{type: polynomial, order: 8, band: [0, 2.0]}}
+    result = build_convex(spec).designed().design.result
+    assert result.gap < 1e-6
+
+
+def test_a_spectrum_of_order_zero_is_white_in_time():
+    """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
+    costs = [
+        solve(
+            changed(GAINS, f"spectrum={{{kind}}}", "signal.candidates=1", "solver.any_spectrum=false")
+        ).result["cost"]
+        for kind in ("type: fir, order: 1", "type: fir, order: 0", "type: white")
+    ]
+    assert costs[0] < costs[1] < costs[2]
+
+
+@pytest.mark.slow
+def test_free_spectra_of_unequal_limits_are_proved():
+    """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
+    spec = changed(
+        "plant: {B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]],\n"
+        "  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1, -0.8]]]}\n"
+        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
+        "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
+        "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
+    )
+    assert build_convex(spec).designed().design.result.gap < 1e-6
+
+
+LOOP = f"""{IN_LOOP}
+cost: {{input_power: 1, output_power: 0.1, excitation_power: 0.01}}
+accuracy: {{standard_deviation: {{'a1[1]': 0.002, 'b1[1,2]': 0.01}}}}
+solver: {{any_spectrum: false}}
+signal: {{candidates: 1}}
 """
-    outcome = solve(changed(text))
-    assert outcome.result["information"]["parameters"] == ["b0", "a0", "a1"]
-    assert outcome.result["objective"]["relative_gap"] <= 1e-6
-    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
-    assert outcome.result["signal"]["efficiency"] > 0.9
+
+
+TWO_ALONE = """
+plant: {A: [[1, -1.1], [1, -0.6]], B: [[[0, 1, 0.4], [0]], [[0], [0, 0.7]]]}
+noise: {C: [[1, 0.3], [1]], variance: [[1, 0], [0, 0.5]]}
+experiment:
+  samples: 500
+  controller:
+    numerator: [[[0.3, -0.25], [0]], [[0], [0.3]]]
+    denominator: [[[1, -1], [1]], [[1], [1, -0.5]]]
+"""
+
+
+def in_loop(*overrides):
+    return parse_spec(LOOP, overrides=list(overrides))
+
+
+def test_decoupled_loops_cost_as_much_as_each_alone():
+    common = "cost: {input_power: 1, output_power: 0.2}\nspectrum: {type: fir, order: 5}\n"
+    common += "accuracy: {model_error: {relative: 0.05, alpha: 3}}\n"
+    both = parse_spec(TWO_ALONE + common)
+    alone = [
+        "plant: {A: [1, -1.1], B: [0, 1, 0.4]}\nnoise: {C: [1, 0.3], variance: 1}\n"
+        "experiment: {samples: 500, controller: {numerator: [0.3, -0.25], denominator: [1, -1]}}\n",
+        "plant: {A: [1, -0.6], B: [0, 0.7]}\nnoise: {variance: 0.5}\n"
+        "experiment: {samples: 500, controller: {numerator: [0.3], denominator: [1, -0.5]}}\n",
+    ]
+    design = build_convex(both).designed().design.result
+    costs = []
+    for text in alone:
+        spec = parse_spec(text + common)
+        costs.append(build_convex(spec).designed().design.result.objective)
+    assert design.gap < 1e-6
+    assert design.objective == pytest.approx(sum(costs), rel=2e-6)
+
+
+def test_the_units_of_the_loop_do_not_make_it_algebraic():
+    """u1 in millionths, u2 in millions: the gains differ by 1e12, the loop is the same and has its delay."""
+    scaled = in_loop(
+        "plant.B=[[[0, 1.0e+6, 0.4e+6], [0, -0.3e-6]], [[0, 0.4e+6], [0, 1.2e-6, -0.5e-6]]]",
+        "experiment.controller.numerator=[[[0.3e-6, -0.25e-6], [0]], [[0], [0.3e+6, -0.2e+6]]]",
+    )
+    build_convex(scaled)

@@ -70,18 +70,6 @@ def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
     assert found.tests.failed == ()
 
 
-def test_what_is_known_keeps_its_value():
-    plant = "{B: [0, 1.0, 0.5], F: [1, -0.7], known: [b2]}"
-    rest = "noise: {C: [1, 0.4], variance: 0.1, known: [c1]}\nexperiment: {samples: 300}\n"
-    model = build_model(parse_spec(f"plant: {plant}\n{rest}", design=False))
-    u, y = record_of(model)
-    found = identify(model, u, y, start=model.theta)
-    assert found.names == ("b1", "f1")
-    fitted = model.at(found.theta).coefficients
-    assert (fitted.B[0][0][2], fitted.C[0][1]) == (0.5, 0.4)
-    assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
-
-
 COLOURED = (
     "{noise: {C: [1, 0.5], D: [1, -0.3], variance: 0.04, known: %s}, experiment: {samples: 300}, plant: "
     "{parameters: {%s: 2.1, T: 18}, continuous: {gain: %s, time_constant: T}, sample: zoh, known: %s}}"
@@ -148,16 +136,6 @@ experiment: {samples: 300}
 
 
 @pytest.mark.slow
-def test_a_gain_whose_sign_an_expression_forbids_blames_no_columns(tmp_path):
-    """sqrt(p) of a plant with gain -1 ends at zero, where no input explains anything."""
-    np.savetxt(tmp_path / "log.csv", _held(-1.0, 4), delimiter=",", header="u,y", comments="")
-    found = estimated(parse_spec(_LAG % (1.0, "sqrt(p)"), design=False), tmp_path / "log.csv")
-    notes = " ".join(found.result["notes"])
-    assert "the search stopped at p = " in notes
-    assert "is not defined" in notes
-    assert "columns" not in notes
-
-
 def test_a_gain_behind_a_pole_of_its_expression_is_told_with_where_the_search_ended(tmp_path):
     """1/(p - 1) from p = 3 does not get to p = 0.5: p runs off to where it changes nothing."""
     np.savetxt(tmp_path / "log.csv", _held(-2.0, 4), delimiter=",", header="u,y", comments="")

@@ -49,23 +49,15 @@ def estimated(tmp_path_factory):
     return identify(parse_spec(LAG), folder / "a.csv")
 
 
-def test_a_prior_without_its_estimate_does_not_count(lag_record):
-    path = lag_record("a.csv", 300, 1, power=0.02)
-    spec = parse_spec(LAG)
-    plain = assess(spec, path).results.result
-    prior = yaml.safe_dump({"information": (1e9 * np.eye(2)).tolist()}, default_flow_style=True)
-    with_prior = assess(parse_spec(LAG, overrides=[f"experiment.prior={prior}"]), path).results.result
-    assert with_prior["assessment"]["requirements"] == plain["assessment"]["requirements"]
-    assert "prior-left-out" in codes(with_prior)
-
-
-def test_a_top_up_does_not_count_on_a_prior_that_no_verdict_can_rest_on(lag_record):
+def test_a_prior_without_its_estimate_counts_neither_for_the_verdict_nor_for_the_top_up(lag_record):
     overrides = ["accuracy.model_error.relative=0.05"]
     path = lag_record("a.csv", 300, 1, power=0.5)
     plain = assess(parse_spec(LAG, overrides=overrides), path)
     prior = yaml.safe_dump({"information": (1e3 * np.eye(2)).tolist()}, default_flow_style=True)
     stated = assess(parse_spec(LAG, overrides=[*overrides, f"experiment.prior={prior}"]), path)
     assert plain.verdict == stated.verdict == "missed"
+    requirements = [one.results.result["assessment"]["requirements"] for one in (plain, stated)]
+    assert requirements[0] == requirements[1]
     assert plain.results.resolved_spec == stated.results.resolved_spec
     written = yaml.safe_load(stated.results.resolved_spec)["experiment"]["prior"]
     assert written["parameters"] == pytest.approx(stated.results.result["identification"]["theta"])

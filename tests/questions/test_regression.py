@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, simulate, solve
-from inputdesign_cli.cli import main
 from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.monte_carlo.regression import run_experiments
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.signal.moments import delayed_regressors, free_regressors
+from tests.support.refusals import refusal
 
 SPECS = Path(__file__).parents[2] / "specs"
 FREE, FIR = SPECS / "regression.yaml", SPECS / "regression_fir.yaml"
@@ -174,18 +174,13 @@ def test_what_cannot_be_made_or_simulated(verb, override, code, part):
     assert error.value.diagnostics[0].code == code
 
 
-def test_an_infeasible_target_says_what_would_be_feasible(capsys, monkeypatch, tmp_path):
+def test_an_infeasible_target_says_what_would_be_feasible():
     """Example 4 at alpha = 2: |b| is 1 at least, so a target of 4 or an alpha of 1 is the border."""
-    arguments = ["solve", str(FIR), "-o", str(tmp_path / "run"), "--set", f"{E}.neglected=[2]"]
-    monkeypatch.setattr("sys.argv", ["idesign", *arguments, "--set", f"{E}.neglected_norm=2"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 3
-    text = capsys.readouterr().err
-    for part in ("target-out-of-reach", "a target above 4 can be met", "neglected_norm below 1", "proved"):
-        assert part in text
-    assert not (tmp_path / "run").exists()
+    two = f"{E}.neglected=[2]"
+    told = refusal(lambda: solve(load_spec(FIR, [two, f"{E}.neglected_norm=2"])), InfeasibleError)
+    assert told.code == "target-out-of-reach"
+    text = f"{told.message} {told.hint}"
+    assert all(part in text for part in ("above 4", "neglected_norm below 1", "proved"))
     with pytest.raises(InfeasibleError):
-        solve(load_spec(FIR, [f"{E}.neglected=[2]", f"{E}.neglected_norm=1"]))
-    feasible = result(FIR, f"{E}.neglected=[2]", f"{E}.neglected_norm=2", f"{E}.target=4.04")
-    assert feasible["status"] == "optimal"
+        solve(load_spec(FIR, [two, f"{E}.neglected_norm=1"]))
+    assert result(FIR, two, f"{E}.neglected_norm=2", f"{E}.target=4.04")["status"] == "optimal"

@@ -2,19 +2,17 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
+from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.outcome import Outcome, read_plain
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.frequency_response.solve import audit_response
 
-SPECS = Path(__file__).parents[2] / "specs"
 SINGLE = """
 plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
 noise: {D: [1, -0.9], variance: 0.01}
@@ -220,7 +218,3 @@ def test_a_record_that_is_wrong_does_not_pass(audited):
     columns["u1"] = columns["u1"] * np.where(np.arange(columns["u1"].size) < 500, 1.0, 1.0001)
     with pytest.raises(InaccurateError):
         audit_response(terms, plan, replace(results, tables={**results.tables, "signal": Table(columns)}))
-
-
-def test_the_shipped_spec_is_solved():
-    assert solve(load_spec(SPECS / "frequency_response.yaml")).result["status"] == "optimal"

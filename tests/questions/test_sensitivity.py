@@ -11,18 +11,9 @@ from inputdesign_cli.accuracy import Absolute, Sensitivity
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
+from tests.support.matrix_specs import IN_LOOP
 
-SPEC = """
-plant:
-  A: [[1, -1.1], [1, -0.6]]
-  B: [[[0, 1.0, 0.4], [0, -0.3]], [[0, 0.4], [0, 1.2, -0.5]]]
-noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
-experiment:
-  samples: 500
-  controller: {numerator: [[[0.3, -0.25], [0]], [[0], [0.3, -0.2]]], denominator: [1, -1]}
-accuracy: {model_error: {sensitivity: {max_db: 7}}}
-spectrum: {type: fir, order: 2}
-"""
+SPEC = IN_LOOP + "accuracy: {model_error: {sensitivity: {max_db: 7}}}\n"
 OPEN = """
 plant: {A: [1, -0.5], B: [[[0, 1.0], [0, 0.4]], [[0, -0.3], [0, 0.8]]]}
 noise: {variance: [[1.0, 0.3], [0.3, 0.5]]}

@@ -12,15 +12,9 @@ from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
+from tests.support.first_order_specs import ERROR, PLANT
 
-BASE = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-accuracy:
-  model_error: {relative: 0.01, alpha: 2.45}
-spectrum: {type: fir, order: 5}
-"""
+BASE = f"{PLANT}{ERROR}spectrum: {{type: fir, order: 5}}\n"
 
 
 def samples_in(hint):
@@ -170,24 +164,6 @@ def test_the_share_of_each_limit_that_single_samples_take():
 
 
 TWO = "specs/two_by_two_arx.yaml"
-
-
-@pytest.mark.slow
-def test_limits_on_each_channel():
-    changes = [
-        "spectrum.order=4",
-        "limits.amplitude={input: [14, 35], output: [70, 70]}",
-        "signal.offset=[1, 2]",
-    ]
-    outcome = solve(load_spec(TWO, [*changes, "signal.candidates=2"]))
-    signal = outcome.result["signal"]
-    assert signal["worst_ratio"] == pytest.approx(1.0, abs=1e-8)
-    assert np.all(np.array(signal["input_peak"]) <= [14, 35])
-    assert np.all(np.array(signal["output_peak"]) <= 70)
-    assert signal["phases"] == "optimised"
-    record = outcome.tables["signal"].columns
-    np.testing.assert_allclose(np.abs(record["u1"] - 1).max(), signal["peak"][0])
-    assert outcome.curves["signal"].limits["u2"] == (-33, 37)
 
 
 def test_what_is_applied_to_several_inputs(tmp_path):

@@ -50,13 +50,13 @@ def of_design(*asked):
     return simulated(*asked).result["simulation"]["inputs"]["design"]
 
 
-def within_wishart(simulation, slack=0.0):
+def within_wishart(simulation):
     low, high = simulation["wishart_range"]
     for entry in simulation["inputs"].values():
         eigenvalues = np.array(entry["covariance_eigenvalues"])
-        assert (1 - slack) * low < eigenvalues.min()
-        assert eigenvalues.max() < (1 + slack) * high
-        assert entry["not_converged"] <= (0.01 * simulation["runs"] if slack else 0)
+        assert low < eigenvalues.min()
+        assert eigenvalues.max() < high
+        assert entry["not_converged"] == 0
 
 
 @pytest.fixture(scope="module")
@@ -79,16 +79,6 @@ def test_the_flexible_transmission_keeps_its_promise_on_its_model_only(flexible)
     simulation, designed = flexible["simulation"]["inputs"], flexible["power"]["excitation"][0]
     for name in ("design", "white"):
         assert simulation[name]["power"]["excitation"][0] == pytest.approx(designed, rel=1e-12)
-
-
-def test_covariances_of_one_channel_lie_in_the_range_of_the_wishart_distribution():
-    result = simulated(FIRST, "simulation={runs: 150, seed: 2, compare: [white]}", "spectrum.order=5").result
-    # Output power 1e3 times that of the noise: the linear theory holds, up to a few per cent of transients.
-    within_wishart(result["simulation"], 0.05)
-    inputs = result["simulation"]["inputs"]
-    assert inputs["white"]["within_r_adm"] < 0.9 < inputs["design"]["within_r_adm"]
-    assert inputs["white_that_suffices"]["within_r_adm"] > 0.9
-    assert "on_design_model" not in inputs["design"]
 
 
 def test_every_input_to_compare_with_has_the_power_of_the_design():
@@ -150,14 +140,6 @@ def test_what_is_known_before_does_not_grow_with_the_record(region):
     # bound.csv stays the statement of the design, for its own length.
     (bound,) = designed.curves["bound"].panels
     assert np.interp(1.0, bound.frequency, bound.r_u) > 1.5 * np.interp(1.0, *found[1])
-
-
-@pytest.mark.slow
-def test_the_shipped_plant_in_s():
-    """r_u of the figure is that of bound.csv for one sample over the root of the length of the record."""
-    found = simulated("specs/two_by_two.yaml", "signal.samples=1024", "simulation.runs=2")
-    for panel, bound in zip(found.curves["errors_design"].panels, found.curves["bound"].panels, strict=True):
-        np.testing.assert_allclose(panel.r_u, bound.r_u / np.sqrt(1024), rtol=1e-9)
 
 
 @pytest.fixture(scope="module")
@@ -350,16 +332,6 @@ def test_seeds_repeat_wherever_runs_are_computed(spec, overrides):
     here, there = simulate(asked), simulate(asked, executor=Elsewhere())
     means = [one.result["simulation"]["inputs"]["design"]["mean_estimate"] for one in (here, there)]
     assert means[0] == means[1]
-
-
-@pytest.mark.slow
-def test_the_design_reaches_the_cramer_rao_bound():
-    length = ["experiment.samples=2000", "signal.samples=2000"]
-    simulation = simulated(ARX, "simulation={runs: 500, seed: 4}", *length).result["simulation"]
-    within_wishart(simulation)
-    ratios = np.array(list(simulation["inputs"]["design"]["rms_over_theory"].values()))
-    # The error of one ratio of 500 runs is 3.2 %; the rms over ten parameters is within 5 %.
-    assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.slow

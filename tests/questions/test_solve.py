@@ -11,16 +11,11 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.questions import execute
 from inputdesign_cli.questions.least_cost.sought import GridMethod
+from tests.support.first_order_specs import ERROR, PLANT
+from tests.support.refusals import refusals
 
 ROOT = Path(__file__).parent.parent.parent
-SMALL = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
-spectrum: {type: fir, order: 3}
-signal: {seed: 1}
-"""
+SMALL = f"{PLANT}{ERROR}spectrum: {{type: fir, order: 3}}\nsignal: {{seed: 1}}\n"
 
 
 def spec_of(text, **changes):
@@ -140,29 +135,61 @@ def test_the_bound_over_every_spectrum_can_be_left_out(kind):
     assert any("--fast" in note for note in fast.get("notes", [])) is not free
 
 
+# Where a spec names a table, which is TABLE.
+TABLED = {
+    "r_adm": (SMALL.replace("relative: 0.01", "table: TABLE"), []),
+    "phi": (SMALL.replace("{type: fir, order: 3}", "{given: {type: table, file: TABLE}}"), ["signal=null"]),
+    "level": (SMALL + "limits: {spectrum: {max: {table: TABLE}}}\n", []),
+    "entries": (
+        (ROOT / "specs" / "two_by_two_arx.yaml").read_text(),
+        ["accuracy.model_error={table: TABLE}"],
+    ),
+    "matrix": (
+        (ROOT / "specs" / "two_by_two_given.yaml").read_text(),
+        ["spectrum={given: {type: table, file: TABLE}}"],
+    ),
+}
 TABLES = [
-    ("frequency_rad_per_s,r_adm\n0.1,1\n1,1\n", "bad-table", "covers 0.1 to 1"),
-    ("frequency,r_adm\n0,1\n3.2,-1\n", "bad-table", "row 3"),
-    ("frequency,r_adm\n3.2,1\n0,1\n", "bad-table", "increase"),
-    ("frequency,bound\n0,1\n3.2,1\n", "data-missing-column", "r_adm"),
-    ("frequency,r_adm\n0,1\n3.2,x\n", "data-not-a-number", "'x'"),
-    ("frequency,r_adm\n", "data-unreadable", "no rows"),
-    (None, "data-unreadable", "does not exist"),
+    ("r_adm", "frequency_rad_per_s,r_adm\n0.1,1\n1,1\n", "bad-table", "covers 0.1 to 1"),
+    ("r_adm", "frequency,r_adm\n0,1\n3.2,-1\n", "bad-table", "row 3"),
+    ("r_adm", "frequency,r_adm\n3.2,1\n0,1\n", "bad-table", "increase"),
+    ("r_adm", "frequency,bound\n0,1\n3.2,1\n", "data-missing-column", "r_adm"),
+    ("r_adm", "frequency,r_adm\n0,1\n3.2,x\n", "data-not-a-number", "'x'"),
+    ("r_adm", "frequency,r_adm\n", "data-unreadable", "no rows"),
+    ("r_adm", None, "data-unreadable", "does not exist"),
+    ("phi", "frequency,phi\n0.2,1\n0.1,1\n", "bad-table", "increase"),
+    ("phi", "frequency,phi\n0.2,1\n5.0,1\n", "bad-table", "Nyquist"),
+    ("phi", "frequency,phi\n0.2,-1\n0.5,1\n", "bad-table", "phi must be nonnegative"),
+    ("phi", "frequency,power\n0.3,1\n0.9,-0.2\n", "bad-table", "power must be nonnegative"),
+    ("level", "frequency,phi\n1,1\n0,1\n", "bad-table", "increase"),
+    (
+        "entries",
+        "frequency,r_adm_11,r_adm_12\n0,1,1\n3.2,1,1\n",
+        "data-missing-column",
+        "no column for r_adm_21",
+    ),
+    ("entries", "frequency,r_adm\n0,0.1\n2,0.1\n", "bad-table", "the band is"),
+    (
+        "matrix",
+        "frequency,phi_11,phi_12_re,phi_12_im,phi_22\n0,1,2,0,1\n1,1,2,0,1\n",
+        "bad-table",
+        "positive semidefinite",
+    ),
 ]
 
 
-@pytest.mark.parametrize(
-    ("content", "code", "words"), TABLES, ids=[code + str(i) for i, (_, code, _) in enumerate(TABLES)]
-)
-def test_bad_tables(tmp_path, content, code, words):
+@pytest.mark.parametrize(("of", "content", "code", "words"), TABLES)
+def test_bad_tables(tmp_path, of, content, code, words):
     table = tmp_path / "r.csv"
     if content is not None:
         table.write_text(content, encoding="utf-8")
-    spec = parse_spec(SMALL.replace("relative: 0.01", f"table: {table}"))
-    with pytest.raises(DataError) as error:
-        validate(spec)
-    assert error.value.diagnostics[0].code == code
-    assert words in error.value.diagnostics[0].message
+    text, changes = TABLED[of]
+    spec = parse_spec(
+        text.replace("TABLE", str(table)), overrides=[one.replace("TABLE", str(table)) for one in changes]
+    )
+    found = refusals(lambda: validate(spec), DataError)[0]
+    assert found.code == code
+    assert words in found.message
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "specs").glob("*.yaml")), ids=lambda p: p.stem)

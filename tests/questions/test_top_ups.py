@@ -105,6 +105,7 @@ def test_each_input_has_its_level(levels, point, means, expected):
     assert {one.code: one.figures for one in found} == expected
 
 
+@pytest.mark.slow
 def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):
     """With the second record alone it judges what the first spec judges with both."""
     monkeypatch.chdir(tmp_path)

@@ -12,13 +12,8 @@ from inputdesign_cli.compute.time_limit import stoppable, watching
 from inputdesign_cli.errors import InaccurateError
 from tests.fuzzing.judge import written
 from tests.fuzzing.textbook import findings
+from tests.support.first_order_specs import ERROR as BOUND, PLANT
 
-PLANT = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-"""
-BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}\n"
 SPECS = {
     "cost": BOUND + "spectrum: {type: fir, order: 20}\n",
     "sinusoids": BOUND + "spectrum: {type: free}\n",

@@ -1,4 +1,4 @@
-"""Limits that are too tight: what they do buy, and what a record within them reaches."""
+"""Limits that are too tight: what is said of them is true, and what a record within them reaches."""
 
 import re
 
@@ -7,16 +7,11 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
+from tests.support.first_order_specs import ERROR, FIR, PLANT, complaint_of, run
 from tests.support.refusals import refusal, refusals
 
-FIRST = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-spectrum: {type: fir, order: 8}
-signal: {candidates: 1}
-"""
-ERROR = "accuracy: {{model_error: {{relative: {}, alpha: 2.45}}}}\n"
+FIRST = f"{PLANT}spectrum: {{type: fir, order: 8}}\nsignal: {{candidates: 1}}\n"
+WITHIN = "accuracy: {{model_error: {{relative: {}, alpha: 2.45}}}}\n"
 TWO = """
 plant:
   A: [1, -0.7]
@@ -62,9 +57,9 @@ accuracy: {standard_deviation: {b1: 0.01}}
 @pytest.mark.parametrize(
     ("head", "accuracy", "fraction"),
     [
-        (FIRST + "limits: {input_power: 0.2}\n", ERROR, 0.01),
-        (FIRST + "limits: {input_power: 0.2, output_power: {min: 20, max: 45}}\n", ERROR, 0.01),
-        (TWO, ERROR, 0.1),
+        (FIRST + "limits: {input_power: 0.2}\n", WITHIN, 0.01),
+        (FIRST + "limits: {input_power: 0.2, output_power: {min: 20, max: 45}}\n", WITHIN, 0.01),
+        (TWO, WITHIN, 0.1),
         (TWO, "accuracy: {{weighted_variance: {{max: {}}}}}\n", 0.0004),
     ],
     ids=["power", "floor", "channels", "variance"],
@@ -84,11 +79,11 @@ def test_what_is_bought_can_be_had_and_no_more(head, accuracy, fraction):
 
 
 def test_an_experiment_that_is_too_short_says_what_it_buys():
-    text = FIRST + "objective: shortest_experiment\n" + ERROR.format(0.01)
+    text = FIRST + "objective: shortest_experiment\n" + WITHIN.format(0.01)
     limits = "limits: {{input_power: 0.2, samples: {}}}\n"
     details = refused(text + limits.format(400), "too-long").details
     loosened = (
-        FIRST + "objective: shortest_experiment\n" + ERROR.format(0.01 * details["factor"] * (1 + 1e-6))
+        FIRST + "objective: shortest_experiment\n" + WITHIN.format(0.01 * details["factor"] * (1 + 1e-6))
     )
     assert solve(parse_spec(loosened + limits.format(400))).result["samples"] == 400
 
@@ -105,7 +100,7 @@ def test_an_experiment_that_is_too_short_says_what_it_buys():
 def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
     """Several limits that are exhausted together: who raises each as told has a spectrum, no less does."""
     text = TWO.replace("input_power: [1.0, 0.02]", "LIMITS").replace("signal: {candidates: 1}\n", "")
-    text += ERROR.format(0.3)
+    text += WITHIN.format(0.3)
     message = refused(text.replace("LIMITS", limits.format(*keys.values()))).message
 
     def raised(share):
@@ -207,19 +202,107 @@ def test_two_levels_come_near_to_what_is_proved_of_every_record():
 
 
 def test_a_record_that_falls_short_of_the_best_accuracy_is_not_called_cheap():
-    spec = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 200}
-accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
-objective: best_accuracy
-spectrum: {type: fir, order: 4}
-limits: {amplitude: 0.4}
-signal: {type: multisine, candidates: 1}
-"""
+    spec = (
+        PLANT.replace("500", "200")
+        + WITHIN.format(0.01)
+        + "objective: best_accuracy\nlimits: {amplitude: 0.4}\n"
+    )
+    spec += "spectrum: {type: fir, order: 4}\nsignal: {type: multisine, candidates: 1}\n"
     outcome = solve(parse_spec(spec))
     result = outcome.result
     more = result["signal"]["worst_ratio"] / result["objective"]["value"] - 1
     assert more > 0.01
     (found,) = [one for one in result["findings"] if one["code"] == "record-less-accurate"]
     assert found["figures"]["reached"] / found["figures"]["designed"] - 1 == pytest.approx(more)
+
+
+LOOP = """
+plant: {A: [1, -0.5], B: [0, 1.0, 0.3]}
+noise: {C: [1, 0.4], variance: 0.2}
+experiment: {samples: 100, controller: {numerator: [0.05], denominator: [1, -0.2]}}
+accuracy: {model_error: {relative: 0.2}}
+cost: {output_power: 1}
+spectrum: {type: multisine, lines: 10}
+"""
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize(
+    ("text", "power", "level", "relative"),
+    [
+        (PLANT + ERROR + FIR, "input_power", 0.2, 0.01),
+        (LOOP, "output_power", 0.5, 0.2),
+        (
+            LOOP.replace("{type: multisine, lines: 10}", "{type: white}\nsignal: {type: binary}"),
+            "output_power",
+            0.3,
+            0.2,
+        ),
+    ],
+    ids=["noise", "sinusoids in a loop", "two levels in a loop"],
+)
+def test_infeasible_limits_are_explained_and_what_is_promised_is_true(text, power, level, relative):
+    """Who raises the limit as told, or admits the errors that a spectrum can keep, succeeds."""
+    least = solve(parse_spec(text)).result["power"][power.split("_")[0]][0]
+    limited = f"{text}limits: {{{power}: %r}}\n"
+    told = refusal(lambda: solve(parse_spec(limited % level)), InfeasibleError)
+    assert (told.code, told.key) == ("infeasible", f"limits.{power}")
+    assert told.location is not None
+    needed = float(told.message.split(">= ")[1].split(",")[0])
+    assert least * (1 - 1e-6) <= needed <= least * (1 + 1e-4)
+    factor = float(told.hint.split("errors ")[1].split(" times")[0])
+    assert factor == pytest.approx(np.sqrt(least / level), rel=1e-3) or "controller" in text
+    found = solve(parse_spec(limited % (needed * (1 + 1e-6)))).result
+    assert found["status"] == "optimal"
+    wider = [f"accuracy.model_error.relative={relative * factor * (1 + 1e-6):.12g}"]
+    assert solve(parse_spec(limited % level, overrides=wider)).result["status"] == "optimal"
+
+
+def test_infeasible_without_a_way_out_by_one_limit():
+    limits = "limits: {input_power: 0.01, output_power: 0.1}\n"
+    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
+    assert "no change of a single limit is enough" in diagnostic.message
+    times = float(diagnostic.message.split("have to be ")[1].split(" times")[0])
+    # What the message promises is true, and no overstatement.
+    raised = (
+        f"limits: {{input_power: {0.01 * times * (1 + 1e-4)}, output_power: {0.1 * times * (1 + 1e-4)}}}\n"
+    )
+    assert run(ERROR + FIR + raised)["status"] == "optimal"
+    lowered = (
+        f"limits: {{input_power: {0.01 * times * (1 - 1e-3)}, output_power: {0.1 * times * (1 - 1e-3)}}}\n"
+    )
+    assert complaint_of(ERROR + FIR + lowered, InfeasibleError).code == "infeasible"
+
+
+def test_a_density_that_is_too_low_is_told_its_factor():
+    # A flat spectrum needs 1.705495; below that level no spectrum has more at any frequency.
+    diagnostic = complaint_of(ERROR + FIR + "limits: {spectrum: 1.5}\n", InfeasibleError)
+    times = float(diagnostic.message.split("limits.spectrum would have to be ")[1].split(" times")[0])
+    assert times == pytest.approx(1.705495 / 1.5, rel=1e-4)
+
+
+def test_contradictory_limits():
+    limits = "limits: {input_power: 0.3, output_power: {min: 300}}\n"
+    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
+    assert diagnostic.code == "contradictory-limits"
+    assert "output_power" in diagnostic.message
+    assert "input_power" in diagnostic.message
+
+
+def test_too_long():
+    limits = "objective: shortest_experiment\nlimits: {input_power: 0.2, samples: 400}\n"
+    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
+    assert (diagnostic.code, diagnostic.key) == ("too-long", "limits.samples")
+
+
+def test_what_only_noise_tells_is_out_of_reach_of_any_power():
+    """Of y = G u + (1 - 0.5 q^-1) e the variance of c1 is (1 - 0.5^2) / N, whatever u is."""
+    spec = parse_spec(
+        "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.5], variance: 1.0}\n"
+        "experiment: {samples: 500}\naccuracy: {standard_deviation: {c1: 0.01}}\n"
+        "spectrum: {type: fir, order: 3}\n"
+    )
+    diagnostic = refusal(lambda: solve(spec), InfeasibleError)
+    ratio = np.sqrt((1 - 0.25) / 500) / 0.01
+    assert f"{ratio:.6g} times what is asked" in diagnostic.message
+    assert f"{ratio**2:.4g} times as many samples" in diagnostic.hint

@@ -1,7 +1,24 @@
-"""A spec with two inputs and two outputs in continuous time, and others made of it."""
+"""Specs with two inputs and two outputs, in open and closed loop and in continuous time."""
 
 from inputdesign_cli.specification import parse_spec
 
+ARX = """
+plant:
+  A: [[1, -0.7], [1, 0.4]]
+  B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]]
+noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
+experiment: {samples: 500}
+"""
+IN_LOOP = """
+plant:
+  A: [[1, -1.1], [1, -0.6]]
+  B: [[[0, 1.0, 0.4], [0, -0.3]], [[0, 0.4], [0, 1.2, -0.5]]]
+noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
+experiment:
+  samples: 500
+  controller: {numerator: [[[0.3, -0.25], [0]], [[0], [0.3, -0.2]]], denominator: [1, -1]}
+spectrum: {type: fir, order: 2}
+"""
 CONTINUOUS = """
 plant:
   continuous:

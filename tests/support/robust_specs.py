@@ -5,14 +5,13 @@ import pytest
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions import build_task
+from tests.support.first_order_specs import PLANT
+from tests.support.matrix_specs import ARX
 
-FIRST = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.02}}
-spectrum: {type: fir, order: 6}
-signal: {candidates: 1, seed: 1}
+FIRST = f"""{PLANT}
+accuracy: {{model_error: {{relative: 0.02}}}}
+spectrum: {{type: fir, order: 6}}
+signal: {{candidates: 1, seed: 1}}
 """
 LOOP = """
 plant: {B: [0, 0.5], F: [1, -0.8]}
@@ -23,14 +22,11 @@ accuracy: {model_error: {relative: 0.1}}
 spectrum: {type: fir, order: 6}
 signal: {candidates: 1, seed: 1}
 """
-TWO = """
-plant: {A: [[1, -0.7], [1, 0.4]], B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]]}
-noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.2}}
-spectrum: {type: fir, order: 3}
-signal: {candidates: 1, seed: 1}
-solver: {any_spectrum_tolerance: 0.009}
+TWO = f"""{ARX}
+accuracy: {{model_error: {{relative: 0.2}}}}
+spectrum: {{type: fir, order: 3}}
+signal: {{candidates: 1, seed: 1}}
+solver: {{any_spectrum_tolerance: 0.009}}
 """
 PROCESS = """
 sample_time: 1
