@@ -6,7 +6,7 @@ import scipy.optimize
 import scipy.signal
 import scipy.stats
 
-from inputdesign_cli import analyse, parse_spec, solve
+from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.questions import build_task
@@ -20,6 +20,7 @@ accuracy: {model_error: {%s, confidence: CONFIDENCE}}
 %s
 """
 FIR = BASE % ("B: [1.0, -0.4, 0.2]", 1, 400, "absolute: 0.1", "spectrum: {type: fir, order: 4}")
+GAIN = BASE % ("B: [1.0]", 1, 200, "absolute: 0.1", "signal: {type: binary}")
 POLE = BASE % ("B: [0, 1], F: [1, -0.9]", 1, 60, "relative: 0.3, band: [0.01, 1]", "spectrum: {type: white}")
 TWO = BASE % (
     "B: [[[0.5], [0.2]], [[0.1], [0.8]]]",
@@ -101,6 +102,16 @@ def test_it_says_when_there_is_none():
 
 
 @pytest.mark.slow
+def test_estimates_that_are_normal_at_every_length_need_no_correction():
+    """A gain and a signal of two levels: least squares is normal with variance 1 / (N p) whatever N."""
+    told = solve(spec(GAIN, "{exact: 0.95, draws: 1000, runs: 1000}", "spectrum={type: white}")).result
+    error = told["model_error"]
+    assert error["confidence"]["excess"] == pytest.approx(1.0, abs=0.13)  # 3 standard errors
+    assert error["alpha"] == pytest.approx(scipy.stats.norm.ppf(0.975), rel=0.1)
+    assert error["confidence"]["kept"] == pytest.approx(0.95, abs=0.025)
+
+
+@pytest.mark.slow
 def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
     """The records are simulated and fitted plainly here: a pole, by least squares of the simulation error."""
     runs = "{exact: 0.9, draws: 1000, runs: 1000}"
@@ -151,6 +162,39 @@ def test_experiments_without_estimates_keep_no_confidence():
     assert calibration.corrected(errors, M, lost).excess == np.inf
     lost[80:95] = errors[0].experiment.model.theta + 1.0
     assert np.isfinite(calibration.corrected(errors, M, lost).excess)
+
+
+PLANTS = {
+    "first order": ("{B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.9], variance: 1.0}", "relative: 0.01"),
+    "resonance": (
+        "{B: [0, 1, 0.5], F: [1, -1.601, 0.9409]}\nnoise: {variance: 1.0}",
+        "relative: 0.1, band: [0.01, 1.5]",
+    ),
+    "armax": (
+        "{A: [1, -1.5, 0.7], B: [0, 1, 0.5]}\nnoise: {C: [1, -1, 0.2], variance: 1.0}",
+        "relative: 0.1, band: [0.01, 1.5]",
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*PLANTS, "flexible transmission"])
+def test_runs_keep_the_bound_with_the_probability(name):
+    study = {"simulation.runs": 1000, "simulation.seed": 3}
+    if name in PLANTS:
+        plant, error = PLANTS[name]
+        asked = parse_spec(
+            f"plant: {plant}\naccuracy: {{model_error: {{{error}, confidence: {{exact: 0.95}}}}}}\n"
+            "experiment: {samples: 500}\nspectrum: {type: fir, order: 20}\n"
+        )
+    else:
+        asked = load_spec("specs/flexible_transmission.yaml").with_(
+            **{"accuracy.model_error.alpha": None, "accuracy.model_error.confidence": {"exact": 0.95}}
+        )
+        study["simulation.plant"] = None  # as the design takes it
+        study["simulation.noise"] = None
+    kept = simulate(asked.with_(**study)).result["simulation"]["inputs"]["design"]["within_r_adm"]
+    assert kept == pytest.approx(0.95, abs=0.015)
 
 
 @pytest.mark.slow

@@ -219,6 +219,15 @@ def test_longer_windows_know_more() -> None:
     assert face.share == pytest.approx(longer, rel=1e-4)
 
 
+def output_error_plant(rng):
+    """A random plant with one or two poles of moduli up to 0.9."""
+    order = int(rng.integers(1, 3))
+    poles = rng.uniform(0.2, 0.9, order) * rng.choice([-1.0, 1.0], order)
+    if order == 2 and rng.random() < 0.5:
+        poles = poles[0] * np.exp(1j * rng.uniform(0.2, 2.8) * np.array([1.0, -1.0]))
+    return {"B": [0.0, *rng.standard_normal(order).tolist()], "F": np.real(np.poly(poles)).tolist()}
+
+
 def test_no_pseudo_random_sequence_is_better_than_the_best_start():
     """Whatever the register and the clock, also where the record holds a part of the sequence only."""
     design = designed(PLANTS[0][0], 30, ERROR)
@@ -233,3 +242,29 @@ def test_no_pseudo_random_sequence_is_better_than_the_best_start():
     every = sorted(goal.worst(goal.plant.information(u)) for u in starts)
     ranked = [goal.worst(goal.plant.information(u)) for u in search.ranked(starts, 4)]
     assert ranked == pytest.approx(every[:4], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_search_finds_the_best_of_all_records_of_most_plants():
+    """Of 2^9 records of ten samples the best few on a grid are compared at every frequency."""
+    samples, found = 10, 0
+    every = np.array([(1.0, *rest) for rest in product((-1.0, 1.0), repeat=samples - 1)])
+    for seed in range(50):
+        plant = output_error_plant(np.random.default_rng(seed))
+        design = designed(plant, samples, ERROR)
+        bound = bound_over_records(design.problem, design.any_spectrum, samples, windows=8)
+        goal = worst_of(design, samples)
+        pulses = [goal.plant.gradient(np.eye(samples)[:, [k]]) for k in range(samples)]
+        psi = np.tensordot(every, np.array(pulses).reshape(samples, samples, -1), axes=1)
+        rows = design.problem.requirements[0].rows(np.geomspace(0.02, 2.5, 60))
+        covariances = np.linalg.inv(goal.plant.known + psi.swapaxes(1, 2) @ psi)
+        rough = np.linalg.norm(np.einsum("wqi,rij,wpj->rwqp", rows, covariances, rows), 2, axis=(2, 3))
+        few = every[np.argsort(rough.max(axis=1))[:20]]
+        best = min(goal.worst(goal.plant.information(u[:, None])) for u in few)
+        assert np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
+        rng = np.random.default_rng(seed)
+        starts = [bound.best, *(np.sign(rng.standard_normal((samples, 1))) for _ in range(8))]
+        search = FlipSearch([goal], np.array([[-1.0], [1.0]]), samples)
+        _, ratio = search.best(starts, rng, enough=best * (1.0 + 1e-9), over=lambda: False, changes=30)
+        found += ratio <= best * (1.0 + 1e-6)
+    assert found >= 45, found
