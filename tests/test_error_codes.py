@@ -6,7 +6,10 @@ import ast
 import re
 from collections.abc import Iterable
 
+import pytest
+
 from inputdesign_cli.diagnostics import explanation, explanations
+from inputdesign_cli.findings import kinds
 from tests.support.refusals import refused
 from tests.support.wording import long_sentences, unclear_words
 from tests.test_architecture import FILES, ROOT, nodes, offenders, room_of
@@ -54,13 +57,15 @@ def test_no_code_is_explained_in_vain():
     assert [code for code in explanations() if f'{code}"' not in source] == []
 
 
-def test_explanations_are_complete():
-    for code, entry in explanations().items():
+@pytest.mark.parametrize("known", [explanations, kinds])
+def test_explanations_of_errors_and_findings_are_complete(known):
+    for code, entry in known().items():
         assert CODE.fullmatch(code), code
         assert entry.title[0].isupper(), code
         assert not entry.title.endswith("."), code
         assert entry.text.endswith("."), code
         assert entry.remedy.endswith("."), code
+        assert "Args" not in entry.text, code
         assert long_sentences(f"{entry.text} {entry.remedy}") == [], code
         assert unclear_words(f"{entry.title}. {entry.text} {entry.remedy}") == [], code
 
@@ -70,6 +75,7 @@ def test_no_code_is_explained_twice():
     lines = (ROOT / "error_codes.yaml").read_text(encoding="utf-8").splitlines()
     stated = [line.removesuffix(":") for line in lines if CODE.match(line)]
     assert stated == list(explanations())
+    assert kinds().keys() & explanations().keys() == set()
 
 
 def test_explaining():

@@ -86,6 +86,7 @@ KEPT = [
 ]  # fmt: skip
 
 
+@pytest.mark.first(5)
 @pytest.mark.parametrize("name", KEPT)
 def test_a_pipe_in_a_campaign_is_not_waited_for(campaigns, tmp_path, monkeypatch, capsys, name):
     shutil.copytree(campaigns / "once", tmp_path / "c")

@@ -1,7 +1,5 @@
 """Calibrated confidence: closed forms, plain Monte Carlo, properties; the designs that use it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.optimize
@@ -14,7 +12,6 @@ from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.common.confidence import settled_alpha
 
-SPECS = Path(__file__).parents[2] / "specs"
 BASE = """
 plant: {%s}
 noise: {variance: %s}
@@ -191,7 +188,7 @@ def test_runs_keep_the_bound_with_the_probability(name):
             "experiment: {samples: 500}\nspectrum: {type: fir, order: 20}\n"
         )
     else:
-        asked = load_spec(SPECS / "flexible_transmission.yaml").with_(
+        asked = load_spec("specs/flexible_transmission.yaml").with_(
             **{"accuracy.model_error.alpha": None, "accuracy.model_error.confidence": {"exact": 0.95}}
         )
         study["simulation.plant"] = None  # as the design takes it

@@ -32,9 +32,7 @@ def test_a_run_is_written_and_summarised(run, verbs, tmp_path, verb):
         "signal.csv",
         "result.json",
     }
-    for part in ("First-order system", "0.258498", "1.705495", "6.6 times", "0.192547", "gap below 1e-6"):
-        assert part in out
-    for part in ("3.142 rad/s", "500 samples", "2.94", "1.02", "runs/first"):
+    for part in ("First-order system", "0.258498", "1.705495", "0.192547", "3.142 rad/s", "2.94", "1.02"):
         assert part in out
 
 

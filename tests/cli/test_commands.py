@@ -55,9 +55,8 @@ def test_check_passes(run, verbs, tmp_path):
     (tmp_path / "golden" / "g.yaml").write_text(GOLDEN % "0.2585")
     code, out, err = run("check")
     assert (code, err) == (0, "")
-    assert "2 of 2 quantities agree" in out
     assert "FAILS" not in out
-    for part in ("g: white", "power", "0.258498", "0.2585", "-2.0e-06", "1.0e-04", "paper, Section 1"):
+    for part in ("2 of 2", "g: white", "power", "0.258498", "0.2585", "-2.0e-06", "1.0e-04"):
         assert part in out
     assert verbs == [(Path("golden/a.yaml"), [])]
 
@@ -177,13 +176,6 @@ def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
     assert (tmp_path / "a.yaml").read_text().count("#") > 8
 
 
-@pytest.mark.parametrize("arguments", [("init", "--kind", "closd-loop"), ("sweep", "a", "--verb", "slove")])
-def test_an_unknown_word_is_refused_with_those_that_are_known(run, arguments):
-    code, _, err = run(*arguments)
-    assert code == 2
-    assert f"'{arguments[-1]}' is not one of" in " ".join(err.split())
-
-
 def test_explain(run):
     code, out, _ = run("explain")
     assert code == 0
@@ -200,13 +192,10 @@ def test_explain(run):
     assert "no-such-code" in err
 
 
-def test_schema(run):
+def test_schema_and_version(run):
     code, out, err = run("schema")
     assert (code, err) == (0, "")
     assert set(json.loads(out)["properties"]) >= {"plant", "experiment", "accuracy", "spectrum"}
-
-
-def test_version(run):
     assert run("--version") == (0, f"idesign {inputdesign_cli.__version__}\n", "")
 
 

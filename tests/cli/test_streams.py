@@ -104,9 +104,6 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     assert not (tmp_path / "r").exists()
 
 
-# A signal that comes while an object is finalised, while an import swallows it, while a class is made.
-
-
 PROGRAM = """
 import signal, sys, time
 import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
@@ -218,15 +215,12 @@ def test_no_color(monkeypatch, variables, expected):
     assert colourful(Shown()) is expected
 
 
-def test_neither_colour_nor_progress_goes_to_files(tmp_path, capsys):
+def test_progress_is_shown_on_a_terminal_alone_and_cleared(monkeypatch, tmp_path, capsys):
     with (tmp_path / "log").open("w") as file:
         assert not colourful(file)
     with status("working", quiet=False):
         pass
     assert capsys.readouterr() == ("", "")
-
-
-def test_progress_is_shown_on_a_terminal_and_cleared(monkeypatch):
     terminal = shown_by(monkeypatch)
     with status("[working] on it", quiet=False):
         pass

@@ -8,9 +8,12 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.explore import explore_records, explore_structure
+from inputdesign_cli.explore.division import divided
 from inputdesign_cli.explore.search import ranked
-from tests.explore.plants import column, held, lag, with_noise
+from inputdesign_cli.plant import SampledModel
+from tests.explore.plants import column, held, with_noise
 from tests.explore.test_sweep import drifting
+from tests.support.plants import lag_of
 
 STEP = 0.5
 
@@ -19,7 +22,7 @@ def first_order(seed, samples=600, K=2.0, T=6.0, L=1.7, hold=10, ratio=10.0, pol
     """Return a record of a lag with dead time, samples half a unit of time apart."""
     rng = np.random.default_rng(seed)
     u = held(rng, samples, hold)[:, None]
-    x, _ = lag(K, T, L, STEP).simulate(u, np.zeros(u.shape), 1.0)
+    x, _ = SampledModel(lag_of([K], [T, 1.0], L), STEP).simulate(u, np.zeros(u.shape), 1.0)
     return u, 30.0 + with_noise(rng, x, ratio, pole)
 
 
@@ -246,3 +249,49 @@ def test_an_interrupted_search_gives_the_best_so_far(monkeypatch):
     u, y = first_order(3, 300)
     chosen = explore_structure([(u[:180], y[:180])], [(u[180:], y[180:])], step=STEP)
     assert set(map(id, chosen.candidates)) == set(map(id, tried))
+
+
+def record(u):
+    u = np.asarray(u, dtype=float)
+    return u.reshape(len(u), -1), np.arange(len(u), dtype=float)[:, None]
+
+
+def pulse(samples, up, down):
+    t = np.arange(samples)
+    return ((t >= up) & (t < down)).astype(float)
+
+
+@pytest.mark.parametrize(("up", "down"), [(50, 110), (20, 200), (100, 260), (130, 170), (30, 120)])
+def test_the_steps_of_a_single_pulse_are_parted_with_what_comes_after_them(up, down):
+    first, second, split = divided([record(pulse(300, up, down))])
+    assert split.endswith("and the rest")
+    assert len(first) == len(second) == 1
+    cut = len(first[0][0])
+    assert cut + len(second[0][0]) == 300
+    # Each part has one of the steps, and no fewer than ten samples after it.
+    assert up + 10 <= cut < down
+    np.testing.assert_array_equal(np.concatenate([first[0][1], second[0][1]])[:, 0], np.arange(300))
+
+
+def test_other_records_keep_three_fifths_or_are_judged_in_blocks_or_at_once():
+    """Inputs that move all along, one after the other, and in a single step."""
+    moves = np.tile([1.0, -1.0], 75)
+    first, _, split = divided([record(np.random.default_rng(1).choice([-1.0, 1.0], 200))])
+    assert (len(first[0][0]), split) == (120, "the first 60 % and the rest")
+    both = np.column_stack([np.r_[moves, np.zeros(150)], np.r_[np.zeros(150), moves]])
+    assert divided([record(both)])[2] == "blocks in turn"
+    assert divided([record(pulse(300, 100, 300))])[2] == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bump_up_and_down_tells_gain_and_time_constant(seed):
+    """A lag of 45 samples behind six, one pulse: parted in blocks, two poles were invented beside it."""
+    rng, pole = np.random.default_rng(seed), np.exp(-1.0 / 45.0)
+    u = 30.0 + 10.0 * pulse(300, 50, 110)
+    y = scipy.signal.lfilter(np.append(np.zeros(7), 0.8 * (1.0 - pole)), [1.0, -pole], u - 30.0)
+    y += 0.05 * scipy.signal.lfilter([1.0], [1.0, -0.5], rng.standard_normal(300))
+    found = explore_records([(u[:, None], y[:, None])])
+    w = np.array([1e-3, 0.01, 0.03])
+    truth = 0.8 * (1.0 - pole) * np.exp(-7j * w) / (1.0 - pole * np.exp(-1j * w))
+    assert np.abs(found.model.plant_at(w)[:, 0, 0] / truth - 1.0).max() < 0.05

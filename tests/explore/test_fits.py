@@ -6,7 +6,9 @@ import scipy.signal
 
 from inputdesign_cli.explore import by_chance, fits
 from inputdesign_cli.explore.structures import Orders, Process, process_models
-from tests.explore.plants import column, lag, siso
+from inputdesign_cli.plant import PolynomialModel, SampledModel
+from tests.explore.plants import column
+from tests.support.plants import lag_of
 
 STEP = 0.5
 
@@ -15,7 +17,7 @@ def test_a_level_and_a_start_cost_no_fit():
     """A simulation from any state about any level, without noise, explains everything."""
     u, F = np.random.default_rng(5).standard_normal(300), [1.0, -1.5, 0.7]
     y = 7.0 + scipy.signal.lfilter([0.0, 1.0, 0.5], F, u)
-    found = fits(siso([0.0, 1.0, 0.5], F), [column(u[100:], y[100:])])
+    found = fits(PolynomialModel.single([0.0, 1.0, 0.5], F=F), [column(u[100:], y[100:])])
     assert found.simulation[0] > 100.0 - 1e-6
     assert found.prediction[0] > 100.0 - 1e-6
 
@@ -23,7 +25,7 @@ def test_a_level_and_a_start_cost_no_fit():
 def test_the_fit_is_that_of_its_definition():
     u, e = np.random.default_rng(6).standard_normal((2, 2000))
     y = scipy.signal.lfilter([0.0, 1.0], [1.0, -0.5], u) + e
-    found = fits(siso([0.0, 1.0], [1.0, -0.5]), [column(u, y)])
+    found = fits(PolynomialModel.single([0.0, 1.0], F=[1.0, -0.5]), [column(u, y)])
     plain = 100.0 * (1.0 - np.linalg.norm(e) / np.linalg.norm(y - y.mean()))
     assert found.simulation[0] == pytest.approx(plain, abs=0.3)
 
@@ -45,7 +47,7 @@ def test_noise_explains_itself_by_chance_as_seldom_as_stated():
 
 def test_an_unstable_model_has_no_simulation():
     u, y = np.random.default_rng(7).standard_normal((2, 3000, 1))
-    assert fits(siso([0.0, 1.0], [1.0, -1.5]), [(u, y)]).simulation[0] < -1e3
+    assert fits(PolynomialModel.single([0.0, 1.0], F=[1.0, -1.5]), [(u, y)]).simulation[0] < -1e3
 
 
 @pytest.mark.parametrize("late", [0.5, 40.0, 120.0])
@@ -65,7 +67,7 @@ def test_a_true_model_is_judged_alike_in_s_and_in_q(in_s):
     """A record that begins while 14 unknown inputs are still on their way: only its noise is left."""
     rng = np.random.default_rng(4)
     u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)[:, None]
-    truth, pole = lag(2.0, 6.0, 7.0, STEP), np.exp(-STEP / 6.0)
+    truth, pole = SampledModel(lag_of([2.0], [6.0, 1.0], 7.0), STEP), np.exp(-STEP / 6.0)
     x, _ = truth.simulate(u, np.zeros(u.shape), 1.0)
     y = x + 0.1 * np.std(x) * rng.standard_normal(x.shape)
     polynomial = Orders("OE", (15,), 1, f=1).model().at(np.array([2.0 * (1.0 - pole), -pole]))

@@ -24,9 +24,7 @@ RECORDS = 20
 
 
 def lag(gain, delay=1, pole=0.9):
-    one = (np.ones(1),)
-    B = np.concatenate([np.zeros(delay), [gain * (1.0 - pole)]])
-    return PolynomialModel(((B,),), one, ((np.array([1.0, -pole]),),), one, one, np.eye(1))
+    return PolynomialModel.single([*np.zeros(delay), gain * (1.0 - pole)], F=[1.0, -pole])
 
 
 def nearest(u, y):

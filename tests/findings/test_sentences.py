@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from inputdesign_cli.finding import Finding, Severity, trusted, undecided
 from inputdesign_cli.findings import (
     campaigns,
     designed_records as records,
@@ -153,3 +154,18 @@ def test_a_message_is_the_title_the_fact_and_the_remedy():
     assert FOUND["record-shorter"][0].message == (
         "A record ends before its plan: r.csv has 59 of the 60 samples of plan_01.csv."
     )
+
+
+@pytest.mark.parametrize(
+    ("severity", "decides", "trusts"),
+    [
+        (Severity.NOTE, True, True),
+        (Severity.DOUBT, True, False),
+        (Severity.UNDECIDED, False, False),
+        (Severity.REFUTED, False, False),
+    ],
+)
+def test_severities_decide(severity, decides, trusts):
+    found = [Finding("a", Severity.NOTE, "x"), Finding("b", severity, "y")]
+    assert undecided(found) != decides
+    assert trusted(found) == trusts

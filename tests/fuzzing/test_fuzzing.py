@@ -69,6 +69,7 @@ TEXTS = {
 }
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize(
     ("name", "spectrum"),
     [

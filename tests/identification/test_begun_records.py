@@ -5,10 +5,9 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.questions.building.system import build_model
+from tests.support.plants import stated
 
 GAIN, LAG, N, BEFORE = 2.0, 10.0, 500, 200
 IN_S = "{{continuous: {{gain: 2, time_constant: 10, dead_time: {delay}}}, sample: zoh}}"
@@ -19,8 +18,7 @@ IN_STATES = (
 
 
 def model_of(words, delay):
-    text = f"plant: {words.format(delay=delay)}\nnoise: {{variance: 0.01}}\n"
-    return build_model(parse_spec(text, design=False))
+    return stated(f"plant: {words.format(delay=delay)}\nnoise: {{variance: 0.01}}\n")
 
 
 def cut_out(delay, seed, *, before=BEFORE, samples=N):
@@ -172,7 +170,7 @@ def test_an_integrating_plant_may_be_measured_about_any_level(plant):
     regressors = np.column_stack([total, np.ones(400), time])
     expected = np.linalg.lstsq(regressors, y, rcond=None)[0][0]
     spread = np.sqrt(0.04 * np.linalg.inv(regressors.T @ regressors)[0, 0])
-    model = build_model(parse_spec(f"plant: {plant}\nnoise: {{variance: 0.04}}\n", design=False))
+    model = stated(f"plant: {plant}\nnoise: {{variance: 0.04}}\n")
     found = identify(model, u[:, None], y[:, None])
     assert found.start.free
     assert found.theta[0] == pytest.approx(expected, rel=1e-6)

@@ -8,7 +8,8 @@ from inputdesign_cli.identification import Earlier, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
-from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
+from inputdesign_cli.plant import Intersample, PolynomialModel
+from tests.support.plants import lag_of
 from tests.support.records import arx_regressors, shifted, simulated
 
 ARX = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.2, 0.5], variance=0.3)
@@ -39,13 +40,13 @@ def test_arx_with_known_noise_is_ridge_regression():
 
 
 def in_s(rng):
-    model = ContinuousModel.monic(((np.array([2.0]),),), ((np.array([1.0, 0.8, 1.0]),),), np.eye(1))
+    model = lag_of([2.0], [1.0, 0.8, 1.0])
     u = rng.standard_normal((2, 800, 1))
     y = np.array([model.driven(x, Intersample(0.4, hold=False)) for x in u])
     return model, u, y + 0.3 * rng.standard_normal(y.shape)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "made", [in_s, lambda rng: (JENKINS, *simulated(JENKINS, 1500, rng, runs=2))], ids=["s", "q"]
 )

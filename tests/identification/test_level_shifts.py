@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify
-from inputdesign_cli.questions.building.system import build_model
+from tests.support.plants import stated
 
 ARX = "sample_time: 1\nplant: {A: [1, -0.8], B: [0, 0.5]}\nnoise: {variance: 0.01}\n"
 LAG = (
@@ -22,10 +21,6 @@ NOISES = {
     "coloured": "noise: {variance: 0.01, D: [1, -0.5]}",
     "walk": "noise: {variance: 0.01, C: [1, -0.5], drift: true}",
 }
-
-
-def model_of(text):
-    return build_model(parse_spec(text, design=False))
 
 
 def lag_of(samples, seed, noise="white", size=0.1):
@@ -44,7 +39,7 @@ def lag_of(samples, seed, noise="white", size=0.1):
 
 
 def shift_of(text, u, y, **settings):
-    return identify(model_of(text), u, y, **settings).tests.shift
+    return identify(stated(text), u, y, **settings).tests.shift
 
 
 def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_more():
@@ -95,7 +90,7 @@ def test_where_it_happens_is_found(words, at, lag, sign):
     u, y = lag_of(300, 3)
     after = np.maximum(np.arange(300.0) - at, 0.0)
     y[:, 0] += sign * 0.5 * (-np.expm1(-after / lag) if lag else after >= 1.0)
-    estimate = identify(model_of(words + NOISES["white"]), u, y)
+    estimate = identify(stated(words + NOISES["white"]), u, y)
     found = estimate.tests.shift
     assert estimate.tests.shifted[:1] == (found,)
     assert found.test in estimate.tests.failed
@@ -109,7 +104,7 @@ def test_where_it_happens_is_found(words, at, lag, sign):
 def test_a_load_that_comes_and_goes_is_two(seed):
     u, y = lag_of(300, seed)
     y[120:180] += 0.6
-    found = identify(model_of(LAG + NOISES["white"]), u, y)
+    found = identify(stated(LAG + NOISES["white"]), u, y)
     first, second = sorted(found.tests.shifted, key=lambda one: one.sample)
     assert (first.sample, first.rises, second.sample, second.rises) == (120, True, 180, False)
     assert not [test for test in found.tests.beside_shifts if test.probability < 1e-4]
@@ -118,7 +113,7 @@ def test_a_load_that_comes_and_goes_is_two(seed):
 @pytest.mark.slow
 def test_it_belongs_to_a_record_and_to_an_output():
     first, second = lag_of(150, 5), lag_of(200, 6)
-    matrix = model_of(
+    matrix = stated(
         "sample_time: 1\nplant: {A: [[1, -0.9], [1, -0.9]], B: [[[0, 0.1]], [[0, 0.1]]]}\n"
         "noise: {variance: [[0.01, 0], [0, 0.01]]}\n"
     )
@@ -139,13 +134,13 @@ def test_it_belongs_to_a_record_and_to_an_output():
 def test_lines_and_single_samples_are_no_shifts():
     u, y = lag_of(300, 7)
     line = y + np.linspace(0.0, 1.0, 300)[:, None]
-    found = identify(model_of(LAG + NOISES["white"]), u, line, rest=False)
+    found = identify(stated(LAG + NOISES["white"]), u, line, rest=False)
     assert found.tests.shift.test.probability < 1e-3
     assert not found.tests.shift.alone
     assert found.tests.shifted == ()
     spike = y.copy()
     spike[288] += 5.0
-    found = identify(model_of(LAG + NOISES["white"]), u, spike)
+    found = identify(stated(LAG + NOISES["white"]), u, spike)
     assert found.tests.shift.test.probability < 1e-3
     assert found.tests.shifted == ()
 
@@ -163,7 +158,7 @@ def test_a_shift_that_alone_refutes_a_model_is_told_whatever_hardly_counts():
     """Its score may say less than a test that does not fail; another one that fails outweighs it."""
     u, y = lag_of(300, 5)
     y[120:] += 0.6
-    found = identify(model_of(LAG + NOISES["white"]), u, y)
+    found = identify(stated(LAG + NOISES["white"]), u, y)
     shift = found.tests.shifts[0]
     faint = replace(shift, score=5.0)
     one = next(one for one in found.tests.directed if not one.of_structure)

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 import scipy
 
-from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records, evaluate
 from inputdesign_cli.identification.start import FreeStarts, Start
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.questions.building.system import build_model
+from tests.support.plants import stated
 
 N = 40
 RICH = PolynomialModel.single(
@@ -100,8 +99,8 @@ def test_a_known_pole_on_the_circle_leaves_a_regression_of_differences():
     u, e = rng.standard_normal(N), rng.standard_normal(N)
     delayed = np.append(0.0, u[:-1])
     y = 0.6 * delayed + 40.0 + np.cumsum(e)
-    spec = parse_spec("plant: {B: [0, 0.5]}\nnoise: {D: [1, -1], known: [d1], variance: 1}\n", design=False)
-    found = identify(build_model(spec), u[:, None], y[:, None])
+    model = stated("plant: {B: [0, 0.5]}\nnoise: {D: [1, -1], known: [d1], variance: 1}\n")
+    found = identify(model, u[:, None], y[:, None])
     steps, of_y = np.diff(delayed), np.diff(y)
     b = steps @ of_y / (steps @ steps)
     assert found.theta == pytest.approx([b], rel=1e-2)

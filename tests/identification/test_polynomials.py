@@ -5,7 +5,6 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
@@ -14,11 +13,10 @@ from inputdesign_cli.identification.records import RecordProblem, Records, evalu
 from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification.models.fields import check_delay_stable
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.plants import arx, box_jenkins
+from tests.support.plants import arx, box_jenkins, stated
 from tests.support.records import check_record, shifted, simulated
 from tests.support.refusals import refused
 
@@ -163,7 +161,7 @@ MODELS = {"common": arx(per_output=False), "bj": SYSTEMS["bj"], "two bj": box_je
 MODELS |= SYSTEMS
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_known_parameters_are_recovered_without_a_start(model):
     u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))
@@ -215,12 +213,10 @@ def test_bad_data_is_refused_and_the_channel_named(change, code, named):
     assert named in found[0].message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "runs"),
-    [
-        (arx(), 200),
-        *(pytest.param(one, 500, marks=pytest.mark.slow) for one in (arx(per_output=False), box_jenkins())),
-    ],
+    [(arx(), 200), (arx(per_output=False), 500), (box_jenkins(), 500)],
     ids=["arx", "common", "bj"],
 )
 def test_estimates_reach_the_cramer_rao_bound(model, runs):
@@ -269,8 +265,7 @@ _IN_S = "{continuous: {gain: 2, time_constant: 10}, sample: zoh}"
 @pytest.mark.parametrize("plant", ["{B: [0, 1], F: [1, -0.7]}", _IN_S], ids=["q", "s"])
 def test_noise_that_a_search_may_arrive_at_may_stand_in_a_spec(plant, gap):
     """Whatever the step, C and D have their roots inside the circle by more than rounding."""
-    words = f"plant: {plant}\nnoise: {{variance: 1, C: [1, 0.2], D: [1, -0.5]}}\n"
-    model = build_model(parse_spec(words, design=False))
+    model = stated(f"plant: {plant}\nnoise: {{variance: 1, C: [1, 0.2], D: [1, -0.5]}}\n")
     theta = model.theta.copy()
     for name, sign in (("c1", 1.0), ("d1", -1.0)):
         theta[list(model.names).index(name)] = sign * (1.0 - gap)

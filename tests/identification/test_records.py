@@ -95,15 +95,6 @@ def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(
     assert np.mean(squares) == pytest.approx(k, abs=5 * np.sqrt(2 * k / 15))
 
 
-@pytest.mark.slow
-def test_records_at_rest_are_taken_for_such():
-    u, y = data("bj", 400, np.random.default_rng(7), runs=30)
-    free = [identify(SYSTEMS["bj"], u[i], y[i]).start.free for i in range(30)]
-    assert np.mean(free) < 0.1
-    told = identify(SYSTEMS["bj"], u[0], y[0], rest=True)
-    np.testing.assert_allclose(told.theta, identify(SYSTEMS["bj"], u[0], y[0]).theta, atol=1e-9)
-
-
 @pytest.mark.parametrize("runs", [1, 2])
 def test_arx_from_rest_is_stacked_least_squares(runs):
     u, y = (x[..., 0] for x in data("arx", 200, np.random.default_rng(8), runs=runs))
@@ -168,15 +159,12 @@ def test_of_arx_it_is_the_test_of_wald():
     assert found.tests.alike == pytest.approx([scipy.stats.chi2.sf(statistic, 4)] * 2, rel=1e-6)
 
 
-def test_one_experiment_has_nothing_to_differ_from():
-    assert jointly(recorded(1.0, 300, 1)).tests.alike == ()
-
-
 def test_the_one_that_differs_is_the_least_likely():
     records = [recorded(1.0, 300, 1), recorded(1.0, 300, 2), recorded(-1.0, 300, 3)]
     alike = jointly(*records).tests.alike
     assert np.argmin(alike) == 2
     assert alike[2] < 1e-6
+    assert jointly(records[0]).tests.alike == ()  # nothing to differ from
 
 
 @pytest.mark.slow

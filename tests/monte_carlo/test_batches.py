@@ -221,6 +221,7 @@ def test_each_estimate_keeps_its_own_zeros_in_the_loop(name):
     assert all(np.abs(np.roots(row)).max() < 1 for row in denominator)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", ["zero outside", "two channels"])
 def test_losses_with_zeros_outside_agree_with_theory(name):
     problem = internal_model(name, variance=0.01)

@@ -16,14 +16,51 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.curves import OptimalityCurves, SignalCurves
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from tests.support.outcomes import typed
 from tests.support.processes import running
 from tests.support.refusals import refused
-from tests.support.run_directories import a_run, marks, names, write_with_figures
 
+SPECS = Path(__file__).parents[2] / "specs"
 FILES = ["spec.yaml", "signal.csv", "optimality.csv", "signal.png", "optimality.png", "figures.json"]
+
+
+def a_run(mark: str, *, optimality: bool = False) -> Results:
+    """A small run whose every file tells which run it is of."""
+    number = float(len(mark))
+    curves = {"signal": SignalCurves(np.arange(4.0), {"u1": np.array([1.0, -1.0, 1.0, -1.0]) * number})}
+    tables = {"signal": Table({"time_s": np.arange(4.0), "u1": np.full(4, number)})}
+    if optimality:
+        w = np.array([0.1, 1.0, 3.0])
+        curves["optimality"] = OptimalityCurves(w, np.array([0.5, 1.0, 0.5]), np.array([1.0]))
+        tables["optimality"] = Table({"frequency_rad_per_s": w, "ratio": curves["optimality"].ratio})
+    return Results(
+        typed({"format": 1, "title": mark, "objective": {"kind": "least_cost", "value": np.float64(number)}}),
+        resolved_spec=f"title: {mark}\n",
+        tables=tables,
+        curves=curves,
+    )
+
+
+def write_with_figures(results, directory):
+    """A run with what passes for figures."""
+    return write_run(results, directory, {f"{stem}.png": b"drawn" for stem in results.curves})
+
+
+def marks(directory) -> set[str]:
+    """Which runs the text files of a directory are of."""
+    found = set()
+    for name in ("spec.yaml", "result.json", "signal.csv"):
+        if (directory / name).exists():
+            text = (directory / name).read_text()
+            found |= {mark for mark in ("first", "second") if mark in text or f",{len(mark)}\n" in text}
+    return found
+
+
+def names(directory) -> set[str]:
+    return {path.name for path in directory.iterdir()}
 
 
 def test_a_run_is_read_as_it_was_written_with_its_files_its_software_and_its_spec(tmp_path):
@@ -149,6 +186,24 @@ def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(tmp_path, erro
     assert outcomes.count(True) > 8
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize("users", ["folder", "plain"])
+def test_whenever_the_writer_is_killed_the_next_call_finds_a_whole_run(tmp_path, users):
+    command = [sys.executable, "-m", "tests.support.killed_writer", str(tmp_path), users]
+    ended = subprocess.run(command, cwd=SPECS.parent, capture_output=True, text=True, timeout=100)
+    assert ended.returncode == 0, ended.stderr
+    left = [json.loads(line) for line in ended.stdout.splitlines()]
+    assert len(left) > 20
+    for kill in left:
+        assert kill["then"] in ("first", "second"), kill
+        assert kill["at_once"] != "mixed", kill
+        assert "error" not in kill
+        assert (kill["strange"], kill["in_the_end"], kill["notes"]) == ([], "second", "mine"), kill
+    assert {kill["then"] for kill in left} == {"first", "second"}
+    # There are moments without a run that the next call ends, or this test would prove nothing.
+    assert "none" in {kill["at_once"] for kill in left}
+
+
 def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
     bad = Results(typed({"format": 1, "value": np.nan}), resolved_spec="")
     with pytest.raises(ValueError, match=r"result\.value"):
@@ -232,8 +287,6 @@ def test_a_link_stays_a_link_and_the_current_folder_the_current_one(tmp_path, mo
     assert pathlib.Path.cwd() == tmp_path / "disc"
     assert marks(pathlib.Path()) == {"second"}
 
-
-SPECS = Path(__file__).parents[2] / "specs"
 
 # Names that Python on Windows does not have.
 BARE = """

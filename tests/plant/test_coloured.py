@@ -95,10 +95,7 @@ def test_each_output_has_its_own_drift_and_filters():
     np.testing.assert_allclose(np.diff(v[:, 0], prepend=0.0), np.convolve(C, e[:, 0])[:80], atol=1e-12)
     np.testing.assert_allclose(np.convolve(D, v[:, 1])[:80], e[:, 1], atol=1e-12)
     check_record(model, 120)
-
-
-def test_record_of_a_sampled_plant():
-    check_record(Coloured(heater(), (C,), (D,), drift=(True,)), 150)
+    check_record(Coloured(heater(), (C,), (D,), drift=(True,)), 150)  # of a sampled plant
 
 
 def heater():

@@ -6,7 +6,6 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import (
     ContinuousModel,
     Loop,
@@ -40,11 +39,13 @@ def fine_step(model, u, steps=1000):
 
 
 @pytest.mark.parametrize("tau", DELAYS)
-def test_the_sampled_plant_is_that_of_a_fine_step_simulation(tau):
-    u = np.random.default_rng(0).normal(size=(40, 1))
-    model = late(tau)
-    y, _ = SampledModel(model, STEP).simulate(u, np.zeros((40, 1)), 1.0)
+def test_the_sampled_plant_is_that_of_a_fine_step_simulation_and_of_its_fraction_in_q(tau):
+    u, model = np.random.default_rng(0).normal(size=(40, 1)), late(tau)
+    sampled = SampledModel(model, STEP)
+    y, _ = sampled.simulate(u, np.zeros((40, 1)), 1.0)
     np.testing.assert_allclose(y[:, 0], fine_step(model, u[:, 0]), atol=1e-8)
+    expected = scipy.signal.freqz(*model.held(0, 0, STEP).sampled, worN=W)[1]
+    np.testing.assert_allclose(sampled.plant_at(W)[:, 0, 0], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("model", [late(0.37), late(1.0), late_entries(), late_entries(common=True)])
@@ -53,13 +54,6 @@ def test_realisation_and_response_are_one_plant(model):
     A, B, C, D = sampled.realisation
     expected = np.array([C @ np.linalg.solve(x * np.eye(len(A)) - A, B) + D for x in z])
     np.testing.assert_allclose(sampled.plant_at(W), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("tau", DELAYS)
-def test_numerator_and_denominator_in_q_are_those_of_the_response(tau):
-    entry = late(tau).held(0, 0, STEP)
-    expected = scipy.signal.freqz(*entry.sampled, worN=W)[1]
-    np.testing.assert_allclose(SampledModel(late(tau), STEP).plant_at(W)[:, 0, 0], expected, atol=1e-12)
 
 
 def test_the_gradient_has_two_sides_at_a_boundary():
@@ -194,19 +188,6 @@ def test_samples_drive_an_integrator_as_a_sum(hold):
     if not hold:  # the trapezoidal rule is nearly exact for a signal that is slow
         expected = expected + 0.5 * H * u
     np.testing.assert_allclose(y, expected, atol=1e-9 if hold else 0.02 * np.abs(expected).max())
-
-
-def test_the_gradient_of_a_record_is_that_of_differences():
-    model, record = plant_of([0.3], [1, 0.8, 0]), np.random.default_rng(2).standard_normal((300, 1))
-    e = np.zeros((300, 1))
-
-    def caused(moved):
-        return model.at(moved).simulate(record, e, 1.0)[0]
-
-    step = 1e-6 * np.eye(3)[[0, 2]]
-    expected = [(caused(model.theta + d) - caused(model.theta - d)) / 2e-6 for d in step]
-    psi = FiniteRecord(Experiment(model, 300), 300).gradient(record)[:, [0, 2], 0]
-    np.testing.assert_allclose(psi, np.concatenate(expected, axis=1), atol=1e-6 * np.abs(psi).max())
 
 
 def test_estimates_hold_the_integrator():

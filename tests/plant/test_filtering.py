@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant import Rational, TransferMatrix, delayed, discretised, pid
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
-from inputdesign_cli.questions.building.system import build_model
+from tests.support.plants import stated
 
 
 def by_definition(b, a, x):
@@ -112,7 +111,7 @@ PLANT = "plant: {B: [0, 1], F: [1, -0.5]}\n"
 
 
 def noise(text):
-    return NoiseSpectrum.of(build_model(parse_spec(f"{PLANT}{text}", design=False)))
+    return NoiseSpectrum.of(stated(PLANT + text))
 
 
 def test_of_a_moving_average():
@@ -136,12 +135,11 @@ def test_of_an_autoregression_through_a_record_shorter_than_its_memory():
 
 
 def test_of_correlated_outputs():
-    spec = parse_spec(
+    model = stated(
         "plant: {B: [[[0, 1]], [[0, 2]]], F: [[[1, -0.5]], [[1, -0.2]]]}\n"
-        "noise: {C: [[1, 0.5], [1]], variance: [[1.0, 0.6], [0.6, 2.0]]}",
-        design=False,
+        "noise: {C: [[1, 0.5], [1]], variance: [[1.0, 0.6], [0.6, 2.0]]}"
     )
-    found, k = NoiseSpectrum.of(build_model(spec)), np.array([3, 7])
+    found, k = NoiseSpectrum.of(model), np.array([3, 7])
     w = 2 * np.pi * k / 20
     assert found.at(20, k) == pytest.approx(np.stack([1.25 + np.cos(w), np.full(2, 2.0)], axis=1), rel=1e-12)
 

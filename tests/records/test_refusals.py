@@ -18,14 +18,13 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.questions.building.tables import read_columns, read_samples
 from inputdesign_cli.records import Preparation, read_log, read_sheet
+from tests.support.refusals import refused
 
 U, Y = np.arange(20.0) % 7, np.arange(20.0) % 5
 
 
-def refused(path, prepared=None):
-    with pytest.raises(DataError) as caught:
-        read_log(path, prepared or Preparation())
-    return caught.value.diagnostics[0]
+def refused_log(path, prepared=None):
+    return refused(read_log, path, prepared or Preparation(), kind=DataError)[0]
 
 
 def log(path, stamps, names="time,u,y"):
@@ -61,7 +60,7 @@ MOMENTS = [BEGAN + timedelta(seconds=30 * k) for k in range(20)]
 def test_text_by_its_code_line_and_option(text, code, line, option, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(text)
-    found = refused(path)
+    found = refused_log(path)
     assert (found.code, found.location and found.location.line) == (code, line)
     assert option in found.hint
 
@@ -76,7 +75,7 @@ def test_dates_in_digits_are_asked_about(form, kind, tmp_path):
         log(path, stamps)
     else:
         np.savez(path, time=stamps, u=U, y=Y)
-    found = refused(path)
+    found = refused_log(path)
     assert found.code == "data-not-a-number"
     assert "--time-format" in found.hint
     assert read_log(path, Preparation(time_unit="s")).lengths[0] > 0  # numbers that count
@@ -90,7 +89,7 @@ def test_dates_whose_order_is_not_clear_are_asked_about(tmp_path):
         tmp_path / "log.csv",
         [f"{t:%d/%m/%Y %H:%M:%S}" for t in (BEGAN + timedelta(days=k) for k in range(5))],
     )
-    found = refused(path)
+    found = refused_log(path)
     assert (found.code, found.location.line) == ("data-not-a-number", 2)
     assert "--time-format" in found.hint
     read = read_log(path, Preparation(time_format="%d/%m/%Y %H:%M:%S"))
@@ -101,16 +100,16 @@ def test_dates_whose_order_is_not_clear_are_asked_about(tmp_path):
 def test_a_cell_among_dates_that_is_none_is_shown_with_its_line(wrong, tmp_path):
     stamps = [t.isoformat(" ") for t in MOMENTS]
     stamps[7] = wrong
-    found = refused(log(tmp_path / "log.csv", stamps))
+    found = refused_log(log(tmp_path / "log.csv", stamps))
     assert (found.code, found.location.line) == ("data-not-a-number", 9)
     assert "--time-format" in found.hint
 
 
 def test_a_form_or_a_mark_that_the_cells_do_not_have_is_refused(tmp_path):
     path = log(tmp_path / "log.csv", [t.isoformat(" ") for t in MOMENTS])
-    assert "--time-format" in refused(path, Preparation(time_format="%d.%m.%Y")).hint
+    assert "--time-format" in refused_log(path, Preparation(time_format="%d.%m.%Y")).hint
     path.write_text("u;y\n1.234;1,5\n2;2,5\n")
-    assert refused(path, Preparation(decimal=",")).code == "data-not-a-number"
+    assert refused_log(path, Preparation(decimal=",")).code == "data-not-a-number"
 
 
 def archive(name, content):
@@ -144,7 +143,7 @@ TEXT = b"time,u,y\n0,1,2\n1,2,3\n"
 )
 def test_what_is_no_table_is_unreadable(name, raw, tmp_path):
     (tmp_path / name).write_bytes(raw)
-    assert refused(tmp_path / name).code == "data-unreadable"
+    assert refused_log(tmp_path / name).code == "data-unreadable"
 
 
 @pytest.mark.slow
@@ -156,7 +155,7 @@ def test_an_archive_that_unpacks_to_more_than_the_limit_is_refused_at_once(name,
                 "[Content_Types].xml" if name == "log.xlsx" and k == 1 else f"a{k}.npy", bytes(100 * 2**20)
             )
     started = time.monotonic()
-    assert "1 GiB" in refused(tmp_path / name).message
+    assert "1 GiB" in refused_log(tmp_path / name).message
     assert time.monotonic() - started < 5.0
 
 
@@ -172,7 +171,7 @@ def test_an_archive_that_unpacks_to_more_than_the_limit_is_refused_at_once(name,
 )
 def test_arrays_that_are_no_columns_are_refused(arrays, said, tmp_path):
     scipy.io.savemat(tmp_path / "log.mat", arrays)
-    found = refused(tmp_path / "log.mat")
+    found = refused_log(tmp_path / "log.mat")
     assert said in f"{found.message} {found.hint}"
     if "z" in arrays:
         np.testing.assert_array_equal(read_log(tmp_path / "log.mat#z", Preparation()).u[:, 0], 2 * U)
@@ -237,10 +236,14 @@ def test_no_damage_to_a_file_leads_to_another_error(kind, tmp_path):
 
 def named(path, wanted=None):
     started = time.monotonic()
-    with pytest.raises(DataError) as caught:
-        read_columns(path, wanted or {"u": "u"}, key="spectrum.given.signal")
+    found = refused(read_columns, path, wanted or {"u": "u"}, kind=DataError, key="spectrum.given.signal")
     assert time.monotonic() - started < 5.0
-    return caught.value.diagnostics[0]
+    return found[0]
+
+
+def no_samples(path):
+    (found,) = refused(read_samples, path, {"u": "u"}, kind=DataError, key="spectrum.given.signal")
+    return found
 
 
 def test_what_is_no_plain_file_is_refused_at_once(tmp_path):
@@ -280,15 +283,11 @@ def test_the_header_of_a_table_is_shown(tmp_path):
 @pytest.mark.parametrize("line", ["", "# 3,0"])
 def test_a_signal_lacks_no_sample_between_its_rows(line, tmp_path):
     (tmp_path / "u.csv").write_text(f"u,r\n1,0\n2,0\n{line}\n4,0\n")
-    with pytest.raises(DataError) as caught:
-        read_samples(tmp_path / "u.csv", {"u": "u"}, key="spectrum.given.signal")
-    assert caught.value.diagnostics[0].code == "data-not-a-number"
+    assert no_samples(tmp_path / "u.csv").code == "data-not-a-number"
 
 
 @pytest.mark.parametrize("value", [9e99, -1e308, 1e30, 1e12])
 def test_a_value_beside_which_all_others_are_lost_is_refused_with_its_line(value, tmp_path):
     (tmp_path / "u.csv").write_text("u\n" + "".join(f"{value if k == 30 else k % 7}\n" for k in range(60)))
-    with pytest.raises(DataError) as caught:
-        read_samples(tmp_path / "u.csv", {"u": "u"}, key="spectrum.given.signal")
-    (found,) = caught.value.diagnostics
+    found = no_samples(tmp_path / "u.csv")
     assert (found.code, found.location.line) == ("beyond-precision", 32)

@@ -11,7 +11,6 @@ from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records import Preparation, read_data, read_log
-from tests.support.refusals import refused
 
 STRUCTURE = "sample_time: 2\ntime_unit: min\nplant: {B: [0, 1], F: [1, -0.7]}\n"
 UNITS = Units("min", 2.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
@@ -132,18 +131,6 @@ def test_the_variance_of_noise_that_is_estimated_need_not_be_stated():
             parse_spec(STRUCTURE + noise)
     with pytest.raises(SpecError, match="noise"):
         parse_spec(STRUCTURE + "noise: 3\n", design=False)
-
-
-@pytest.mark.parametrize(
-    ("setting", "said"),
-    [
-        ("plant.B=3.6", r"one input and one output write a list"),
-        ("plant.B=[[0, 1, 2]]", r"one input and one output write a list"),
-        ("plant.F=[1, -0,7]", r"write 0\.7: a comma begins the next coefficient"),
-    ],
-)
-def test_hints_name_the_likely_mistake_first(setting, said):
-    assert re.search(said, refused(parse_spec, STRUCTURE, overrides=[setting], design=False)[0].hint)
 
 
 @pytest.mark.parametrize("column", ["1", "Time", "TIME [s]", "time [s]"])

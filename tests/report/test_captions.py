@@ -185,6 +185,7 @@ def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command():
     assert "The residuals drift." not in told
 
 
+@pytest.mark.slow
 def test_a_loop_error_says_which_theory_its_ratios_are_of():
     """Table I of errata.md: N J of formula (19) and of white noise, and 27.7 % in the mean loss."""
     spec = load_spec("specs/distillation_column.yaml", ["signal={samples: 100, candidates: 1}"])

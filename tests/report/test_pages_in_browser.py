@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.signal
 
 from inputdesign_cli import assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import Location, SpecError
@@ -18,7 +17,7 @@ from inputdesign_cli.questions import explore
 from inputdesign_cli.report.render import report_text
 from tests.support.browser import clipped, needs_browser, started, violations
 from tests.support.campaigns import applied
-from tests.support.pages import SPEC
+from tests.support.pages import SPEC, recorded
 from tests.support.sweep_files import run_sweep
 
 pytestmark = [needs_browser, pytest.mark.browser]
@@ -63,13 +62,8 @@ NAMES = ["open", "closed", *KINDS, *SWEEPS, *OF_RECORDS, "campaign", "campaign b
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
-    """A record of the plant of SPEC, which misses what is asked."""
-    rng = np.random.default_rng(1)
-    u, e = rng.standard_normal((2, 400))
-    y = scipy.signal.lfilter([0, 1], [1, -0.5], u) + e
-    path = tmp_path_factory.mktemp("record") / "data.csv"
-    np.savetxt(path, np.c_[np.arange(400.0), u, y], delimiter=",", header="time,u,y", comments="")
-    return path
+    """A record that misses what is asked."""
+    return recorded(tmp_path_factory.mktemp("record") / "data.csv")
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +125,18 @@ def browser():
         yield found
 
 
+@pytest.fixture
+def shown(address, browser):
+    """Opens a page of a kind."""
+
+    def opened(name):
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.goto(address(name))
+        return page
+
+    return opened
+
+
 @pytest.mark.first(2)
 @pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])
 @pytest.mark.parametrize("name", NAMES)
@@ -152,9 +158,8 @@ def small_text(page):
         .map((e) => e.src.slice(0, 22)).filter((kind) => kind !== "data:image/svg+xml;bas")""")
 
 
-def test_the_contents_lead_to_headings_by_keyboard(address, browser):
-    page = browser.new_page()
-    page.goto(address("open"))
+def test_the_contents_lead_to_headings_by_keyboard(shown):
+    page = shown("open")
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     assert page.url.endswith("#the-question")
@@ -163,12 +168,11 @@ def test_the_contents_lead_to_headings_by_keyboard(address, browser):
     assert missing == []
 
 
-def test_values_are_told_where_one_points_and_by_the_arrow_keys(address, browser, runs):
+def test_values_are_told_where_one_points_and_by_the_arrow_keys(shown, runs):
     """They are those of bound.csv, to the digits that are shown, at the frequency that is shown."""
     table = np.genfromtxt(runs / "open" / "bound.csv", delimiter=",", names=True)
     w, r_u = table[table.dtype.names[0]], table["r_u"]
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto(address("open"))
+    page = shown("open")
     plot = page.locator("[role=slider]").first
     told = plot.locator("xpath=following-sibling::p")
     box = plot.bounding_box()
@@ -198,9 +202,8 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(address, browser
         ("assessed", ["time", "predicted one step ahead"], 0),
     ],
 )
-def test_every_kind_of_curve_tells_its_values(address, browser, name, told, figure):
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto(address(name))
+def test_every_kind_of_curve_tells_its_values(shown, name, told, figure):
+    page = shown(name)
     plot = page.locator("figure").nth(figure).locator("[role=slider]")
     answer = plot.locator("xpath=following-sibling::p")
     box = plot.bounding_box()
@@ -216,12 +219,11 @@ def test_every_kind_of_curve_tells_its_values(address, browser, name, told, figu
 
 
 @pytest.mark.slow
-def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(address, browser, place):
+def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(shown, place):
     """What is said at the ring is C G at the frequency that is said, by nyquist.csv."""
     table = np.genfromtxt(place("loop") / "nyquist.csv", delimiter=",", names=True)
     w, loop = table[table.dtype.names[0]], table["CG_re"] + 1j * table["CG_im"]
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto(address("loop"))
+    page = shown("loop")
     plot = page.locator("figure").nth(1).locator("[role=slider]")
     box = plot.bounding_box()
     for across, down in ((0.5, 0.5), (0.6, 0.7), (0.4, 0.6)):
@@ -241,9 +243,8 @@ def test_a_page_without_scripts_shows_the_same_pictures(address, browser):
     assert page.locator("[role=slider]").count() == 0
 
 
-def test_all_numbers_are_folded_until_they_are_asked_for(address, browser):
-    page = browser.new_page()
-    page.goto(address("open"))
+def test_all_numbers_are_folded_until_they_are_asked_for(shown):
+    page = shown("open")
     cell = page.get_by_text("objective.lower_bound", exact=True)
     assert not cell.is_visible()
     page.locator("summary").click()

@@ -160,7 +160,7 @@ def experiment(request, first_order):
     return Experiment(arx(), 240).whitened(1.0)
 
 
-@pytest.mark.first(20)
+@pytest.mark.first(12)
 @pytest.mark.parametrize("meets", [True, False])
 @pytest.mark.parametrize("limited", [*LIMITS, "none"])
 @pytest.mark.parametrize("kind", SETTINGS)
@@ -201,7 +201,7 @@ def test_limits_hold_exactly(experiment, kind, limited):
     check(experiment, SETTINGS[kind], bounds_of(experiment.inputs, **LIMITS[limited]))
 
 
-@pytest.mark.first(8)
+@pytest.mark.first(4)
 @pytest.mark.parametrize("limited", ["amplitude", "both", "output"])
 @pytest.mark.parametrize("kind", CONVERTERS)
 def test_converters_hold_the_limits_too(experiment, kind, limited):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, questions
+from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.building.system import build_model
@@ -59,22 +59,3 @@ def test_the_spec_keeps_the_words_and_can_be_read_again():
     assert parse_spec(spec.to_yaml()).noise == spec.noise
     with pytest.raises(SpecError, match="stands beside standard_deviation"):
         spec.with_(**{"noise.variance": 2.0})
-
-
-def test_data_are_judged_with_such_noise_and_with_more(tmp_path):
-    """Estimates, and noise that is estimated along, start from D as from one that is written out."""
-    rng, a = np.random.default_rng(3), np.exp(-1.0 / 6.0)
-    u, e, y = np.repeat(rng.choice([-1.0, 1.0], 60), 10), rng.standard_normal((2, 600)), np.zeros((3, 600))
-    for t in range(1, 600):
-        y[0, t] = np.exp(-1.0 / 6.0) * y[0, t - 1] + (1 - np.exp(-1.0 / 6.0)) * u[t - 1]
-        y[1, t] = a * y[1, t - 1] + 0.02 * e[0, t]
-        y[2, t] = 0.3 * y[2, t - 1] + 0.05 * e[1, t]
-    file = tmp_path / "log.csv"
-    np.savetxt(file, np.c_[u, y.sum(axis=0)], delimiter=",", header="u,y", comments="")
-    words = parse_spec(LAG + ASKED + FADES)
-    written = {"variance": words.noise.variance, "D": list(words.noise.D)}
-    found, same = (
-        questions.assess(spec, file).results.result["identification"]["theta"]
-        for spec in (words, words.with_(noise=written))
-    )
-    assert found == pytest.approx(same, rel=1e-6)

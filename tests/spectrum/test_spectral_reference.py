@@ -35,14 +35,6 @@ def test_coefficients_reach_the_reference(hermitian, criterion, expected, close)
     assert bound - value <= (1e-4 if hermitian else 1e-5) * abs(value)
 
 
-def test_coordinates_do_not_matter():
-    """Whitened for another power: the information in raw parameters is the same."""
-    real = problem(False)
-    other = Spectral(paper_experiment(power=3.0), PolynomialBasis(2, 13, (0.0, 2.0)))
-    x = real.basis.even * 500
-    np.testing.assert_allclose(other.information(x), real.information(x), rtol=1e-8, atol=1e-6)
-
-
 def design(problem, criterion):
     basis, k = problem.basis, problem.experiment.size
     maps = np.array([[basis.gram(problem.maps[:, i, j]) for j in range(k)] for i in range(k)])

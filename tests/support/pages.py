@@ -3,6 +3,8 @@
 import re
 
 import html5lib
+import numpy as np
+import scipy.signal
 
 from inputdesign_cli.report.render import script
 
@@ -17,6 +19,14 @@ signal: {type: multisine, candidates: 1, seed: 5}
 """
 LOOP = ", controller: {numerator: [0.1], denominator: [1]}"
 XHTML = "{http://www.w3.org/1999/xhtml}"
+
+
+def recorded(path):
+    """Write a record of the plant of SPEC, as a logger does."""
+    u, e = np.random.default_rng(1).standard_normal((2, 400))
+    y = scipy.signal.lfilter([0, 1], [1, -0.5], u) + e
+    np.savetxt(path, np.c_[np.arange(400.0), u, y], delimiter=",", header="time,u,y", comments="")
+    return path
 
 
 def parse(text):

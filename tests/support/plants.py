@@ -2,9 +2,16 @@
 
 import numpy as np
 
+from inputdesign_cli import parse_spec
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel, Parametrisation, PolynomialModel, Reparametrised
+from inputdesign_cli.questions.building.system import build_model
+
+
+def stated(text):
+    """The model that the sections of a spec state."""
+    return build_model(parse_spec(text, design=False))
 
 
 def arrays(rows):

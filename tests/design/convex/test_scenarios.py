@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.design.convex.demands import Alternative, Demands, Question
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before, samples_for, unlikely
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.spectrum import LinesBasis
 from tests.support.convex_designs import alternatives, around, asked, check, random_spectra, relative
+from tests.support.plants import stated
 
 
 def question(experiment, others=(), *, goal="cost", order=8, fraction=0.1, **more):
     return asked(experiment, goal, relative(fraction), order, others=others, **more)
 
 
-@pytest.mark.first(6)
+@pytest.mark.first(4)
 @pytest.mark.parametrize(
     ("goal", "paid"),
     [
@@ -90,18 +90,13 @@ def test_the_design_agrees_with_a_plain_program(first_order, paid):
     assert plain == pytest.approx(1.0, rel=1e-5)
 
 
-LAG = """
-plant: {parameters: {theta: 1}, continuous: {numerator: [theta], denominator: [1, theta]}}
-noise: {variance: 1}
-accuracy: {criterion: A}
-limits: {input_power: 1, band: [0.001, 100]}
-"""
+LAG = "plant: {parameters: {theta: 1}, continuous: {numerator: [theta], denominator: [1, theta]}}\n"
 
 
 def test_one_constant_between_a_tenth_and_ten():
     """Four lines for the worst relative variance 1 / (theta^2 M) of unit power; by hand 12.69."""
 
-    model = build_model(parse_spec(LAG))
+    model = stated(LAG + "noise: {variance: 1}\n")
 
     def at(theta):
         experiment = Experiment(model.at([theta]), 1, (1e-3, 100.0))
@@ -137,9 +132,7 @@ def test_one_constant_between_a_tenth_and_ten():
 
 def test_the_certificate_of_the_worst_cost_holds_for_random_spectra():
     """max_s cost_s >= a mean of the costs >= sum_s tr(Y_s (M_s - M0_s)), the mean over several plants."""
-    text = "plant: {B: [0, 1], F: [1, -1.6, 0.94]}\nnoise: {variance: 1}\nexperiment: {samples: 500}\n"
-    model = build_model(parse_spec(text + "accuracy: {criterion: A}\nlimits: {input_power: 1}\n"))
-    nominal = Experiment(model, 500)
+    nominal = Experiment(PolynomialModel.single([0, 1], F=[1, -1.6, 0.94]), 500)
     others = alternatives(nominal, [np.array([1.0, -1.6 + d, 0.94]) for d in (-0.1, 0.1)], 0.1)
     stated = question(nominal, others, order=8, cost={"output": 1.0}, paid="worst")
     design = solve_design(stated, tolerance=1e-7, any_spectrum_tolerance=None)
