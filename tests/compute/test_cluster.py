@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -27,6 +29,13 @@ SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 PATHS = str(Path(__file__).parents[2])
 
 
+def wait_until(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 120
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
 class Loopback:
     """A scheduler and its workers, each a process of its own (no nanny: a killed worker stays dead)."""
 
@@ -34,22 +43,24 @@ class Loopback:
         self.folder, self.file, self.certificates = folder, folder / "scheduler.json", certificates
         self.environment = {**os.environ, "PYTHONPATH": PATHS, "OPENBLAS_NUM_THREADS": "1"}
         options = ["--host", host, "--port", "0", "--no-dashboard", "--no-show", "--no-jupyter"]
-        self.processes = [self.start("scheduler", *options, "--scheduler-file", str(self.file))]
-        deadline = time.monotonic() + 30
-        while not self.file.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        self.processes = []
+        self.start("scheduler", *options, "--scheduler-file", str(self.file))
+        wait_until(self.file.exists)
 
-    def start(self, *arguments: str) -> subprocess.Popen:
+    def start(self, *arguments: str, **streams: IO) -> subprocess.Popen:
         command = [sys.executable, "-m", "dask", *arguments, *self.certificates]
-        return subprocess.Popen(command, env=self.environment, **SILENT)
+        self.processes.append(subprocess.Popen(command, env=self.environment, **{**SILENT, **streams}))
+        return self.processes[-1]
 
     def add_worker(self) -> subprocess.Popen:
+        """A worker that the scheduler knows: on a busy machine that alone can take half a minute."""
         options = ["--no-nanny", "--no-dashboard", "--nthreads", "1"]
         options += [] if self.certificates else ["--host", "127.0.0.1"]
         place = ["--local-directory", str(self.folder / "scratch")]
-        worker = self.start("worker", "--scheduler-file", str(self.file), *options, *place)
-        self.processes.append(worker)
+        log = self.folder / f"worker_{len(self.processes)}.log"
+        with log.open("w") as stream:
+            worker = self.start("worker", "--scheduler-file", str(self.file), *options, *place, stderr=stream)
+        wait_until(lambda: "Registered to" in log.read_text())
         return worker
 
     @property

@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve, validate
 from inputdesign_cli.errors import InaccurateError, SpecError
+from inputdesign_cli.questions.least_cost import solve as least_cost
 
 SAMPLES, VARIANCE, NODES = 500, 0.1, 1 << 14
 
@@ -206,22 +207,40 @@ def test_lines_on_the_pole_are_refused():
     assert refused(Plant(1).text("D", "limits: {input_power: 1}"), spectrum) == "needs-limits"
 
 
-@pytest.mark.slow
-def test_where_digits_end_on_the_way_to_what_is_only_approached_a_remedy_is_told():
-    """Power ever nearer to frequency zero is free of charge; a band that leaves it out has an optimum."""
-    text = """
+APPROACHED = """
 plant: {A: [1, -1], B: [0, 0.5, 0.2]}
 noise: {variance: 0.1}
 experiment: {samples: 500, controller: {numerator: [0.5], denominator: [1]}}
 cost: {input_power: 1}
 accuracy: {model_error: {absolute: 0.1, alpha: 2, band: [0.03142, 3.141]}}
+signal: {samples: 100, seed: 1, candidates: 1}
 spectrum: {type: free}
 """
+
+
+def test_what_is_only_approached_is_said_also_where_digits_end_on_the_way(monkeypatch):
+    """Power ever nearer to frequency zero is free of charge."""
+    found = solve(parse_spec(APPROACHED)).result
+    assert ("optimum-only-approached", "doubt") in {(f["code"], f["severity"]) for f in found["findings"]}
+
+    def ended(*_args, **_more):
+        raise InaccurateError.because("internal-disagreement", "digits ended", "ask for less")
+
+    monkeypatch.setattr(least_cost, "audit", ended)
     with pytest.raises(InaccurateError) as caught:
-        solve(parse_spec(text))
-    assert "add cost.output_power or cost.excitation_power" in caught.value.diagnostics[0].hint
-    found = solve(parse_spec(text + "limits: {band: [0.0314, 3.14159]}\n")).result
+        solve(parse_spec(APPROACHED))
+    (told,) = caught.value.diagnostics
+    assert told.code == "internal-disagreement"
+    assert all(remedy in told.hint for remedy in ("cost.output_power", "limits.band", "ask for less"))
+
+
+@pytest.mark.slow
+def test_a_band_that_leaves_out_what_is_only_approached_has_an_optimum():
+    """It costs a little more than what no design gets below."""
+    bound = solve(parse_spec(APPROACHED)).result["objective"]["lower_bound"]
+    found = solve(parse_spec(APPROACHED + "limits: {band: [0.0314, 3.14159]}\n")).result
     assert found["status"] == "optimal"
+    assert bound < found["cost"] < 1.001 * bound
 
 
 TWO_INPUTS = """

@@ -185,17 +185,33 @@ def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
     assert asked["loop"]["Kp"] == pytest.approx(200.0 / (2.4 * 57.5), rel=0.1)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("margin", ["phase_margin: 50", "max_sensitivity_db: 3", "gain_margin: 4"])
-def test_a_margin_that_the_loop_lacks_is_refused_with_what_it_has(margin):
-    """The first value is one at which the nominal plant just keeps it, the second is one to work with."""
-    stated = "accuracy={loop: {tuning: {simc: {tau_c: 30}}, MARGIN}}"
+MARGINS = pytest.mark.parametrize("margin", ["phase_margin: 50", "max_sensitivity_db: 3", "gain_margin: 4"])
+
+
+def refusal(margin):
+    """The loop with this margin, and its refusal."""
+    stated = f"accuracy={{loop: {{tuning: {{simc: {{tau_c: 30}}}}, {margin}}}}}"
     with pytest.raises(SpecError) as caught:
-        solve(parse_spec(TEXT, overrides=[stated.replace("MARGIN", margin)]))
-    hint = caught.value.diagnostics[0].hint
-    edge, roomy = (float(found) for found in re.findall(r"max_sensitivity_db: ([\d.]+).* ([\d.]+)", hint)[0])
-    spec = parse_spec(TEXT, overrides=[stated.replace("MARGIN", f"max_sensitivity_db: {roomy}")])
-    assert solve(spec).result["status"] == "optimal"
-    reached = float(re.search(r"reaches ([\d.]+)", caught.value.diagnostics[0].message)[1])
-    assert reached <= LoopMargin(max_sensitivity_db=edge).peak * (1.0 + 1e-4) <= 1.003 * reached
-    assert LoopMargin(max_sensitivity_db=roomy).peak == pytest.approx(1.2 * reached, rel=3e-3)
+        solve(parse_spec(TEXT, overrides=[stated]))
+    return stated, caught.value.diagnostics[0]
+
+
+@MARGINS
+def test_a_margin_that_the_loop_lacks_is_refused_with_what_it_has_as_stated(margin):
+    """The first value is one at which the nominal plant just keeps it, the second is one to work with."""
+    _, refused = refusal(margin)
+    key = margin.partition(":")[0]
+    edge, roomy = (
+        LoopMargin(**{key: float(found)}) for found in re.findall(rf"{key}: ([\d.]+)", refused.hint)
+    )
+    reached = float(re.search(r"reaches ([\d.]+)", refused.message)[1])
+    assert reached <= edge.peak * (1.0 + 1e-4) <= 1.003 * reached
+    assert roomy.peak == pytest.approx(1.2 * reached, rel=3e-3)
+
+
+@pytest.mark.slow
+@MARGINS
+def test_the_margin_to_work_with_has_a_design(margin):
+    stated, refused = refusal(margin)
+    roomy = re.search(r"example (\w+: [\d.]+)", refused.hint)[1]
+    assert solve(parse_spec(TEXT, overrides=[stated.replace(margin, roomy)])).result["status"] == "optimal"

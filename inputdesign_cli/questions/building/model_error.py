@@ -156,8 +156,7 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
         return None
     peak = float(np.max(admissible.nominal(made.grid)))
     message = f"|S| of the nominal loop reaches {peak:.4g}, and the margin asks for {stated.peak:.4g} at most"
-    edge, roomy = (rounded_up(20.0 * np.log10(factor * peak), 4) for factor in (1.0, 1.2))
-    less = f"max_sensitivity_db: {edge} (the nearer, the longer), for example {roomy}"
+    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
     hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
     return spec.complain("admissible-not-positive", message, hint=hint, key=_LOOP)
 

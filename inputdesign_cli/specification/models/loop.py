@@ -228,3 +228,12 @@ class LoopMargin(
             return 0.5 / math.sin(math.radians(self.phase_margin) / 2)
         assert self.gain_margin is not None
         return self.gain_margin / (self.gain_margin - 1.0)
+
+    def allowing(self, peak: float) -> str:
+        """Return an entry of the stated margin with which |S| may reach a little more than `peak`."""
+        if self.phase_margin is not None:
+            degrees = math.degrees(2.0 * math.asin(0.5 / peak))
+            return f"phase_margin: {math.floor(10.0 * degrees) / 10.0:g}"
+        if self.gain_margin is not None:
+            return f"gain_margin: {1.0 + math.floor(1000.0 / (peak - 1.0)) / 1000.0:g}"
+        return f"max_sensitivity_db: {math.ceil(2000.0 * math.log10(peak)) / 100.0:g}"
