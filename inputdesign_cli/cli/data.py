@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Into, Shown
+from inputdesign_cli.cli.options import Changes, Into, Shown, typed
 from inputdesign_cli.cli.rows import Levels, Rows, Written, levels
 from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
+
+if TYPE_CHECKING:
+    from inputdesign_cli.outcome.results import Results
 
 
 def explore(
@@ -113,8 +118,31 @@ def assess(
             operating_point=levels.point,
             preparation=rows.of(data),
         )
-    keep(assessment.results, place, shown)
+    again = typed(changes, levels, rows)
+    begins = {
+        "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
+        "idesign explore": ["idesign", "explore", *typed(rows)],
+        "idesign solve SPEC": ["idesign", "solve", str(spec), *typed(changes)],
+    }
+    keep(_with_typed(assessment.results, begins), place, shown)
     _end(assessment.verdict)
+
+
+def _with_typed(results: Results, begins: Mapping[str, Sequence[str]]) -> Results:
+    """Return an assessment whose next command names the spec and the options that were typed.
+
+    Args:
+        begins: how commands begin -> the words that are to stand there.
+    """
+    judged = results.outcome.assessment
+    assert judged is not None
+    command = judged.next or ""
+    for begin, words in begins.items():
+        if command.startswith(begin):
+            command = shlex.join(words) + command.removeprefix(begin)
+    return replace(
+        results, outcome=replace(results.outcome, assessment=replace(judged, next=command or None))
+    )
 
 
 def campaign(

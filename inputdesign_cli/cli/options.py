@@ -20,6 +20,8 @@ import typer
 from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
     from inputdesign_cli.compute.executor import Executor
 
 TABLE: dict[str, dict[str, dict[str, Any]]] = tomllib.loads(
@@ -45,8 +47,7 @@ def declared(command: Callable[..., None], name: str) -> Callable[..., None]:
         kind, types = groups[one.name], get_type_hints(groups[one.name])
         for field in fields(kind):
             stated = one.replace(name=field.name, default=field.default)
-            owner = next((c.__name__ for c in kind.__mro__ if field.name in TABLE.get(c.__name__, ())), "")
-            parameters.append(_declared(stated, types[field.name], owner))
+            parameters.append(_declared(stated, types[field.name], _owner(kind, field.name)))
 
     @wraps(command)
     def run(**given: object) -> None:
@@ -59,6 +60,31 @@ def declared(command: Callable[..., None], name: str) -> Callable[..., None]:
     run.__annotations__ = {one.name: one.annotation for one in parameters}
     run.__dict__["__signature__"] = Signature(parameters)
     return run
+
+
+def _owner(kind: type, name: str) -> str:
+    """Return the section of `options.toml` that declares a field of a dataclass."""
+    return next((c.__name__ for c in kind.__mro__ if name in TABLE.get(c.__name__, ())), "shared")
+
+
+def typed(*groups: DataclassInstance) -> list[str]:
+    """Return the words of a command line that give these options again, without those at their defaults.
+
+    Args:
+        groups: dataclasses of options, as a command takes them.
+    """
+    words: list[str] = []
+    for group in groups:
+        for field in fields(group):
+            given = getattr(group, field.name)
+            if given == field.default:
+                continue
+            stated = TABLE[_owner(type(group), field.name)][field.name]
+            name, _, off = stated.get("names", [f"--{field.name.replace('_', '-')}"])[0].partition("/")
+            switch = field.type == "bool"
+            values = given if isinstance(given, list) else [given]
+            words += [name if given else off] if switch else [w for one in values for w in (name, str(one))]
+    return words
 
 
 def _declared(one: Parameter, kind: type, owner: str, *, is_argument: bool = False) -> Parameter:

@@ -37,7 +37,9 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
         *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
     ]
     title = outcome.title
-    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])
+    # A command is to be copied: a terminal must not break it.
+    page = [*aligned(lines, gap=3, wrap=True), *said("next", outcome)]
+    return "\n".join([*([title, ""] if title else []), *page])
 
 
 def _is_trouble(outcome: Outcome) -> bool:
@@ -47,7 +49,7 @@ def _is_trouble(outcome: Outcome) -> bool:
 
 
 def _trouble(outcome: Outcome) -> Iterator[Line]:
-    """Yield the finding that comes first and the next command: no number of a refuted model counts."""
+    """Yield the finding that comes first: no number of a refuted model counts."""
     yield from _named("verdict", said("verdict", outcome))
     more = len(outcome.notes or ()) - 1
     if more > 0:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,19 +15,22 @@ from inputdesign_cli.findings.places import Record
 from inputdesign_cli.findings.refuted_structure import DRIFT
 from inputdesign_cli.identification import Estimate
 
-_AGAIN = "the same command with "
+# SPEC and options of the command that was typed are filled in where they are known, on the command line.
+_ASSESS = "idesign assess SPEC "
+_AGAIN = _ASSESS + "{logs} "
+_ALONE = _ASSESS + "{first} --output {alone}"  # where the run of all records does not stand
 _EXPLORE = "idesign explore {logs}"
 _NEXT = {
     # Samples that are wrong or of another system upset every test.
-    "samples-repeated": "idesign assess SPEC {first}",
+    "samples-repeated": _ALONE,
     "columns-misaligned": _EXPLORE,
     "sensor-stands-still": _AGAIN + "{rows}",
     "spikes": _AGAIN + "{rows}",
     "input-logged-late": _EXPLORE,
     "input-answers-output": _AGAIN
-    + '--set "experiment.controller={{numerator: [..], denominator: [..]}}", the controller of the loop',
+    + '--set "experiment.controller={{numerator: [..], denominator: [..]}}"  # the controller of the loop',
     "input-without-effect": _EXPLORE,
-    "records-differ": "idesign assess SPEC {first}",
+    "records-differ": _ALONE,
     "prior-of-these-data": _AGAIN + "--set experiment.prior=null",
     "prior-contradicted": _AGAIN + "--set experiment.prior=null",
     "level-shift": _AGAIN + "{rows}",
@@ -40,12 +45,12 @@ _NEXT = {
     "plant-changed": _AGAIN + "--range {half}",
     "no-accuracy-here": _EXPLORE,
     "neglected-parameter": _EXPLORE,
-    "other-minimum": "idesign solve SPEC --set signal.seed=2, and assess both records",
+    "other-minimum": "idesign solve SPEC --set signal.seed=2  # then assess both records",
     # Of a frequency response without a model.
     "spiked-periods": _AGAIN + "--without ROWS",
     "drifting-periods": _AGAIN + "--detrend linear",
-    "nonlinear-response": "idesign solve SPEC --set signal.phases=random, and apply half of it",
-    "response-within-chance": "idesign assess SPEC {logs} MORE.csv, a further record of this signal",
+    "nonlinear-response": "idesign solve SPEC --set signal.phases=random  # and apply half of it",
+    "response-within-chance": _AGAIN + "MORE.csv  # a further record of this signal",
 }
 """The command after each finding that leaves a verdict open; an earlier one silences the later ones."""
 _DETREND = _AGAIN + "--detrend linear"
@@ -76,11 +81,15 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         found = [one for one in against if one.code == DRIFT.code]
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
-    middle, files = float(data.time[len(data.time) // 2]), [name for name, _ in data.files] or ["DATA"]
+    option = str(alike[0].figures.get("option", "--without ROWS"))
+    if option == "--without" and "{rows}" in command:  # too many rows to be listed
+        command = _EXPLORE
+    middle, files = float(data.time[len(data.time) // 2]), data.paths or ("DATA",)
     figures = {
-        "logs": " ".join(files),
-        "first": files[0],
-        "rows": alike[0].figures.get("option", "--without ROWS"),
+        "logs": shlex.join(files),
+        "first": shlex.quote(files[0]),
+        "alone": shlex.quote(f"runs/{Path(files[0]).stem}_alone"),
+        "rows": option,
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }
     return Leading(alike, command.format(**figures))

@@ -61,6 +61,7 @@ class Record:
         lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
             the inputs cause a part of it.
         remarks: what a question did to the record later.
+        paths: of the files, as they were given.
     """
 
     u: Array
@@ -79,6 +80,7 @@ class Record:
     repeated: tuple[Finding, ...] = ()
     lined: bool = False
     remarks: tuple[str, ...] = ()
+    paths: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -35,13 +35,15 @@ if TYPE_CHECKING:
     from inputdesign_cli.records import Preparation
 
 Files = str | Path | Sequence[str | Path]
+Stated = Spec | str | Path | Mapping[str, object]
+"""A spec, the name of its file, or its content as `Spec.from_dict` takes it."""
 Verb = Literal["solve", "analyse", "simulate"]
 """What makes results of a spec, by the names that commands, sweeps and golden files use."""
 # Numbers of a spec within this many powers of ten of one are not to blame.
 _USUAL = 6.0
 
 
-def solve(spec: Spec) -> Results:
+def solve(spec: Stated) -> Results:
     """Design the experiment that the spec asks for; a given excitation is analysed.
 
     Raises:
@@ -49,30 +51,34 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
-    return _in_time(spec, lambda: build_task(spec).solve())
+    known = _known(spec)
+    return _in_time(known, lambda: build_task(known).solve())
 
 
-def analyse(spec: Spec) -> Results:
+def analyse(spec: Stated) -> Results:
     """Return the accuracy that a given excitation gives, without any design. It raises as `solve` does."""
-    return _in_time(spec, lambda: build_analysis(spec).solve())
+    known = _known(spec)
+    return _in_time(known, lambda: build_analysis(known).solve())
 
 
-def validate(spec: Spec) -> None:
+def validate(spec: Stated) -> None:
     """Read, check and set up, but compute nothing: the design, or the estimation where none is asked for."""
     from inputdesign_cli.questions.assessment.build import build_identification
 
-    with _placed(spec):
-        build_task(spec) if spec.asks_for_design else build_identification(spec)
+    known = _known(spec, design=None)
+    with _placed(known):
+        build_task(known) if known.asks_for_design else build_identification(known)
 
 
-def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
+def simulate(spec: Stated, *, executor: Executor | None = None) -> Results:
     """Design the experiment, or take the given one, and try it many times on a simulated true system.
 
     Args:
         executor: where batches of runs are computed (default: in this process); the result does not depend
             on it.
     """
-    return _in_time(spec, lambda: build_task(spec).simulate(executor))
+    known = _known(spec)
+    return _in_time(known, lambda: build_task(known).simulate(executor))
 
 
 def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Results:
@@ -96,7 +102,7 @@ def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:
 
 
 def identify(
-    spec: Spec,
+    spec: Stated,
     data: Files,
     *,
     remove_means: bool = False,
@@ -124,17 +130,18 @@ def identify(
     from inputdesign_cli.questions.frequency_response.build import build_measurement
     from inputdesign_cli.questions.frequency_response.measure import measure
 
-    known, files = _prepared(preparation, operating_point, remove_means), _paths(data)
-    with _placed(spec):
+    prepared, files = _prepared(preparation, operating_point, remove_means), _paths(data)
+    known = _known(spec, design=False)
+    with _placed(known):
         if frequency_response:
-            found = measure(build_measurement(spec), files, known)
+            found = measure(build_measurement(known), files, prepared)
         else:
-            found = identify_records(build_identification(spec), files, known)
-        return finite(found, most_extreme(spec.content))
+            found = identify_records(build_identification(known), files, prepared)
+        return finite(found, most_extreme(known.content))
 
 
 def assess(
-    spec: Spec,
+    spec: Stated,
     data: Files,
     *,
     remove_means: bool = False,
@@ -150,14 +157,14 @@ def assess(
     from inputdesign_cli.questions.frequency_response.build import build_measurement
     from inputdesign_cli.questions.frequency_response.measure import measure
 
-    with _placed(spec):
-        known = _prepared(preparation, operating_point, remove_means)
-        if spec.accuracy.frequency_response is not None:
-            results = measure(build_measurement(spec), _paths(data), known, assess=True)
+    known, prepared = _known(spec), _prepared(preparation, operating_point, remove_means)
+    with _placed(known):
+        if known.accuracy.frequency_response is not None:
+            results = measure(build_measurement(known), _paths(data), prepared, assess=True)
             found = results.outcome.assessment
             assert found is not None  # the spec has lines
-            return Assessment(found.verdict, finite(results, most_extreme(spec.content)))
-        return assess_records(build_identification(spec), _paths(data), known)
+            return Assessment(found.verdict, finite(results, most_extreme(known.content)))
+        return assess_records(build_identification(known), _paths(data), prepared)
 
 
 def next_round(spec: Spec, decide: Callable[[Rounds], Results], *, begins: bool = False) -> Results:
@@ -232,6 +239,15 @@ def _(model: Results) -> control.lti.LTI:
     found = model.files.get("model.yaml")
     blocks = {} if found is None else yaml.safe_load(found)
     return to_control(spec.with_(**{key: blocks[key] for key in ("plant", "noise") if key in blocks}))
+
+
+def _known(spec: Stated, design: bool | None = True) -> Spec:
+    """Return a spec as it is, or read it from the file that is named or from a mapping; see `load_spec`."""
+    if isinstance(spec, Spec):
+        return spec
+    if isinstance(spec, Mapping):
+        return Spec.from_dict(spec, design=design)
+    return load_spec(Path(spec), design=design)
 
 
 def _paths(data: Files) -> list[Path]:

@@ -125,6 +125,7 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
         ),
         repeated=tuple(samples_repeated(paths, [one.values for one in recorded])),
         lined=any(one.lined for one in records),
+        paths=tuple(map(str, paths)),
     )
 
 

@@ -1,12 +1,15 @@
 """One finding explains the others, and the command that it names ends the matter."""
 
+import json
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.signal
 
 from inputdesign_cli import assess, parse_spec
+from inputdesign_cli.errors import EXIT_DONE, EXIT_UNDECIDED
 from inputdesign_cli.finding import REFUTED, UNDECIDED, Finding
 from inputdesign_cli.findings import kinds
 from inputdesign_cli.findings.faults import follows_inputs
@@ -14,6 +17,7 @@ from inputdesign_cli.findings.leading import leading
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.questions import explore
 from inputdesign_cli.records import Preparation
+from tests.support.commands import caller
 from tests.support.heater import said
 
 ASKED = "accuracy={model_error: {relative: 0.15, band: [0.0005, 0.01]}}"
@@ -28,7 +32,6 @@ spectrum: {{type: fir, order: 10}}
 IN_S = "{continuous: {gain: 1.6, time_constant: 240, dead_time: 35}, sample: zoh}"
 IN_Q = "{B: [0, 0, 0, 0.08, 0.01], F: [1, -0.944]}"
 STEP, K, T, L = 15, 1.72, 262.0, 31
-AGAIN = "the same command with "
 
 
 def record(path, fault, seed, samples=480):
@@ -54,10 +57,11 @@ def record(path, fault, seed, samples=480):
 def followed(spec, data, command):
     """What comes of the command that a verdict names."""
     if command.startswith("idesign explore"):
-        assert command == f"idesign explore {data.name}"
+        assert shlex.split(command) == ["idesign", "explore", str(data)]
         found = explore([data]).results.resolved_spec
         return assess(parse_spec(found, overrides=[ASKED]), data)
-    option, value = shlex.split(command.removeprefix(AGAIN))
+    *again, option, value = shlex.split(command)
+    assert again == ["idesign", "assess", "SPEC", str(data)]
     if option == "--detrend":
         return assess(spec, data, preparation=Preparation(detrend=value))
     assert option == "--set"
@@ -80,6 +84,24 @@ def ended(fault, plant, seed, path):
 @pytest.mark.parametrize(("fault", "seed"), [("noise", 0), ("drift", 0)])
 def test_the_command_ends_the_matter(fault, seed, tmp_path):
     assert ended(fault, IN_Q, seed, tmp_path)
+
+
+@pytest.mark.parametrize("fault", ["drift", "delay"])
+def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys):
+    """In the folder of the user, with names that have blanks, and with the options that were typed."""
+    monkeypatch.chdir(tmp_path)
+    folder, idesign = Path("of today"), caller(monkeypatch, capsys)
+    folder.mkdir()
+    record(folder / "a record.csv", fault, 0)
+    renamed = (folder / "a record.csv").read_text().replace("time,u1,y1", "time,valve,outlet")
+    (folder / "a record.csv").write_text(renamed)
+    (folder / "heat exchanger.yaml").write_text(f"plant: {IN_Q}{SPEC}")
+    options = ["--columns", "u=valve,y=outlet", "--set", "title=a trial"]
+    code, out, _ = idesign("assess", folder / "heat exchanger.yaml", folder / "a record.csv", *options)
+    assert code == EXIT_UNDECIDED
+    printed = out.splitlines()[-1].removeprefix("next: ")
+    assert json.loads(Path("runs/a record_assessed/result.json").read_text())["assessment"]["next"] == printed
+    assert idesign(*shlex.split(printed)[1:])[0] == EXIT_DONE
 
 
 @pytest.mark.slow
@@ -105,7 +127,9 @@ def test_every_kind_that_leaves_a_verdict_open_names_a_command():
     data = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
     for code in open_ - {"campaign-refuted"}:
         first = leading([Finding(code, REFUTED, "x", "", {"rows": []})], None, data)
-        assert first.command.startswith(("idesign ", AGAIN))
+        assert first.command.startswith(
+            ("idesign assess SPEC DATA ", "idesign explore DATA", "idesign solve SPEC ")
+        )
         assert "{" not in first.command.replace("{numerator", "")
 
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import yaml
 
-from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.errors import SpecError
 from tests.support.first_order_specs import ERROR, FIR, PLANT, run
 
 
@@ -221,3 +223,15 @@ def test_what_noise_alone_tells_of_some_parameters_needs_no_excitation(spectrum,
     ).result
     assert (found["cost"] > 0) == needed
     assert (found["status"] == "nothing_needed") != needed
+
+
+def test_a_command_takes_a_spec_its_file_or_its_content(tmp_path):
+    file = tmp_path / "first.yaml"
+    file.write_text(PLANT + ERROR + FIR)
+    cost = solve(parse_spec(PLANT + ERROR + FIR)).cost
+    for given in (file, str(file), yaml.safe_load(file.read_text())):
+        validate(given)
+        assert solve(given).cost == pytest.approx(cost, rel=1e-9)
+    with pytest.raises(SpecError) as caught:
+        solve(str(tmp_path / "other.yaml"))
+    assert caught.value.diagnostics[0].code == "file-missing"

@@ -102,7 +102,7 @@ class Spec(Section):
 
     @classmethod
     def from_dict(
-        cls, data: Mapping[str, object], *, folder: Path | None = None, design: bool = True
+        cls, data: Mapping[str, object], *, folder: Path | None = None, design: bool | None = True
     ) -> Spec:
         """Return the spec of plain data: mappings, lists, arrays, numbers and texts, as a file holds them.
 
