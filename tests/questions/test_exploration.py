@@ -98,6 +98,7 @@ def test_two_heaters_are_told_by_their_first_half(tmp_path):
     assert second > 91.1 - 2.0
 
 
+@pytest.mark.slow
 def test_an_input_without_effect_earns_no_trust(tmp_path):
     """The best of many structures explains 22 % of the noise of these 20 unseen samples."""
     path = lag_log(tmp_path / "log.csv", gain=0.0, samples=50, seed=1)

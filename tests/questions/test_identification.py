@@ -234,10 +234,10 @@ def test_noise_from_before_the_record_is_no_start_in_motion(write, seed, samples
     assert not found.result["identification"]["free_start"]
     assert abs(found.result["identification"]["theta"]["c1"]) < 1 - 1 / samples
     assert "start-estimated" not in codes(found)
-    # Where the first residual leaves no doubt it is said.
-    columns["y1"] = columns["y1"] + 100.0
-    start = codes(identify(load_spec(SPEC), write(columns)))["start-estimated"]
-    assert abs(start.figures["first_residual"]) > 3.0 * start.figures["noise"]
+    if before == 0:  # where the first residual leaves no doubt it is said
+        columns["y1"] = columns["y1"] + 100.0
+        start = codes(identify(load_spec(SPEC), write(columns)))["start-estimated"]
+        assert abs(start.figures["first_residual"]) > 3.0 * start.figures["noise"]
 
 
 @pytest.mark.parametrize("others", [(), pytest.param((False, True), marks=pytest.mark.slow)])

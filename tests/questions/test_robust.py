@@ -106,9 +106,8 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     ]
     less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
     dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
-    solved = task.solve()
-    told = solved.result["robust"]["fresh"]
-    assert (told["less"], told["dearer"], told["missed"]) == (len(less), len(dearer), len(less | dearer))
+    told = robust_result(done, done.plants).entry.fresh
+    assert (told.less, told.dearer, told.missed) == (len(less), len(dearer), len(less | dearer))
     assert less > dearer > set()
 
 

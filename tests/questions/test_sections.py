@@ -57,6 +57,7 @@ OTHER = {
 SPECIAL = {
     "analyse": {"spectrum": "{given: {type: white, power: 2}}", "limits": "{input_power: 0.5}"},
     "simulate": {"campaign": "{stages: [80], max_samples: 80}"},
+    "assess": {"signal": "{type: binary, candidates: 1, seed: 3}"},
     "campaign": {
         "limits": "{input_power: 1000, amplitude: 10}",
         "experiment": "{samples: 120}",

@@ -159,6 +159,7 @@ def without_a_value(rows):
     return [*rows[:3], rows[3].replace(rows[3].split(",")[1], "nan", 1), *rows[4:]]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("mend", [without_a_value, lambda rows: rows[5:]])
 def test_rows_that_are_missing_leave_the_others_where_they_are(begun, taken, tmp_path, mend):
     """The applied samples count, whether the record begins late or has a gap."""
