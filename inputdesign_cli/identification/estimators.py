@@ -119,13 +119,14 @@ class Estimate:
 
 @dataclass(frozen=True)
 class BatchEstimate:
-    """Prediction-error estimates of many records."""
+    """Holds prediction-error estimates of many records."""
 
     theta: Array  # (runs, k)
     noise: Array  # (runs, p, p) covariance of e, unbiased to first order
     information: Array  # (runs, k, k), whose inverse is the covariance of theta
     converged: NDArray[np.bool_]  # (runs,)
     steps: NDArray[np.int64]  # (runs,)
+    fast: bool = False  # whether all records were estimated in one pass
 
 
 @singledispatch
@@ -228,12 +229,14 @@ def fit_batch(
     kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.model.names)))
-    problem = None if free else kind.batch(inputs, outputs)
+    together = None if free else kind.batch(inputs, outputs)
+    problem = together
     if problem is None:
         runs = zip(inputs, outputs, strict=True)
         problem = RecordProblem(tuple(Records(kind, (run,), free=free) for run in runs))
     found = minimise(problem, np.array(begin))
-    return BatchEstimate(found.theta, *problem.concluded(found.theta), found.converged, found.steps)
+    theta, fast = found.theta, together is not None
+    return BatchEstimate(theta, *problem.concluded(theta), found.converged, found.steps, fast)
 
 
 def information_of_data(

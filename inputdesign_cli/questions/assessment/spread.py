@@ -2,7 +2,8 @@
 
 First-order theory states a covariance of the estimate. A short record may hold too little noise to average,
 and the likelihood may be no parabola. Then records of the estimated model are simulated and estimated again.
-How far they scatter depends on the plant, so that plants of the confidence region are simulated as well.
+How far they scatter depends on the plant, so that plants of the confidence region are simulated as well,
+where that takes a moment.
 """
 
 from __future__ import annotations
@@ -43,13 +44,13 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     """
     if estimate.errors.size >= _PLENTY * estimate.theta.size or not estimate.search.converged:
         return estimate, []
-    factor = _scatter(model, u, step, _RUNS, free=estimate.start.free)
+    factor, fast = _scatter(model, u, step, _RUNS, free=estimate.start.free)
     if factor <= _LUCK:
         return estimate, []
     each = [factor]
-    for other in _possible(model, min(factor, _WIDEST) * estimate.covariance):
+    for other in _possible(model, min(factor, _WIDEST) * estimate.covariance) if fast else ():
         with suppress(ArithmeticError, RuntimeWarning):  # a plant whose numbers have no end
-            each.append(_scatter(other, u, step, _EACH, free=estimate.start.free))
+            each.append(_scatter(other, u, step, _EACH, free=estimate.start.free)[0])
     factor = max(factor, float(np.quantile(each, _MOST_OF_THEM)))
     wider = replace(estimate, factor=estimate.factor / np.sqrt(factor))
     return wider, scattered(float(np.sqrt(factor)), _RUNS, none=factor >= _MOST)
@@ -67,18 +68,21 @@ def _possible(model: Model, covariance: Array) -> list[Model]:
     return found
 
 
-def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> float:
-    """Return the 95 % quantile of squared distances from the model over that of first-order theory."""
+def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> tuple[float, bool]:
+    """Return the 95 % quantile of squared distances from the model over that of first-order theory.
+
+    Then whether the estimates took a moment, since all records were estimated in one pass.
+    """
     rng = np.random.default_rng(0)
     e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
     try:
         found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free)
     except np.linalg.LinAlgError:  # records as short as this determine no estimate
-        return _MOST
+        return _MOST, False
     away = (found.theta - model.theta)[found.converged]
     if len(away) < _SETTLED * runs:
-        return _MOST
+        return _MOST, False
     squares = np.einsum("ri,rij,rj->r", away, found.information[found.converged], away)
     factor = float(np.quantile(squares, _LEVEL) / scipy.stats.chi2.ppf(_LEVEL, model.theta.size))
-    return min(factor, _MOST) if np.isfinite(factor) else _MOST
+    return min(factor, _MOST) if np.isfinite(factor) else _MOST, found.fast
