@@ -66,7 +66,7 @@ expected speed:
 
 ![the voltage to apply and the speed to be expected](images/mechatronics_signal.png)
 
-![the loop with the discs that the data leave, and the circle to keep off](images/mechatronics_nyquist.png)
+![the loop, its discs of uncertainty, and the circle to avoid](images/mechatronics_nyquist.png)
 
 The discs of uncertainty stay out of the 6 dB circle about -1.
 

@@ -280,13 +280,13 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     line = Traced(L.real, L.imag, curves.frequency, style.frequency_label(time_unit), values, color=BLUE)
     line.set_label("C G, nominal")
     axes.add_line(line)
-    handles: list[Artist] = [line, Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)")]
+    handles: list[Artist] = [line, Patch(color=BLUE, alpha=0.3, label="model error |C| r_u")]
     if curves.circle is not None:
         axes.add_patch(Circle((-1.0, 0.0), curves.circle, color=ORANGE, alpha=0.07, linewidth=0))
         axes.add_patch(
             Circle((-1.0, 0.0), curves.circle, fill=False, edgecolor=ORANGE, linestyle=DASHED, linewidth=1.6)
         )
-        label = f"to be kept off: |S| up to {1.0 / curves.circle:.3g}"
+        label = f"not admissible: |S| above {1.0 / curves.circle:.3g}"
         handles.append(Patch(facecolor="#FDF1E9", edgecolor=ORANGE, linestyle=DASHED, label=label))
     limiting = np.interp(curves.limiting, curves.frequency, L)
     limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
