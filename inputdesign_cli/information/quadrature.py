@@ -239,7 +239,6 @@ def integrate_band(
     sums: Sums = PRODUCTS,
     highest_lag: int = 0,
     knots: Array = _NONE,
-    several: bool = False,
 ) -> NDArray:
     """Integrate over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
@@ -256,7 +255,7 @@ def integrate_band(
         hi=band[1] / unit,
         highest_lag=highest_lag,
         knots=knots / unit,
-        several=several,
+        several=True,
         unit=unit,
     )
 

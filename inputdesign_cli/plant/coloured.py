@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TypeVar, cast
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
@@ -30,7 +31,7 @@ from inputdesign_cli.plant.model import (
     row_parameters,
     tables_at,
 )
-from inputdesign_cli.plant.polynomial import all_roots, evaluate, unit_circle
+from inputdesign_cli.plant.polynomial import all_roots
 
 _T = TypeVar("_T")
 _ONE = (np.ones(1),)
@@ -167,8 +168,8 @@ class Coloured(Parametrised, Derived):
         return beside_zero(w, self._nearest)
 
     def _inverse_at(self, w: ArrayLike) -> ComplexArray:
-        q = unit_circle(w)
-        return np.stack([evaluate(a, q) / evaluate(b, q) for a, b in self.inverse_filters], axis=-1)
+        q = np.exp(-1j * np.asarray(w))
+        return np.stack([polyval(q, a) / polyval(q, b) for a, b in self.inverse_filters], axis=-1)
 
     def prediction_gradient(self, w: ArrayLike, y: Signals, u: Signals, e: Signals) -> ComplexArray:
         """Return the gradient of the prediction as (n, k, p, m), see `Model`."""
@@ -189,12 +190,12 @@ class Coloured(Parametrised, Derived):
         shape = (len(of_plant), len(self.own_parameters), *of_plant.shape[2:])
         own = np.zeros(shape, dtype=complex)
         if w is not None and e is not None:
-            q = unit_circle(w)
+            q = np.exp(-1j * np.asarray(w))
             for index, parameter in enumerate(self.own_parameters):
                 for i, _ in parameter.places:
                     below, sign = self.below(parameter.letter, i)
                     if below is not None:
-                        factor = sign * q**parameter.power / evaluate(below, q)
+                        factor = sign * q**parameter.power / polyval(q, below)
                         own[:, index, i] = factor[:, None] * e[:, i]
         return np.concatenate([of_plant, own], axis=1)
 

@@ -2,91 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.polynomial.polynomial import polyval
+from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 
-Key = TypeVar("Key")
-_latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
-_WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared
 _MODERATE = 1e100  # quotients up to this are no overflow
-
-
-def unit_circle(w: ArrayLike) -> ComplexArray:
-    """Return q^-1 at normalised frequencies `w` (rad/sample), in the same shape.
-
-    At w - j rho it is on a circle of radius e^-rho: the transform of signals weighted with e^(-rho t).
-    """
-    at = np.asarray(w)
-    asked, known = _latest[0]
-    # G, H and their gradients are asked for at the same frequencies in turn, also for similar plants.
-    if at.shape == asked.shape and np.array_equal(at, asked):
-        return known
-    q = np.asarray(np.exp(-1j * at))
-    if at.size < _WORTH_KEEPING:
-        return q
-    q.setflags(write=False)
-    _latest[0] = (at.copy(), q)
-    return q
-
-
-def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
-    """Return the value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
-
-    Several polynomials (S, l) have values (S, ..).
-    """
-    stated = np.asarray(coefficients, dtype=float)
-    if stated.ndim == 2 and len(stated) > 1:
-        return _horner(stated.reshape(len(stated), *(1 for _ in np.shape(q)), -1), q)
-    if stated.ndim == 2:
-        return evaluate(stated[0], q)[None]
-    c = stated.tolist()
-    if len(c) == 1:
-        return np.full(np.shape(q), c[0], dtype=complex)
-    value: ComplexArray = c[-1] * q
-    value += c[-2]
-    for coefficient in c[-3::-1]:  # Horner
-        value *= q
-        value += coefficient
-    return value
-
-
-def _horner(coefficients: Array, q: ComplexArray) -> ComplexArray:
-    """Return sum_i coefficients[.., i] q^i for coefficients (.., l), broadcast against q."""
-    value = np.zeros(np.broadcast_shapes(coefficients.shape[:-1], np.shape(q)), dtype=complex)
-    value += coefficients[..., -1]
-    for lag in range(coefficients.shape[-1] - 2, -1, -1):
-        value *= q
-        value.real += coefficients[..., lag]
-    return value
-
-
-def evaluate_all(polynomials: Mapping[Key, Sequence[Array]], q: ComplexArray) -> dict[Key, ComplexArray]:
-    """Return values (S, 1, n) at `q` of polynomials of S models each; of constants (S, 1, 1)."""
-    tables = {key: np.array(one) for key, one in polynomials.items()}
-    found = {key: one[:, None].astype(complex) for key, one in tables.items() if one.shape[1] == 1}
-    varying = [key for key, one in tables.items() if one.shape[1] > 1]
-    if varying:
-        longest = max(tables[key].shape[1] for key in varying)
-        models = len(tables[varying[0]])
-        rows = np.zeros((len(varying), models, longest))
-        for row, key in zip(rows, varying, strict=True):
-            row[:, : tables[key].shape[1]] = tables[key]
-        at_q = evaluate(rows.reshape(-1, longest), q).reshape(len(varying), models, 1, q.size)
-        found |= dict(zip(varying, at_q, strict=True))
-    return found
-
-
-def powers(q: ComplexArray, highest: int) -> list[ComplexArray]:
-    """Return the powers of q up to the `highest`, from q^0 on; at least up to the first."""
-    found = [np.ones_like(q), q]
-    for _ in range(highest - 1):
-        found.append(found[-1] * q)
-    return found
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
@@ -128,9 +52,8 @@ def at(matrix: Array, q: ComplexArray) -> ComplexArray:
 
     The values of an entry are contiguous in memory.
     """
-    value = _horner(matrix[..., None, :], q)
-    *leading, rows, columns, last = range(value.ndim)
-    return value.transpose(*leading, last, rows, columns)
+    values = polyval(q, np.moveaxis(matrix[..., None, :], -1, 0), tensor=False)
+    return np.asarray(np.moveaxis(values, -1, -3), dtype=complex)
 
 
 def multiply(left: Array, right: Array) -> Array:

@@ -15,11 +15,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 import scipy
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import frequency_plane, logarithmic_distance
-from inputdesign_cli.plant.polynomial import all_roots, at, delay_of, evaluate, roots_in_z, stack, unit_circle
+from inputdesign_cli.plant.polynomial import all_roots, at, delay_of, roots_in_z, stack
 
 Coefficients = Sequence[float] | Array
 
@@ -61,8 +62,8 @@ class Rational(ScalarTransfer):
 
     def at(self, w: ArrayLike) -> ComplexArray:
         """Return the frequency response at normalised frequencies `w`."""
-        q = unit_circle(w)
-        return evaluate(self.numerator, q) / _product_at(self.denominator, q)
+        q = np.exp(-1j * np.asarray(w))
+        return polyval(q, self.numerator) / _product_at(self.denominator, q)
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -217,7 +218,7 @@ class TransferMatrix:
 
     def fraction_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Return P (n, rows, columns) and the diagonal of Q (n, rows) at normalised frequencies `w` (n,)."""
-        q = unit_circle(w)
+        q = np.exp(-1j * np.asarray(w))
         return at(self.numerator, q), np.stack([_product_at(row, q) for row in self.factors], axis=-1)
 
     def scaled(self, factor: Rational) -> TransferMatrix:
@@ -277,5 +278,5 @@ def product_of(polynomials: Iterable[Coefficients]) -> Array:
 def _product_at(polynomials: Iterable[Array], q: ComplexArray) -> ComplexArray:
     value = np.ones_like(q)
     for polynomial in polynomials:
-        value = value * evaluate(polynomial, q)
+        value = value * polyval(q, polynomial)
     return value

@@ -11,12 +11,12 @@ from dataclasses import replace
 from typing import cast
 
 from inputdesign_cli.specification.models.experiment import NoiseShape
-from inputdesign_cli.specification.models.fields import check_no_growth, depth
+from inputdesign_cli.specification.models.fields import check_no_growth, depth, size_of
 from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.transfer import check_each, check_per_output, size_of
+from inputdesign_cli.specification.models.transfer import check_each, check_per_output
 from inputdesign_cli.specification.models.wording import count, show
 from inputdesign_cli.specification.yaml.places import Path, parse_key
 

@@ -53,7 +53,7 @@ class FlatBasis(DensityFamily):
     ) -> NDArray[np.float64]:
         """Return level times (1 / 2 pi) integral of the trace of the density, (1, ...)."""
         source, sums = integrand(density, factor, self.inputs)
-        found = integrate_band(source, None, singularities, self.band, sums=sums, several=self.inputs > 1)
+        found = integrate_band(source, None, singularities, self.band, sums=sums)
         return self.level * (found if self.inputs == 1 else np.trace(found, axis1=-2, axis2=-1).real)
 
     def coarser(self) -> list[FlatBasis]:

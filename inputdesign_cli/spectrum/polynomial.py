@@ -94,9 +94,7 @@ class PolynomialBasis(GramBasis):
             return p[:, first] * p[:, second]
 
         lag = 2 * self.order
-        found = integrate_band(
-            source, products, singularities, self.band, sums=sums, highest_lag=lag, several=self.inputs > 1
-        )
+        found = integrate_band(source, products, singularities, self.band, sums=sums, highest_lag=lag)
         # The advanced indices are apart, so that their axis comes first: (size, ...).
         entries = np.moveaxis(found, (-2, -1), (1, 2))[pairs, i, j] if self.inputs > 1 else found[pairs]
         spread = (slice(None), *[None] * (entries.ndim - 1))

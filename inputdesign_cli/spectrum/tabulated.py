@@ -83,7 +83,6 @@ class TabulatedSpectrum(DensityFamily):
             band,
             sums=sums,
             knots=self.frequency,
-            several=r > 1,
         )
         if r == 1:
             return found.real

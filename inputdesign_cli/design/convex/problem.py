@@ -85,8 +85,9 @@ class Gradients:
         def density(w: Array) -> NDArray:
             if w is grid and known:  # asked for again with every share that limits keep of a price
                 return known[0]
-            parts = (self._worth(number, weights[number], w, on_grid=w is grid) for number in weighty)
-            total = sum(parts, self.worthless(w))
+            total = self.worthless(w)
+            for number in weighty:
+                total = total + self._worth(number, weights[number], w, on_grid=w is grid)
             if w is grid:
                 known.append(total)
             return total

@@ -29,7 +29,6 @@ from inputdesign_cli.plant.polynomial import (
     determinant_and_adjugate,
     multiply,
     roots_in_z,
-    unit_circle,
 )
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
@@ -164,7 +163,7 @@ class DesiredLoop(ControlLaw):
             return None
         # P = N / D with D = prod (z - z_i): its terms z^1 .. z^m are the terms of d log det G.
         D = np.poly(self.outside).real[::-1]
-        m, z = self.outside.size, 1 / unit_circle(rule.nodes)
+        m, z = self.outside.size, 1 / np.exp(-1j * rule.nodes)
         waves = rule.weights * z ** -np.arange(1, m + 1)[:, None]
         terms = (waves @ logarithmic).real
         terms = np.concatenate([-(D[m - 1 :: -1] @ terms)[None], terms])
@@ -228,7 +227,7 @@ class MinimumVariance(ControlLaw):
 
     def unavoidable(self, w: ArrayLike) -> ComplexArray:
         """Return E (K, n, n), diagonal: the part of the noise that no controller can remove."""
-        q = unit_circle(w)
+        q = np.exp(-1j * np.ravel(w))
         E = np.zeros((q.size, self.plant.outputs, self.plant.outputs), dtype=complex)
         for i, terms in enumerate(self._terms):
             E[:, i, i] = np.polynomial.polynomial.polyval(q, terms)
@@ -246,7 +245,7 @@ class MinimumVariance(ControlLaw):
         self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
     ) -> ComplexArray | None:
         """Return dT = E H^-1 dH H^-1 - dE H^-1, with dE the first terms of dH, see `ControlLaw`."""
-        H, q = self.plant.noise_at(rule.nodes)[:, None], unit_circle(rule.nodes)
+        H, q = self.plant.noise_at(rule.nodes)[:, None], np.exp(-1j * rule.nodes)
         powers = q ** np.arange(self.plant.inverse_delay)[:, None]
         terms = np.einsum("dk,klab->dlab", rule.weights / powers, H @ relative_noise).real
         dE = np.einsum("dk,dlab->klab", powers, terms)

@@ -173,10 +173,10 @@ class DelayedMatrix(transfer.TransferMatrix, family="continuous", phrase="a tran
         above, below, delay = (
             named.expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
         )
-        rows = transfer.as_matrix(above)
+        rows = fields.as_matrix(above)
         denominators: named.TermMatrix
         if fields.depth(below) == 3:
-            denominators = transfer.as_matrix(below)
+            denominators = fields.as_matrix(below)
         else:
             common = product_of(below if fields.depth(below) == 2 else [below])
             denominators = tuple(tuple(common for _ in row) for row in rows)

@@ -22,7 +22,6 @@ from inputdesign_cli.specification.models.section import (
     tag,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import with_paths
 from inputdesign_cli.specification.models.wording import count
 
 # This factor moves roots on the unit circle inside, whatever the rounding of decimals.
@@ -75,7 +74,7 @@ class NoiseShape(Section):
         """Return the names of the coefficients of each polynomial C, or D."""
         return [
             tuple(f"{letter.lower()}{k}{f'[{at[0] + 1}]' if at else ''}" for k in range(1, len(polynomial)))
-            for at, polynomial in with_paths(self.C if letter == "C" else self.D)
+            for at, polynomial in fields.with_paths(self.C if letter == "C" else self.D)
         ]
 
     @property
@@ -90,7 +89,7 @@ class NoiseShape(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that D is stable where it is estimated, and does not grow where it is known."""
-        for (place, polynomial), held in zip(with_paths(self.D), self.held, strict=True):
+        for (place, polynomial), held in zip(fields.with_paths(self.D), self.held, strict=True):
             shrunk = tuple(c * _INSIDE**k for k, c in enumerate(polynomial)) if held else polynomial
             if found := fields.check_delay_stable(shrunk):
                 instead = "; write drift: true, or list all its coefficients in noise.known"

@@ -16,6 +16,7 @@ from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 from inputdesign_cli.specification.models.section import PathDiagnostic, Wording, by_tag, carry, fail, tag
 from inputdesign_cli.specification.models.sizes import COEFFICIENT, DEVIATIONS, QUANTITY, SIZES, magnitude
 from inputdesign_cli.specification.models.wording import show
+from inputdesign_cli.specification.yaml.plain import Plain
 
 Polynomial = tuple[float, ...]
 
@@ -123,6 +124,32 @@ def depth(value: object) -> int:
     if not isinstance(value, list | tuple):
         return 0
     return 1 + max((depth(v) for v in value), default=0)
+
+
+def as_matrix(value: tuple) -> Plain:
+    """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
+    return value if depth(value) == 3 else ((value,),)
+
+
+def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
+    """Return every polynomial of a nested value with its indices."""
+    if depth(value) == 1:
+        return [((), value)]
+    return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
+
+
+def size_of(value: tuple) -> tuple[int, int]:
+    """Return the numbers of rows and columns."""
+    entries = as_matrix(value)
+    return len(entries), len(entries[0])
+
+
+def shape_words(value: tuple) -> str:
+    """Return the shape in words."""
+    if depth(value) == 1:
+        return "one list of coefficients"
+    rows, columns = size_of(value)
+    return f"{rows} x {columns} lists of coefficients"
 
 
 def as_whole(value: object) -> object:

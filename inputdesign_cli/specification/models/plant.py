@@ -169,39 +169,39 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that A and F have the shape of B, of which some coefficient is present."""
         yield from transfer.check_per_output(self.A, self.outputs, "A")
-        if self.F is not None and transfer.shape_words(self.F) != transfer.shape_words(self.B):
-            message = "{key} must have the shape of B: " + transfer.shape_words(self.B)
+        if self.F is not None and fields.shape_words(self.F) != fields.shape_words(self.B):
+            message = "{key} must have the shape of B: " + fields.shape_words(self.B)
             yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
-        yield from transfer.check_gain(transfer.as_matrix(named.expressed(self.written["B"])), "B")
+        yield from transfer.check_gain(fields.as_matrix(named.expressed(self.written["B"])), "B")
 
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
         """Return the power of the first present coefficient of B, entry by entry; the length if none is."""
-        rows = transfer.as_matrix(named.expressed(self.written.get("B", self.B)))
+        rows = fields.as_matrix(named.expressed(self.written.get("B", self.B)))
         return tuple(tuple(named.leading(entry) for entry in row) for row in rows)
 
     @cached_property
     def shape(self) -> tuple[int, int]:
         """Return the numbers of outputs and inputs."""
-        return transfer.size_of(self.B)
+        return fields.size_of(self.B)
 
     def expression(self, letter: str, row: int, column: int, power: int = 0) -> Expression:
         """Return a coefficient of an entry of A, B or F as an expression in the named parameters."""
         written = named.expressed(self.written[letter.upper()])
         if letter == "a":
             return (written[row] if fields.depth(written) == 2 else written)[power]
-        return transfer.as_matrix(written)[row][column][power]
+        return fields.as_matrix(written)[row][column][power]
 
     @property
     def B_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (the paper's symbol)
         """Return B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
-        return transfer.as_matrix(self.B)
+        return fields.as_matrix(self.B)
 
     @property
     def F_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (likewise)
         """Return F as rows of columns of coefficients; absent polynomials are 1."""
         ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
-        return ones if self.F is None else transfer.as_matrix(self.F)
+        return ones if self.F is None else fields.as_matrix(self.F)
 
 
 class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plant"):
@@ -218,7 +218,7 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     @property
     def shape(self) -> tuple[int, int]:
         """Return the numbers of outputs and inputs."""
-        return transfer.size_of(self.continuous.numerator_matrix)
+        return fields.size_of(self.continuous.numerator_matrix)
 
     @property
     def sampled(self) -> bool:

@@ -16,15 +16,10 @@ from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
-def as_matrix(value: tuple) -> Plain:
-    """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
-    return value if fields.depth(value) == 3 else ((value,),)
-
-
 def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
     """Check that denominators for each entry have the shape of the numerator."""
-    if fields.depth(denominator) == 3 and size_of(denominator) != size_of(as_matrix(numerator)):
-        message = "{key} must have the shape of the numerator: " + shape_words(numerator)
+    if fields.depth(denominator) == 3 and fields.size_of(denominator) != fields.size_of(numerator):
+        message = "{key} must have the shape of the numerator: " + fields.shape_words(numerator)
         hint = "or write one polynomial, a denominator common to all entries"
         yield PathDiagnostic("wrong-shape", message, hint, ("denominator",))
 
@@ -33,16 +28,9 @@ def check_each(
     value: tuple, check: Callable[[fields.Polynomial], PathDiagnostic | None], *path: str
 ) -> Iterator[PathDiagnostic]:
     """Yield the diagnostics of a check of each polynomial of the value at `path`."""
-    for indices, polynomial in with_paths(value):
+    for indices, polynomial in fields.with_paths(value):
         if found := check(polynomial):
             yield replace(found, path=(*path, *indices))
-
-
-def with_paths(value: tuple) -> list[tuple[tuple[int, ...], fields.Polynomial]]:
-    """Return every polynomial of a nested value with its indices."""
-    if fields.depth(value) == 1:
-        return [((), value)]
-    return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
 
 
 def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDiagnostic]:
@@ -60,25 +48,11 @@ def check_gain(entries: TermMatrix, *path: str) -> Iterator[PathDiagnostic]:
         yield PathDiagnostic("zero-polynomial", message, path=path)
 
 
-def size_of(value: tuple) -> tuple[int, int]:
-    """Return the numbers of rows and columns."""
-    entries = as_matrix(value)
-    return len(entries), len(entries[0])
-
-
-def shape_words(value: tuple) -> str:
-    """Return the shape in words."""
-    if fields.depth(value) == 1:
-        return "one list of coefficients"
-    rows, columns = size_of(value)
-    return f"{rows} x {columns} lists of coefficients"
-
-
 def check_proper(
     above: TermMatrix, below: fields.PolynomialMatrix, levels: int, *path: str
 ) -> Iterator[PathDiagnostic]:
     """Check that no entry has a numerator of higher degree (descending in s), written in nested `levels`."""
-    for (i, j), terms in ((at, above[at[0]][at[1]]) for at in np.ndindex(size_of(below))):
+    for (i, j), terms in ((at, above[at[0]][at[1]]) for at in np.ndindex(fields.size_of(below))):
         high, low = len(terms) - leading(terms) - 1, len(below[i][j]) - 1
         if high > low:
             message = f"{{key}} has degree {high} in s, more than its denominator ({low}): it is not proper"
@@ -150,14 +124,14 @@ class TransferMatrix(Section):
     @property
     def numerator_matrix(self) -> fields.PolynomialMatrix:
         """Return the numerators as rows (outputs) of columns (inputs)."""
-        return as_matrix(self.numerator)
+        return fields.as_matrix(self.numerator)
 
     @property
     def denominator_matrix(self) -> fields.PolynomialMatrix:
         """Return the table of denominators, a row for each output, with factors multiplied out."""
         if fields.depth(self.denominator) == 3:
-            return as_matrix(self.denominator)
-        common = fields.product(factor for _, factor in with_paths(self.denominator))
+            return fields.as_matrix(self.denominator)
+        common = fields.product(factor for _, factor in fields.with_paths(self.denominator))
         return tuple(tuple(common for _ in row) for row in self.numerator_matrix)
 
 
