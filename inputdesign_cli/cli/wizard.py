@@ -65,7 +65,7 @@ def wizard(
         from inputdesign_cli.wizard.composing import compose, with_spectrum
 
         if draft is None:
-            draft = compose(said.texts, output.stem, output.parent)
+            draft = compose(said.texts, output.stem, output.parent, remarks=said.remarks)
             draft.validate()
         draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
@@ -115,7 +115,7 @@ def _asked(
     """
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.composing import Conversation
-    talk = Conversation(said.texts, output.stem, output.parent, brief=brief)
+    talk = Conversation(said.texts, output.stem, output.parent, brief=brief, remarks=said.remarks)
     while (one := talk.question) is not None:
         default = one.default or ""  # stands in grey at the prompt
         asks = f"{one.asks} (Enter: {default})" if default else one.asks

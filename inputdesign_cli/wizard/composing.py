@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,11 +14,11 @@ from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard import questions as asking
-from inputdesign_cli.wizard.grammar import Phrase, short
+from inputdesign_cli.wizard.grammar import Phrase, not_linear, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, Question, bad_answer, in_their_words, question
-from inputdesign_cli.wizard.sentence import in_sentence, question_of
+from inputdesign_cli.wizard.sentence import Heard, in_sentence, question_of
 from inputdesign_cli.wizard.wishes import (
     Range,
     channels_of,
@@ -100,13 +100,20 @@ class Draft:
             questions.validate(self.spec())
 
 
-def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAnswer | None = None) -> Draft:
+def compose(
+    answers: Mapping[str, str],
+    stem: str,
+    folder: Path,
+    plant: PlantAnswer | None = None,
+    remarks: Sequence[str] = (),
+) -> Draft:
     """Return the spec that follows from the answers.
 
     Args:
         stem: of the name of the spec.
         folder: of the spec; names of files are relative to it.
         plant: what is known of it, if that is understood already.
+        remarks: on what was said beside the answers.
 
     Raises:
         SpecError: `bad-answer`.
@@ -129,7 +136,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     rate, output = limited(said["limits"], plant)
     made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
-    heard = list(plant.heard)
+    heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values()))]
     if "slope" in plant.values and control is not None and control == plant.controller:
         heard += [f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"]
     facts = {
@@ -226,9 +233,18 @@ class Conversation:
     three about the actuator. An answer that names its question, as in "time=2 h", may come at any time.
     """
 
-    def __init__(self, known: Mapping[str, str], stem: str, folder: Path, *, brief: bool = False) -> None:
+    def __init__(
+        self,
+        known: Mapping[str, str],
+        stem: str,
+        folder: Path,
+        *,
+        brief: bool = False,
+        remarks: Sequence[str] = (),
+    ) -> None:
         """Begin with the answers that are known, from a sentence if `brief`; the rest as of `compose`."""
         self.answers, self._stem, self._folder = dict(known), stem, folder
+        self._remarks = tuple(remarks)
         self._plant: PlantAnswer | None = None
         self._brief = brief
         self.draft: Draft | None = None  # of all answers, once they are there
@@ -251,14 +267,16 @@ class Conversation:
         named = _NAMED.match(text)
         key, text = (named[1].lower(), named[2]) if named else (asked.key, text)
         try:
-            several = in_sentence(text) if key == "plant" else {}
-            self._brief = self._brief or bool(several)
-            self.answers |= several or {key: text}
+            heard = in_sentence(text) if key == "plant" else Heard({})
+            self._brief = self._brief or bool(heard.answers)
+            self._remarks = heard.remarks or self._remarks
+            self.answers |= heard.answers or {key: text}
             self._plant = None if key == "plant" else self._plant
             # The plant, which may be a log to be explored, is read once only.
             if self._plant is None and (plant := self.answers.get("plant", "").strip()):
                 self._plant = understand_plant(plant, self._stem, self._folder)
-            draft = compose({**_MEANWHILE, **self.answers}, self._stem, self._folder, self._plant)
+            said = {**_MEANWHILE, **self.answers}
+            draft = compose(said, self._stem, self._folder, self._plant, self._remarks)
             if self.question is None:
                 draft.validate()
                 self.draft = draft

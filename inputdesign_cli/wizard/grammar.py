@@ -16,13 +16,14 @@ LARGEST, SMALLEST = 1e15, 1e-15
 _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"([-+]?{_DIGITS})"
 ALONE = r"(?<![\w.])"  # the number that follows is no part of another
-PLUS_MINUS = r"(?:plus/minus|plus or minus|\+/?-|±)"
+PLUS_MINUS = r"(?:plus(?:/| or | )minus|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
-UNIT = r"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)[^\s\d,;|+±-][^\s,;|]*)?"
+_UNIT = r"(?:[^\s,;|.:]|[.:](?=[^\s|]))"  # a letter of it
+UNIT = rf"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
 ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly)\b\.?|~|≈)"
-_OF = rf"\s*(?:,\s+|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
-_WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS}){_PER_CENT})?"
+OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
+WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS}){_PER_CENT})?"
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
 VAGUE = 0.2
 """The share within which a value that is "about" right is taken to be known."""
@@ -35,34 +36,69 @@ _FREQUENCIES = {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "rad/h": 1.0 / _HOUR, "m
 _ALIKE: tuple[dict[str, float], ...] = (
     {"k": 1.0, "kelvin": 1.0, "mk": 1e-3, "degc": 1.0, "°c": 1.0, "celsius": 1.0, "degf": 5 / 9, "°f": 5 / 9},
     {"%": 1.0, "percent": 1.0},
-    {"v": 1.0, "mv": 1e-3, "kv": 1e3},
+    {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "kv": 1e3},
     {"a": 1.0, "ma": 1e-3},
     {"bar": 1.0, "mbar": 1e-3, "pa": 1e-5, "kpa": 1e-2},
     {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     {"w": 1.0, "kw": 1e3},
+    {"rad/s": 1.0, "rpm": math.pi / 30.0, "1/min": math.pi / 30.0, "deg/s": math.pi / 180.0},
 )
 # "a minute", "half an hour", "two shifts": words in place of numbers.
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
             "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30}  # fmt: skip
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
-_UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
-_SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={_UNIT_OF_TIME})", re.I)
-AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+\.?\d*|\.\d+)\s*){_UNIT_OF_TIME}"
+UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
+_SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
+AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+\.?\d*|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
+SIGNAL = "(?:level|temperature|speed|pressure|flow|position|concentration|output|sensor|measurement)"
+DRIVE = (
+    "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"
+    "|input|actuator)"
+)
 # "per minute", and of a gain "per 10 % of valve".
 _RATE = rf"(?:\s*(?P<size>(?!(?:per|and)\b)[^\s\d,;|/]+))?(?:\s*(?:per|/)\s*{_TIME})?"
-_BASE = rf"\s*(?:/|\bper\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>[^\s\d,;|]+)(?:\s+of\s+(?:the\s+)?[a-z]+)?"
+_BASE = (
+    rf"\s*(?:/|\bper\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)(?:\s+of\s+(?:the\s+)?{DRIVE})?"
+)
 # What stands behind the number of each kind.
 _BEHIND = {
     "time": rf"(?:\s*{_TIME})?",
     "frequency": rf"(?:\s*(?P<unit>{'|'.join(_FREQUENCIES)})\b)?",
     "rate": _RATE,
     "slope": rf"{_RATE}(?:{_BASE})?",
+    "speed": rf"(?:\s*(?P<size>(?!(?:per|and)\b)[^\s\d,;|/]+))?\s*(?:per|/)\s*{_TIME}(?:{_BASE})?",
     "gain": rf"(?:\s*(?!plus/)(?P<size>[^\s\d,;|+±]*){_BASE})?",
     "any": rf"(?P<size>{UNIT})",
     "none": "",
 }
-_FILLING = "a an the of and with in at each all about is for by i want"
+# Words without content: they join others, or name what everything here is about.
+_FILLING = (
+    "a an the of and with in at each all about is for by i want we it its this that there has have am are "
+    "be been to my our me us on as so then please need needs would like should must may can will do does "
+    "measured also tune design level temperature speed pressure flow position concentration "
+    "sensor measurement"
+)
+# What no linear model has: a design for one says nothing of it.
+_NONLINEAR = (
+    r"friction|stiction|stick[- ]slip|sticks?|sticky|backlash|hysteresis|dead[- ]?(?:band|zone)|saturat\w*"
+    r"|non-?linear\w*"
+)
+NONLINEAR = re.compile(
+    r"(?:\b(?:and|with|has|some|a (?:bit|little) of|much|strong|dry|static|coulomb)\s+)*"
+    rf"(?<!viscous )\b(?P<what>(?:{_NONLINEAR})\b"
+    rf"(?:\s+(?:a (?:bit|little)|sometimes|at low speeds?|of {_DIGITS}[^,;]*))*)",
+    re.I,
+)
+
+
+def orders(words: str, kind: str, within: str = WITHIN) -> tuple[str, str]:
+    """Return the patterns of a quantity: "dead time of 25 s", and "25 s of dead time"."""
+    number = rf"(?P<number>[-+]?{_DIGITS}){_BEHIND[kind]}"
+    return (
+        rf"(?P<words>(?:{ABOUT}\s*|\b)(?:{words})\b{OF}){number}{within}",
+        rf"(?P<words>{ABOUT}\s*)?{ALONE}{number}\s*(?:of\s+)?\b(?:{words})\b{within}",
+    )
 
 
 @dataclass(frozen=True)
@@ -114,11 +150,10 @@ class Phrase:
         return self.sized(float(found[1]), unit)
 
     def quantity(
-        self, words: str, kind: str, within: str = _WITHIN, unit: str | None = None
+        self, words: str, kind: str, within: str = WITHIN, unit: str | None = None
     ) -> Quantity | None:
-        """Read words (a pattern), a number, its unit, and the share "within 30 %" that may follow."""
-        head = rf"(?P<words>(?:{ABOUT}\s*|\b)(?:{words})\b{_OF})"
-        found = self.take(rf"{head}(?P<number>[-+]?{_DIGITS}){_BEHIND[kind]}{within}")
+        """Read words (a pattern) and a number with its unit, in either order, and a share that follows."""
+        found = next(filter(None, map(self.take, orders(words, kind, within))), None)
         if found is None:
             return None
         said = {name: (text or "").strip() for name, text in found.groupdict().items()}
@@ -149,7 +184,7 @@ class Phrase:
     def band(self) -> tuple[float | None, float | None]:
         """Read the ends of a band of frequencies; one unit holds for both."""
         frequency = NUMBER + _BEHIND["frequency"].replace("?P<unit>", "")
-        found = self.take(rf"\bfrom\b{_OF}{frequency}\s*(?:\bup to\b|\bto\b|-)\s*{frequency}")
+        found = self.take(rf"\bfrom\b{OF}{frequency}\s*(?:\bup to\b|\bto\b|-)\s*{frequency}")
         if found is None:
             return self.after("from", "frequency"), self.after("up to|to", "frequency")
         low, high = (float(found[1]), found[2] or found[4]), (float(found[3]), found[4] or found[2])
@@ -174,19 +209,19 @@ class Phrase:
 
     def finish(self, also: str = "") -> None:
         """Refuse what was not read, except words without content and `also` (words between blanks)."""
-        known = f"{_FILLING} {also.lower()}".split()
-        for piece in self._left.split("|"):
-            if any(word and word not in known for word in re.split(r"[\s,;.:]+", piece.lower())):
+        known = also.lower().split()
+        for piece in NONLINEAR.sub(" ", self._left).split("|"):  # what is nonlinear is said back
+            if any(word not in known for word in unread(piece)):
                 raise bad_answer(self.key, f'"{piece.strip(" ,;.:")}" is not understood')
 
     def sized(self, value: float, unit: str, wanted: str | None = None) -> float:
-        """Return a difference in units of the spec; unknown units are not converted."""
+        """Return a difference in units of the spec; where that has none, any unit is."""
         wanted = self._unit if wanted is None else wanted
         ours, theirs = (one.strip("()").lower() for one in (wanted, unit))
         group, other = (next((group for group in _ALIKE if one in group), None) for one in (ours, theirs))
-        if ours == theirs or group is None or other is None:
+        if ours == theirs or not ours or not theirs:
             return value
-        if group is not other:
+        if group is not other or group is None or other is None:
             raise bad_answer(self.key, f"it is in {unit}, but the gain of the plant has {wanted} there")
         return value * group[theirs] / group[ours]
 
@@ -196,7 +231,21 @@ class Phrase:
             return value * _TIMES.get(unit, 1.0) / self._clock
         if kind == "frequency":
             return value * _FREQUENCIES.get(unit, 1.0) * self._clock
-        return value / _TIMES.get(unit, 1.0) * self._clock if kind in ("rate", "slope") else value
+        return value / _TIMES.get(unit, 1.0) * self._clock if kind in ("rate", "slope", "speed") else value
+
+
+def unread(text: str) -> list[str]:
+    """Return the words of a text that have content, in small letters."""
+    return [word for word in re.split(r"[\s,;.:|]+", text.lower()) if word and word not in _FILLING.split()]
+
+
+def not_linear(text: str) -> list[str]:
+    """Return the remark on words such as friction, which no linear model has; none without such words."""
+    found = dict.fromkeys(one["what"].lower() for one in NONLINEAR.finditer(text))
+    why = "no linear model has it, and the design leaves it out"
+    return (
+        [f"{', '.join(found)}: {why}. Move so far that it matters little; assess tests it"] if found else []
+    )
 
 
 def needed(value: float | None, key: str, what: str) -> float:

@@ -21,7 +21,9 @@ from inputdesign_cli.wizard.plants import PlantAnswer, unit_of_time
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
 _DRIFTING = 0.2  # the step of a drift from one sample to the next, of the deviation of white noise
-_LASTING = r"(?:fad|chang)\w*(?: slowly)?(?: in| within)?|correlation time|lasts|slow(?:ly)?"
+_CHANGES = r"(?:fad|chang|var[yi]|wander)\w*"
+_LASTING = rf"{_CHANGES}(?: slowly)?(?: in| within| over)?|correlation time|lasts|slow(?:ly)?"
+_SLOWLY = rf"\b(?:{_CHANGES} )?slow(?:ly)?\b(?: {_CHANGES})?"
 _FADING = 0.2  # of the time constant of the plant: how long noise lasts of which nothing is said
 _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
@@ -42,6 +44,7 @@ class _Level:
     guessed: bool = False  # it has a colour that nobody knows
     rounded: bool = False  # it is the least that noise can be
     drifts: bool = False
+    slow: bool = False  # it fades as slowly as the plant answers
 
 
 def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list[str]:
@@ -65,6 +68,8 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     assert level is not None
     fades, pole, why = level.fades, level.pole, level.why
     colour = f"fades in {short(fades)} {plant.time_unit}, as you said" if fades else "white"
+    if level.slow:
+        colour = 'as long as the plant: that is how "slowly" is taken'
     if level.guessed and not drifts:
         fades = float(f"{max(_FADING * plant.slow, 2.0 * plant.sample_time):.1g}")
         colour = "a guess, for noise is seldom white; called white it would promise too much accuracy"
@@ -151,23 +156,32 @@ def _stated(text: str, folder: Path, plant: PlantAnswer) -> _Level:
         unit = plant.time_unit
         why = f"noise that fades in {short(fades)} {unit} is white in samples {short(step)} {unit} apart"
         raise bad_answer("noise", f'{why}: write "white"')
+    slow = fades is None and said.take(_SLOWLY) is not None
+    fades = max(plant.slow, WHITE * step) if slow else fades
     rounding = _resolution(said)
-    deviation = said.after("standard deviation|deviation|std|noise", named=True)
+    deviation = said.after("standard deviation|deviation|std|rms|noise", named=True)
     if deviation is None and not re.fullmatch(rf"\s*{NUMBER}\s*", text):
         deviation = said.number(rf"^[\s|]*{NUMBER}({UNIT})")
     said_both = {"the standard deviation": deviation, "the resolution": rounding}
     sizes = {what: needed(one, "noise", what) for what, one in said_both.items() if one is not None}
     if not sizes:
         raise bad_answer("noise", "it does not say a standard deviation or a resolution")
-    said.finish("that which it noise has slow slowly")
-    because = [f"standard deviation {short(deviation)}"] if deviation is not None else []
+    said.finish("which noise")
+    spoken = " ".join(text.split())
+    because = [f'standard deviation {short(deviation)} ("{spoken}")'] if deviation is not None else []
     if rounding is not None:
         least = "" if because else ": the least that noise can be"
         because.append(f"rounding to {short(rounding)} has a variance of its square over 12{least}")
     size = math.hypot(deviation or 0.0, (rounding or 0.0) / math.sqrt(12.0))
     guessed = fades is None and deviation is not None
     return _Level(
-        size, "; ".join(because), fades, guessed=guessed, rounded=rounding is not None, drifts=drifts
+        size,
+        "; ".join(because),
+        fades,
+        guessed=guessed,
+        rounded=rounding is not None,
+        drifts=drifts,
+        slow=slow,
     )
 
 

@@ -20,7 +20,7 @@ from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.units import SECONDS
-from inputdesign_cli.wizard.grammar import ABOUT, VAGUE, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import ABOUT, SIGNAL, VAGUE, Phrase, needed, short
 from inputdesign_cli.wizard.questions import bad_answer, file_of, in_their_words, package_data
 
 if TYPE_CHECKING:
@@ -28,14 +28,17 @@ if TYPE_CHECKING:
     from inputdesign_cli.records.sheet import Sheet
 
 _NONE: Mapping[str, float] = MappingProxyType({})
-INTEGRATES = r"integrat\w+(?: (?:with|gain|slope))*|(?:(?:the )?(?:level|output) )?(?:rises|grows)(?: by)?"
-# Names in a spec -> words and units of an answer.
-_QUANTITIES = {
-    "gain": ("gain", "gain"),
-    "slope": (INTEGRATES, "slope"),
+_WHAT = rf"(?:(?:the )?(?:{SIGNAL}|room|tank|water))"
+RISES = rf"(?:{_WHAT} )?(?:rises|grows|increases|climbs|warms|heats|raises)(?: {_WHAT})?(?: by| with)?"
+# Names of what is said of a plant -> words, and the kind of unit. What rises in a time integrates.
+QUANTITIES = {
+    "rise": (RISES, "speed"),
+    "slope": (r"integrat\w+(?: (?:with|gain|slope|by))*", "slope"),
+    "gain": (rf"gain|{RISES}", "gain"),
     "time_constant": ("time constant|lag", "time"),
     "dead_time": ("dead time|delay", "time"),
 }
+NO_DELAY = r"\b(?:no|without|hardly any|negligible)\s+(?:dead time|delay)\b"
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
 _SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
 _NEARLY = 2.0  # points of fit that a model may lose which rules of tuning know
@@ -63,6 +66,7 @@ class PlantAnswer:
     sampling: float | None = None  # time_unit between samples, where that is known already
     why_sampling: str = "as the plant is sampled"  # the reason for these
     tunable: bool = False  # whether rules of tuning know it
+    undelayed: bool = False  # one lag without a dead time, whose loop these would make as fast as it can be
     channels: int = 1  # the larger number of its inputs and outputs
     explored: Spec | None = None  # the model of a log, which has its noise
     called: Mapping[str, str] = field(default_factory=dict)  # names of channels in a log
@@ -101,7 +105,7 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
             return (_stepped if word.lower() == "step" else _explored)(path, stem, columns)
     if text.endswith(".json"):
         return system_of(file_of("plant", folder / text))
-    if re.search(rf"\b(?:gain|{INTEGRATES})\b", text, re.I):
+    if re.search("|".join(rf"\b(?:{words})\b" for words, _ in QUANTITIES.values()), text, re.I):
         return plant_of_words(text)
     raise bad_answer("plant", f'"{text}" is none of these')
 
@@ -122,15 +126,19 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     An integrator has a slope in place of the gain: "integrates 0.02 %/s per %, dead time 20 s".
     """
     phrase = Phrase(text, "plant")
-    read = {name: phrase.quantity(*words) for name, words in _QUANTITIES.items()}
+    phrase.take(NO_DELAY)
+    read = {name: phrase.quantity(*words) for name, words in QUANTITIES.items()}
     found = {name: one for name, one in read.items() if one is not None}
+    steady = [name for name in ("rise", "slope", "gain") if name in found]
+    if len(steady) != 1 or not found[steady[0]].value:
+        raise bad_answer("plant", "it does not say the gain, or says that it is zero, or says two")
+    gain = found[steady[0]]
+    found = {name.replace("rise", "slope"): one for name, one in found.items()}
     own = {name: one.share for name, one in found.items() if one.share is not None}
     sampled = phrase.after(r"sampl(?:e|ing) time|sampled every", "time", named=True)
     part, whole = phrase.share(), phrase.take(ABOUT)
     phrase.finish("known it tank")
     values = {name: one.value for name, one in found.items() if one.value}
-    if len(values.keys() & {"slope", "gain"}) != 1 or {"slope", "gain"} <= found.keys():
-        raise bad_answer("plant", "it does not say the gain, or says that it is zero")
     if "gain" in values or "time_constant" in found:
         needed(values.get("time_constant"), "plant", "the time constant")
     if values.get("dead_time", 0.0) < 0.0:
@@ -147,7 +155,6 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         f"{name.replace('_', ' ')} {short(around[name][0])} to {short(around[name][1])}" for name in vague
     ]
     taken = f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}'
-    gain = found.get("slope") or found["gain"]
     plant = PlantAnswer(
         (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds"),
         values.get("time_constant", 0.0),
@@ -156,6 +163,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         sampling=None if sampled is None else needed(sampled, "plant", "the sample time"),
         why_sampling="as you said",
         tunable=True,
+        undelayed="gain" in values and "dead_time" not in values,
         heard=(f"{taken}; the design holds for all of these",) if vague else (),
         units=(gain.size, gain.base),
     )
@@ -249,6 +257,7 @@ def system_of(path: Path) -> PlantAnswer:
         sampling=None if decays.size else _round_step(late / 2.0),
         why_sampling="half the dead time, or a little less, for it has no time constant",
         tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
+        undelayed=len(den) == 2 and not integrates and not late,
     )
 
 

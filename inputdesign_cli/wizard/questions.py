@@ -27,8 +27,7 @@ class Question:
     allowed: str
     default: str | None = None
     always: bool = False  # it is asked beyond a sentence, too
-    clause: str = ""  # a pattern of words in a clause that answers it
-    part: str = ".*"  # what counts of this clause
+    pieces: list[str | list[str]] = field(default_factory=list)  # see questions.yaml
     sets: tuple[str, ...] = ()  # sections of the spec
 
 
@@ -107,10 +106,14 @@ def file_of(key: str, path: Path) -> Path:
 
 @dataclass(frozen=True)
 class Answers:
-    """Holds the answers by question, and the places of answers in a file (else of its beginning)."""
+    """Holds the answers by question, and the places of answers in a file (else of its beginning).
+
+    `remarks` are on what a sentence says beside its answers.
+    """
 
     texts: dict[str, str] = field(default_factory=dict)
     places: dict[str, Location] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -1,76 +1,128 @@
-"""A whole wish in a sentence, taken apart into the answers that its clauses give."""
+"""A whole wish in a sentence, taken apart into pieces that answer questions.
+
+What is left over is refused, or said back.
+"""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
+from functools import cache
 
-from inputdesign_cli.wizard.grammar import AMOUNT, NUMBER, PLUS_MINUS
-from inputdesign_cli.wizard.plants import INTEGRATES
+from inputdesign_cli.wizard import grammar, plants, wishes
+from inputdesign_cli.wizard.grammar import NONLINEAR, not_linear, orders, unread
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
-_TURNS = ("wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "time")
-"""The questions that a clause may answer: the first of which it has a word."""
-_PATTERNS = {"AMOUNT": AMOUNT, "INTEGRATES": INTEGRATES, "NUMBER": NUMBER, "PLUS_MINUS": PLUS_MINUS}
-_FILE = re.compile(r"\s*(?:(?:time|[uy]\d*)\s*=|(?:step|log)\s+\S*\.\w)", re.I)  # and its columns
-_WHAT = re.compile(r"\s*(?:for\s+)?(?:an?|the|my|our)\s+\w+(?:\s+\w+)?\s*", re.I)  # "a tank", for the reader
-_LASTS = re.compile(rf"\s*\b(?:for|in|within|during)\s+({AMOUNT})\s*$", re.I)
-_ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)([,;:.])(?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
+_TURNS = ("wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
+"""The questions that a sentence may answer, in the order in which their pieces are taken out of it."""
+_PLANT = "|".join(f"<{kind}: {words}>" for words, kind in plants.QUANTITIES.values())
+# <NUMBER> and the like in a pattern of a piece.
+_MACROS = {**vars(grammar), **vars(plants), **vars(wishes), "PLANT": _PLANT}
+_MACRO = re.compile(r"<([A-Z_]+|[a-z]+: [^<>]*)>")
+_GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
+_ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
+_NEGATION = re.compile(r"\b(?:not?|never|without|except|unless|neither|nor|but)\b|n't\b", re.I)
+_JOINS = r"(?:for|of|in|with|a|an|the|my|our|i|we|have|is|and|to)"
+_BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.I)
+_WORD = r"(?!(?:is|are|was|has|have|does|do|will|must|should|may|can)\b)[a-z'-]+"
+_ABOUT_WHAT = re.compile(
+    r"[\s|]*(?:(?:(?:i|we) (?:have|want|need)|this is|it is|there is|consider|for)\b[\s|]*)?"
+    rf"{_WORD}(?:[\s|]+{_WORD}){{0,5}}[\s|]*",
+    re.I,
+)
 
 
-def question_of(clause: str) -> str | None:
-    """Return the question that a clause answers, by the words in it."""
-    if _FILE.match(clause):
-        return "plant"
-    return next((key for key in _TURNS if _found(question(key).clause, clause)), None)
+@dataclass(frozen=True)
+class Heard:
+    """Holds what a sentence says: answers by question, and remarks on what answers none."""
+
+    answers: dict[str, str]
+    remarks: tuple[str, ...] = ()
 
 
-def _found(pattern: str, clause: str) -> re.Match[str] | None:
-    """Return the first match of a pattern, in which <NUMBER> and the like stand for pieces of the grammar."""
-    return re.search(re.sub(r"<(\w+)>", lambda name: _PATTERNS[name[1]], pattern), clause, re.I)
+def question_of(text: str) -> str | None:
+    """Return the question that a text answers, by its first piece."""
+    return next((key for key in _TURNS if any(re.search(one, text, re.I) for one, _ in _pieces(key))), None)
 
 
-def in_sentence(text: str) -> dict[str, str]:
+@cache
+def _pieces(key: str) -> tuple[tuple[str, str], ...]:
+    """Return the patterns of the pieces that answer a question, and what each piece says."""
+    listed = [one if isinstance(one, list) else [one, ""] for one in question(key).pieces]
+    return tuple((_expanded(pattern), template) for pattern, template in listed)
+
+
+def _expanded(pattern: str) -> str:
+    """Return a pattern in which <NUMBER> and the like stand for pieces of the grammar."""
+
+    def piece(found: re.Match[str]) -> str:
+        kind, _, words = found[1].partition(": ")
+        made = "|".join(orders(words, kind)) if words else _expanded(_MACROS[kind])
+        return f"(?:{_GROUP.sub('(?:', made)})"
+
+    while _MACRO.search(pattern):
+        pattern = _MACRO.sub(piece, pattern)
+    return pattern
+
+
+def in_sentence(text: str) -> Heard:
     """Return the answers by question, or none if the text answers a single question at most.
 
     Raises:
-        SpecError: `bad-answer` for a clause that answers no question.
+        SpecError: `bad-answer` for what answers no question, where it has a number, a negation or a verb.
     """
-    found: dict[str, list[str]] = {}
-    pieces, unread = _ENDS.split(text.strip()), []
-    for clause, end in zip(pieces[::2], [*pieces[1::2], ""], strict=True):
-        key = question_of(clause)
-        lasts = _LASTS.search(clause) if key in ("wish", "range") else None
-        if lasts is not None:
-            clause = clause[: lasts.start()]
-            found.setdefault("time", []).append(lasts[1])
-        if key is None:
-            known = end == ":" or _WHAT.fullmatch(clause) or not clause.strip()  # what it is about
-            unread += [] if known else [clause]
-            continue
-        part = _found(question(key).part, clause)
-        found.setdefault(key, []).append(part[0] if part else clause)
+    found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
+    left = NONLINEAR.sub(_taken, text)
+    for key in _TURNS:
+        for pattern, template in _pieces(key):
+            while piece := re.search(pattern, left, re.I):
+                said = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
+                found.setdefault(key, []).append((piece.start(), said.strip(" ,.")))
+                left = left[: piece.start()] + _taken(piece) + left[piece.end() :]
     if len(found) < 2:
-        return {}
-    if unread:
-        raise bad_answer("plant", f'"{unread[0].strip()}" is not understood')
-    if "return" in found:
-        found["return"] = [
-            "no" if re.search(r"\b(?:not?|never)\b", " ".join(found["return"]), re.I) else "yes"
-        ]
-    return {key: ", ".join(parts).strip() for key, parts in found.items()}
+        return Heard({})
+    beside = [part for clause in _ENDS.split(left) for part in _left_over(clause)]
+    answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
+    remarks = [*not_linear(text), *([f"nothing follows from: {', '.join(beside)}"] if beside else [])]
+    if "wish" in answers and wishes.unbounded(answers["wish"]):
+        answers["wish"] += " with a safe margin"
+        remarks.append("no margin was named: a safe one is taken, 6 dB")
+    return Heard(answers, tuple(remarks))
+
+
+def _taken(piece: re.Match[str]) -> str:
+    """Return what stands in the place of a piece, as long as it is: the part of it that is left."""
+    rest = piece.groupdict().get("rest") or ""
+    before = piece.start("rest") - piece.start() if rest else len(piece[0])
+    return ("|".ljust(before) + rest).ljust(len(piece[0]), "|")
+
+
+def _left_over(clause: str) -> list[str]:
+    """Return the words of a clause that no piece has and that have content.
+
+    Raises:
+        SpecError: `bad-answer` where they may change the meaning of the rest.
+    """
+    parts = [part.strip() for part in clause.split("|") if unread(part)]
+    understood = "|" in clause or not parts or _ABOUT_WHAT.fullmatch(clause)
+    wrong = next((part for part in parts if re.search(r"\d", part) or _NEGATION.search(part)), None)
+    if wrong or not understood:
+        raise bad_answer("plant", f'"{wrong or clause.strip()}" is not understood')
+    return [_BARE.sub("", part) for part in parts]
 
 
 def spread(answers: Answers) -> bool:
     """Put the answers of a sentence in the place of the plant; return whether there is one.
 
     Raises:
-        SpecError: `bad-answer` for a clause that answers no question.
+        SpecError: `bad-answer` as `in_sentence`.
     """
     with answers.located():
-        found = in_sentence(answers.texts.get("plant", ""))
-    if found:
+        heard = in_sentence(answers.texts.get("plant", ""))
+    if heard.answers:
         del answers.texts["plant"]
-    for key, text in found.items():
+        answers.remarks.extend(heard.remarks)
+    for key, text in heard.answers.items():
         if answers.texts.setdefault(key, text) is text and "plant" in answers.places:
             answers.places[key] = answers.places["plant"]
-    return bool(found)
+    return bool(heard.answers)

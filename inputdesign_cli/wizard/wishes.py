@@ -11,14 +11,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
-from inputdesign_cli.wizard.grammar import ALONE, NUMBER, PLUS_MINUS, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import ALONE, DRIVE, NUMBER, PLUS_MINUS, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 
 _NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations
 _LINES = 20
+_FASTER = 4.0  # than a plant without a dead time: its loop
+_HIGHER = 2.0  # than the corner frequency of a plant: up to there it is to be predicted
 _SAFE = 6.0  # dB of |S|, which keep a gain margin of 2 and a phase margin of 29 degrees
 _LEAST_BITS, _MOST_BITS = 2, 32
+LOOP = r"\b(?:loop|control(?:ler)?|regulator)\b"
 _WITHIN = {
     "prediction": r"\bpredict\w*(?:\s+(?:of\s+)?(?:the|a|my|our)\s+[a-z ]+?(?=\s+within|[|,;]|\s*$))?",
     "parameters": r"\bparameters?\b",
@@ -26,10 +29,7 @@ _WITHIN = {
 }
 
 
-_ACTUATOR = (
-    r"((?:(?!(?:the|our|my|move|may|can|by|from|around)\b)[a-z]+ )?(?:valve|heater|heating|pump|voltage|power"
-    r"|flow|steam|reflux|damper|fan|current|opening|radiator|drive|input|actuator))"
-)
+ACTUATOR = rf"(?:(?!(?:the|our|my|move|may|can|by|from|around|when|open|if|i)\b)[a-z]+ )?{DRIVE}"
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,10 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
     """
     ours = plant.units[1] if plant else ""
     said, number = Phrase(text, "range", unit=ours), f"{NUMBER}({UNIT})"
-    named = said.take(rf"\b(?:(?:the|our|my)\s+)?{_ACTUATOR}\b")
-    ends = said.take(rf"(?<![-+±\w.]){number}\s*(?:to\b|\.\.)\s*{number}")
+    named = said.take(rf"\b(?:(?:the|our|my)\s+)?({ACTUATOR})\b")
+    ends = said.take(rf"(?<![-+±\w.]){number}\s*(?:to\b|\.\.|[-–](?=\s*\d))\s*{number}") or said.take(
+        rf"\bbetween\s+{number}\s*and\s+{number}"
+    )
     about = None if ends else said.take(rf"(?<![-+±\w.]){number}\s*{PLUS_MINUS}\s*{number}")
     if found := ends or about:
         sizes = [(found[1], found[2]), (found[3], found[4])]
@@ -61,7 +63,7 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
         if by is None:
             raise bad_answer("range", f'"{text}" is no range')
         sizes = [(around[1], around[2]) if around else ("0", ""), (by[1], by[2])]
-    said.finish("may move moves moved can be go goes swing from it")
+    said.finish("move moves moved go goes swing swings from")
     unit = next((one.strip() for _, one in sizes if one.strip()), "")
     one, other = (said.sized(float(number), own.strip() or unit) for number, own in sizes)
     middle, side = (one, other) if ends is None else (0.5 * (one + other), 0.5 * (other - one))
@@ -74,11 +76,15 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
     """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
-    if said["names"].lower() == "as said":
-        told = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
-        told |= {channel: (header, "") for channel, header in plant.called.items()}
-    else:
-        parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
+    told = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
+    told |= {channel: (header, "") for channel, header in plant.called.items()}
+    parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
+    if len(parts) == plant.channels == 1 and parts[0][2]:  # "level in cm": the other is as said
+        name, _, unit = parts[0]
+        own = "u1" if name.lower() == span.name.lower() else "y1"
+        Phrase(said["names"], "names", unit=told[own][1]).sized(1.0, unit)
+        told[own] = (name, told[own][1] or unit)
+    elif said["names"].lower() != "as said":
         if len(parts) != len(names) or not all(name for name, _, _ in parts):
             raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
         told = {name: (called, unit.strip()) for name, (called, _, unit) in zip(names, parts, strict=True)}
@@ -149,7 +155,7 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
     """
     said = Phrase(text, "wish", plant.clock)
     said.take(r"\bfor (?:an?|the|my|our) [a-z][^,;]*$")  # which plant, for the reader
-    if said.take(r"\bloop\b"):
+    if said.take(LOOP) or re.search(r"\bPID?\b", text, re.I):
         return _loop(said, plant, controlled)
     part = said.share()
     if part is None or not 0.0 < part < 1.0:
@@ -167,6 +173,9 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         how = f"{100 * part:g} % is 1.96 standard deviations, so that 95 % of estimates are within it"
         return [f"accuracy:  # {how}", f"  standard_deviation: {{{listed}}}"]
     begins, ends = said.band()
+    until = "what you named"
+    if kind == "prediction" and begins is ends is None:
+        ends, until = _HIGHER / plant.slow, f"{_HIGHER:g} over its time constant, as no frequency was named"
     high = needed(ends, "wish", f"up to which frequency (rad/{plant.time_unit})")
     said.finish()
     highest, step = math.pi / plant.sample_time, short(plant.sample_time)
@@ -181,7 +190,7 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         raise bad_answer("wish", f"{low:g} is not below {high:g}")
     band = f"band: [{short(low)}, {short(high)}]"
     if kind == "prediction":
-        how = f"G known within {100 * part:g} %, from one period in the experiment to what you named"
+        how = f"G known within {100 * part:g} %, from one period in the experiment to {until}"
         return [f"accuracy:  # {how}", f"  model_error: {{relative: {short(part)}, {band}}}"]
     how = f"{100 * part:g} % is {_RAYLEIGH:.3g} deviations of a complex error: 95 % are within it"
     size = short(part / _RAYLEIGH)
@@ -200,18 +209,24 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
     derivative = said.take(r"\bPID\b") is not None
     settings = _pid(said, stated=said.take(r"\b(?:my\s+)?own\b|\bmy\b") is not None)
     tuned = settings is None and plant.tunable
+    if tuned and derivative and plant.undelayed:
+        raise bad_answer(
+            "wish", "the rule for a PID needs a dead time, and this plant has none: a PI will do"
+        )
     fast = tuned and not derivative
     speed = said.after(r"(?:closed[- ]loop )?time constant|tau_c", "time") if fast else None
-    said.finish("PI controller margin")
+    said.finish("PI controller loop margin")
     if settings is not None:
         return ["accuracy:", f"  loop: {{controller: {{pid: {settings}}}, {margin}}}"]
     if tuned:
         rule, named = "{simc: {}}", "Skogestad, as fast as the dead time"
         if derivative:
             rule, named = "{amigo: {type: pid}}", "Astrom and Hagglund"
-        elif speed is not None:
-            rule = f"{{simc: {{tau_c: {short(needed(speed, 'wish', 'tau_c'))}}}}}"
-            named = "Skogestad, as fast as you said"
+        elif speed is not None or plant.undelayed:
+            how = f"{_FASTER:g} times as fast as the plant, for it has no dead time"
+            named = f"Skogestad, {how if speed is None else 'as fast as you said'}"
+            speed = plant.slow / _FASTER if speed is None else needed(speed, "wish", "tau_c")
+            rule = f"{{simc: {{tau_c: {short(speed)}}}}}"
         return [
             "accuracy:  # the controller follows from the plant; all that the data leave keep the margin",
             f"  loop: {{tuning: {rule}, {margin}}}  # tuned by the rule of {named}",
@@ -222,6 +237,13 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
         "wish",
         "no rule of tuning is at hand for this plant (they are for a gain, one or two lags and a dead time); "
         'name your own settings, as in "own loop with 6 dB, Kp 1.5, Ti 180"',
+    )
+
+
+def unbounded(text: str) -> bool:
+    """Return whether a wish asks for a loop and names no margin."""
+    return bool(re.search(LOOP, text, re.I)) and not re.search(
+        r"\bmargin|\bdB\b|\bdeg|°|\bsafe\b", text, re.I
     )
 
 

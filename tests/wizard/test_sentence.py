@@ -39,6 +39,90 @@ ROOM = (
 )
 
 
+# As engineers write who have not read the page: a motor, a tank and a room.
+WRITTEN = {
+    "I have a DC motor with dry friction and want to tune a PI speed controller. 10 rad/s per volt, "
+    "time constant roughly 0.5 s, hardly any dead time. Voltage 10 V plus minus 5 V, I have 30 seconds. "
+    "Noise about 1 rad/s.": {
+        "gain": 10,
+        "time_constant": 0.5,
+        "tau_c": 0.125,
+        "offset": 10,
+        "amplitude": 5,
+        "max_sensitivity_db": 6,
+        "duration": 30,
+        "standard_deviation": 1,
+        "correlation_time": 0.1,
+    },
+    "motor, gain about 10 rpm/V, lag about 500 ms, it sticks a bit at low speed, voltage 6 to 14 V, 1 "
+    "minute, noise 5 rpm white, PI with a safe margin": {
+        "gain": 10,
+        "time_constant": 0.5,
+        "offset": 10,
+        "amplitude": 4,
+        "duration": 60,
+        "variance": 25,
+    },
+    "PI loop with 6 dB for a motor: 10 rad/s per V, 0.5 s lag, 0.05 s of dead time, voltage 10 V +/- 5 "
+    "V, 60 s, noise 9.549297 rpm slow, the bearing has some stiction": {
+        "dead_time": 0.05,
+        "standard_deviation": 1,
+        "correlation_time": 0.5,
+    },
+    "PI level control for a tank: level rises 1.2 cm per minute per % of valve, dead time 10 s, valve "
+    "50 +- 10 %, one hour, level noise 3 mm slowly": {
+        "slope": 0.02,
+        "L": None,
+        "amplitude": 10,
+        "standard_deviation": 0.3,
+        "correlation_time": 10,
+    },
+    "I want a level controller for my tank. When I open the inlet valve by 10 % the level rises by "
+    "about 12 cm per minute. Delay about 10 s. The valve can go from 40 to 60 %. The level is measured "
+    "in cm with 0.2 cm noise. We have one hour.": {
+        "slope": 0.02,
+        "dead_time": 10,
+        "offset": 50,
+        "standard_deviation": 0.2,
+    },
+    "PI loop with a safe margin for a tank, level in cm: it integrates with 0.02 cm/s per %, dead time "
+    "10 s, valve 50 +- 10 %, one hour, noise 0.3 cm, slow": {"slope": 0.02, "correlation_time": 10},
+    "Temperature control of a room with a radiator. 10 % more valve warms the room by about 1.5 degC, "
+    "time constant about 3 h, delay 10 minutes, valve 50 % plus or minus 20 %, two days, noise 0.05 K": {
+        "gain": 0.15,
+        "time_constant": 10800,
+        "dead_time": 600,
+        "offset": 50,
+        "amplitude": 20,
+    },
+    "I want to predict the temperature of a room with a radiator within 5 %. The radiator valve can "
+    "move between 30 and 70 %. Gain 0.15 °C/%, time constant 3 hours, dead time 10 minutes. The sensor "
+    "has 0.1 °C resolution. I have two days.": {
+        "relative": 0.05,
+        "offset": 50,
+        "amplitude": 20,
+        "gain": 0.15,
+        "variance": 0.0008333333333333334,
+    },
+    "Room with a radiator: gain 0.15 degC per %, time constant 3 hours, dead time 10 min, valve 30-70 "
+    "%, 48 hours, noise 0.05 degC slowly varying, predict temperature within 5 % up to 0.001 rad/s": {
+        "correlation_time": 10800,
+        "amplitude": 20,
+        "duration": 172800,
+    },
+    "Heat exchanger: gain 1.7 degC/%, 262 s time constant, 31 s dead time, all within 20 %. Temperature "
+    "noise 0.1 degC, fades within a minute. Steam valve around 45 %, may move by 8 %. PI, gain margin "
+    "2. 8 hours.": {
+        "gain": 1.7,
+        "time_constant": 262,
+        "dead_time": 31,
+        "gain_margin": 2,
+        "offset": 45,
+        "amplitude": 8,
+    },
+}
+
+
 def heard(sentence, folder, *more):
     """The draft after a sentence and the answers to what is asked beyond it."""
     talk = Conversation({}, "x", folder)
@@ -70,6 +154,39 @@ def test_a_sentence_and_three_answers_are_a_spec(sentence, facts, tmp_path):
     assert "about" in draft.notes[0]
 
 
+def written(sentence, folder):
+    """The draft after a sentence alone, and its text without the title."""
+    found = in_sentence(sentence)
+    draft = compose(found.answers, "x", folder, remarks=found.remarks)
+    return draft, draft.text.split("\n", 2)[2]
+
+
+@pytest.mark.parametrize(("sentence", "facts"), WRITTEN.items())
+def test_a_sentence_as_engineers_write_is_a_spec(sentence, facts, tmp_path):
+    draft, text = written(sentence, tmp_path)
+    for name, value in facts.items():
+        found = re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", text)
+        assert (found is None) == (value is None), name
+        assert found is None or float(found[1]) == pytest.approx(value, rel=1e-4), name
+    rough = re.findall(r"dry friction|stiction|sticks", sentence)
+    assert sum("no linear model has it" in note for note in draft.notes) == len(rough)
+    assert draft.spec() is not None
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize("sentence", [*WRITTEN, EXCHANGER, MOTOR, TANK, LEVEL, ROOM])
+def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
+    """A strange word anywhere is refused, or said back or written; a strange number, too."""
+    words = sentence.split(" ")
+    for i in range(len(words) + 1):
+        for strange in ("blorgy", "blorgy 7.77"):
+            try:
+                draft, text = written(" ".join([*words[:i], strange, *words[i:]]), tmp_path)
+            except SpecError:
+                continue
+            assert all(part in f"{text} {draft.notes}" for part in strange.split()), words[:i]
+
+
 def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     talk = Conversation({}, "x", tmp_path)
     assert talk.answer(EXCHANGER.replace("valve 45 +- 8 %, ", "")) is None
@@ -84,12 +201,12 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     "text", ["gain 2, time constant 180 s, dead time 25 s, each within 30 %", "heater", ""]
 )
 def test_an_answer_to_one_question_is_no_sentence(text):
-    assert in_sentence(text) == {}
+    assert in_sentence(text).answers == {}
 
 
 def test_a_log_may_stand_in_a_sentence():
-    assert in_sentence("PI loop with 6 dB, gain ca. 2")["plant"] == "gain ca. 2"
-    found = in_sentence("PI loop with 6 dB, log a.csv columns u=OP [%], y=PV, valve 45 +- 8 %")
+    assert in_sentence("PI loop with 6 dB, gain ca. 2").answers["plant"] == "gain ca. 2"
+    found = in_sentence("PI loop with 6 dB, log a.csv columns u=OP [%], y=PV, valve 45 +- 8 %").answers
     assert found["plant"] == "log a.csv columns u=OP [%], y=PV"
     assert set(found) == {"wish", "plant", "range"}
 
@@ -171,6 +288,29 @@ def test_channels_have_the_names_and_units_that_were_said(answers, channels, tmp
     spec = compose(ENGINEER | {"plant": "gain 2, time constant 180 s"} | answers, "x", tmp_path).spec()
     found = {name: one.model_dump(exclude_none=True) for name, one in (spec.channels or {}).items()}
     assert found == channels
+
+
+def test_the_loop_of_a_lag_without_a_dead_time_keeps_the_default_margin(tmp_path):
+    """Skogestad's settings for a closed loop four times as fast: |1/(1 + C G)|, half a sample late."""
+    answers = ENGINEER | {"plant": "gain 2, time constant 180 s"}
+    draft = compose(answers, "x", tmp_path)
+    draft.validate()
+    spec = draft.spec()
+    tau, step = spec.accuracy.loop.tuning.simc.tau_c, spec.sample_time
+    assert tau == 45.0
+    s = 1j * np.geomspace(1e-5, np.pi / step, 3000)
+    loop = 180.0 / (2 * tau) * (1 + 1 / (180.0 * s)) * 2 / (180 * s + 1) * np.exp(-s * step / 2)
+    assert np.max(1 / np.abs(1 + loop)) < 10 ** (6 / 20)
+    with pytest.raises(SpecError, match="a PI will do"):
+        compose(answers | {"wish": "PID loop with 6 dB"}, "x", tmp_path)
+
+
+def test_a_size_in_a_unit_that_the_gain_does_not_have_is_refused(tmp_path):
+    plant = {"plant": "gain 2 degC/%, time constant 180 s"}
+    for key, text in (("range", "40 +- 5 mA"), ("noise", "0.1 furlongs"), ("range", "40 +- 5 stone")):
+        with pytest.raises(SpecError) as caught:
+            compose(ENGINEER | plant | {key: text}, "x", tmp_path)
+        assert caught.value.diagnostics[0].key == key
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 3.0])
