@@ -191,22 +191,20 @@ def test_weighted_variance_example_of_the_peer():
     assert answer.objective == pytest.approx(0.5692322, rel=1e-5)
 
 
-def test_unreachable_accuracy_is_proved(first_order):
-    """Half the least power: the limits must be doubled, and the proof says so."""
-    least = optimum(first_order, requirements=relative())
+@pytest.mark.parametrize("alone", [False, True])
+def test_what_is_out_of_reach_is_proved(first_order, alone):
+    """Half the least power: limits must be doubled. Of limits alone: input power times the peak of |G|^2 is
+    the most output power there is.
+    """
+    limits = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
+    more = {"basis": anywhere()} if alone else {}
+    if not alone:
+        limits = [PowerLimit("input", 0.5 * optimum(first_order, requirements=relative()))]
     with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), limits=[PowerLimit("input", 0.5 * least)])
-    assert caught.value.nearest.certificate.bound == pytest.approx(2.0, rel=1e-4)
-    assert not caught.value.limits_alone
-
-
-def test_contradictory_limits_are_proved(first_order):
-    """Input power times the peak of |G|^2 is the most output power there is."""
-    floors = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
-    with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), basis=anywhere(), limits=floors)
-    assert caught.value.limits_alone
-    assert caught.value.nearest.certificate.bound == pytest.approx(288.0 / 144.0, rel=1e-4)
+        solve(first_order, requirements=relative(), limits=limits, **more)
+    expected = 288.0 / 144.0 if alone else 2.0
+    assert caught.value.nearest.certificate.bound == pytest.approx(expected, rel=1e-4)
+    assert caught.value.limits_alone == alone
 
 
 def test_too_few_lines_are_refused():
