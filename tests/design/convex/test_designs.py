@@ -242,6 +242,32 @@ def test_criteria_agree_with_a_plain_program(letter):
     assert ours.value(1 / design.result.objective) == pytest.approx(plain, rel=1e-5)
 
 
+@pytest.mark.slow
+def test_capped_least_cost_agrees_with_a_plain_program():
+    """A cost that pulls one way and a limit that pulls the other: input cost under a cap on the output."""
+    experiment, kind, order = resonant(), "output", 10
+    free = solve(experiment, requirements=relative(0.1), order=order)
+    quiet = solve(experiment, requirements=relative(0.1), order=order, cost={"output": 1.0})
+    loud = free.problem.power(kind).at(free.result.x)
+    assert quiet.result.objective < 0.9 * loud
+    bound = 0.5 * (quiet.result.objective + loud)
+    limits = [PowerLimit(kind, bound)]
+    design = solve(experiment, requirements=relative(0.1), order=order, limits=limits)
+    check(design)
+    assert design.result.objective > free.result.objective
+    problem = design.problem
+    c, M, constraints = gram_program(problem, order, unit=design.result.objective)
+    scale, requirement = design.result.objective, problem.requirements[0]
+    w = np.union1d(np.linspace(0.0, np.pi, 200), design.result.active_frequencies)
+    K = np.linalg.inv(np.linalg.cholesky(design.result.information))
+    for at in w:
+        slack = K @ (M - requirement.cut(float(at)).matrix) @ K.T
+        constraints.append(0.5 * (slack + slack.T) >> 0)
+    constraints.append(problem.power(kind).vector @ c / bound <= 1.0)
+    plain = cp.Problem(cp.Minimize(problem.price.vector @ c / scale), constraints).solve(solver=cp.CLARABEL)
+    assert plain == pytest.approx(1.0, rel=1e-5)
+
+
 def test_density_limits_agree_with_a_plain_program(first_order):
     """Upper and lower bounds on Phi at every frequency against 400 rows of them."""
     upper = DensityLimit(lambda w: 1.5 + 0.5 * np.cos(w), np.linspace(0.0, np.pi, 300))
