@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from inputdesign_cli.accuracy.cuts import DeterminantCut, EllipsoidCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.spectrum import svec
+from tests.support.convex_designs import pole_form
 
 K = 3
 
@@ -20,12 +21,7 @@ def fixed():
     """R, V, W and the form of the ellipsoid, for the cuts below."""
     rng = np.random.default_rng(0)
     R, V, W = random_matrix(rng, 2), rng.normal(size=(K, 2)), random_matrix(rng)
-    Z, C = rng.normal(size=(2, 2, K))
-    form = np.zeros((K + 1, K + 1))
-    form[:K, :K] = Z.T @ Z - C.T @ C
-    form[:K, K] = form[K, :K] = -C[0]
-    form[K, K] = -1.0
-    return R, V, W, form
+    return R, V, W, pole_form(*rng.normal(size=(2, 2, K)))
 
 
 R, V, W, FORM = fixed()

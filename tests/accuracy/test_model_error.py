@@ -71,6 +71,18 @@ def test_cut_is_equivalent_to_the_bound(first_order, frequency):
     assert abs(slack[0]) < 1e-9 * slack[-1]
 
 
+def test_error_bound_predicts_monte_carlo_of_the_first_order_expansion(first_order):
+    """95 % of Gaussian theta lie within alpha = 2.4477 in the plant's two parameters, so |dG| <= r_u."""
+    rng = np.random.default_rng(5)
+    M = first_order.to_raw(information(3, 3) * 1e4)
+    requirement = first_order_error(first_order, Absolute(1.0), np.sqrt(5.991464547))
+    w = np.linspace(0, np.pi, 50)
+    theta = rng.multivariate_normal(np.zeros(3), np.linalg.inv(M), size=20000)
+    errors = np.abs(theta @ first_order.model.plant_gradient(w)[:, :, 0, 0].T)
+    inside = np.all(errors <= requirement.error_bound(M, w), axis=1).mean()
+    assert inside >= 0.95 - 4 * np.sqrt(0.05 * 0.95 / 20000)
+
+
 def test_violations_find_the_worst_of_a_dense_grid(flexible):
     M = information(6, 4)
     requirement = first_order_error(flexible, Relative(flexible.model, 0.25), 3.55, (1e-3, np.pi))

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from inputdesign_cli import questions
-from inputdesign_cli.cli import main
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import Origin, check_place, write_run
@@ -27,17 +26,11 @@ spectrum: {{given: {{type: white, power: 1.0}}}}
 
 
 @pytest.fixture
-def analyse(monkeypatch, capsys, tmp_path):
+def analyse(run):
     """`idesign analyse ..`: its exit code and the code of its error."""
-    monkeypatch.chdir(tmp_path)
 
     def call(*arguments):
-        command = ["idesign", "analyse", *map(str, arguments), "--no-figures", "--json"]
-        monkeypatch.setattr(sys, "argv", command)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        code = ended.value.code or 0
+        code, out, err = run("analyse", *arguments, "--no-figures", "--json")
         return code, json.loads(out)["errors"][0]["code"] if code and out else err[-200:] if code else ""
 
     return call
@@ -298,18 +291,13 @@ def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
     check_place(tmp_path / "run", Origin(files, overwrite=True), spec)
 
 
-def test_a_report_replaces_its_own_pages_only_or_goes_to_standard_output(
-    analyse, tmp_path, monkeypatch, capsys
-):
+def test_a_report_replaces_its_own_pages_only_or_goes_to_standard_output(run, analyse, tmp_path, monkeypatch):
     monkeypatch.setattr("inputdesign_cli.report.run_page.run_charts", lambda *_, **__: {})
     assert analyse(write(tmp_path / "a.yaml", "a")) == (0, "")
 
     def report(name):
-        monkeypatch.setattr(sys, "argv", ["idesign", "report", "runs/a", "-o", name])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, "output-exists" in err or out.startswith("<!DOCTYPE html>")
+        code, out, err = run("report", "runs/a", "-o", name)
+        return code, "output-exists" in err or out.startswith("<!DOCTYPE html>")
 
     (tmp_path / "data.csv").write_text("u,y\n1,2\n")
     spec = (tmp_path / "runs" / "a" / "spec.yaml").read_text()

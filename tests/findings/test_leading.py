@@ -121,12 +121,14 @@ def test_spikes_that_follow_the_moves_of_inputs_are_no_faults_of_measurement(of_
     assert follows_inputs(errors[errors != 0.0], np.flatnonzero(errors).tolist(), u) == of_inputs
 
 
+DATA = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
+
+
 def test_every_kind_that_leaves_a_verdict_open_names_a_command():
     """The end of a campaign has its own in the message."""
     open_ = {code for code, kind in kinds().items() if kind.severity in (REFUTED, UNDECIDED)}
-    data = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
     for code in open_ - {"campaign-refuted"}:
-        first = leading([Finding(code, REFUTED, "x", "", {"rows": []})], None, data)
+        first = leading([Finding(code, REFUTED, "x", "", {"rows": []})], None, DATA)
         assert first.command.startswith(
             ("idesign assess SPEC DATA ", "idesign explore DATA", "idesign solve SPEC ")
         )
@@ -143,7 +145,6 @@ def test_every_kind_that_leaves_a_verdict_open_names_a_command():
     ],
 )
 def test_what_explains_the_others_comes_first(codes, first):
-    data = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
-    found = leading([Finding(code, REFUTED, code) for code in codes], None, data)
+    found = leading([Finding(code, REFUTED, code) for code in codes], None, DATA)
     assert [one.code for one in found.findings] == [first]
-    assert leading([], None, data) is None
+    assert leading([], None, DATA) is None

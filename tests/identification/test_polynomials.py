@@ -213,10 +213,12 @@ def test_bad_data_is_refused_and_the_channel_named(change, code, named):
     assert named in found[0].message
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "runs"),
-    [(arx(), 200), (arx(per_output=False), 500), (box_jenkins(), 500)],
+    [
+        (arx(), 200),
+        *(pytest.param(one, 500, marks=pytest.mark.slow) for one in (arx(per_output=False), box_jenkins())),
+    ],
     ids=["arx", "common", "bj"],
 )
 def test_estimates_reach_the_cramer_rao_bound(model, runs):

@@ -6,6 +6,7 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.expressions import Expression
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import (
     ContinuousModel,
     Loop,
@@ -188,6 +189,19 @@ def test_samples_drive_an_integrator_as_a_sum(hold):
     if not hold:  # the trapezoidal rule is nearly exact for a signal that is slow
         expected = expected + 0.5 * H * u
     np.testing.assert_allclose(y, expected, atol=1e-9 if hold else 0.02 * np.abs(expected).max())
+
+
+def test_the_gradient_of_a_record_is_that_of_differences():
+    model, record = plant_of([0.3], [1, 0.8, 0]), np.random.default_rng(2).standard_normal((300, 1))
+    e = np.zeros((300, 1))
+
+    def caused(moved):
+        return model.at(moved).simulate(record, e, 1.0)[0]
+
+    step = 1e-6 * np.eye(3)[[0, 2]]
+    expected = [(caused(model.theta + d) - caused(model.theta - d)) / 2e-6 for d in step]
+    psi = FiniteRecord(Experiment(model, 300), 300).gradient(record)[:, [0, 2], 0]
+    np.testing.assert_allclose(psi, np.concatenate(expected, axis=1), atol=1e-6 * np.abs(psi).max())
 
 
 def test_estimates_hold_the_integrator():

@@ -49,6 +49,12 @@ def test_a_prbs_is_white_over_its_period(bits):
     assert found.power == pytest.approx(1.0 - 1.0 / period**2)
 
 
+def test_inputs_of_a_prbs_are_hardly_correlated():
+    u = made("prbs", 1023, 3, bits=10)
+    gram = u.T @ u / 1023
+    assert np.abs(gram - np.eye(3)).max() == pytest.approx(1.0 / 1023)
+
+
 @pytest.mark.parametrize("odd", [False, True])
 def test_a_multisine_has_equal_lines_of_a_low_peak(odd):
     u = made("multisine", 600, 1, (0.1, 2.0), 25, odd=odd)
@@ -62,6 +68,12 @@ def test_a_multisine_has_equal_lines_of_a_low_peak(odd):
     assert found.crest_factor < 1.8  # random phases: about 3
     low, high = found.band
     assert 0.1 <= low < high <= 2.0
+
+
+def test_inputs_of_a_multisine_are_orthogonal():
+    u = made("multisine", 3 * 128, 3, (0.0, np.pi), 10)
+    gram = u.T @ u
+    assert np.abs(gram - np.diag(np.diag(gram))).max() < 1e-9 * gram[0, 0]
 
 
 def test_a_chirp_sweeps_its_band():

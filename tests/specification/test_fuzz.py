@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from inputdesign_cli.diagnostics import as_json, explanations, render
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import parse_spec
+from tests.fuzzing.mutations import places
 
 HERE = Path(__file__).parent
 SPECS = sorted([*(HERE / "data").glob("*.yaml"), *(HERE.parents[1] / "specs").glob("*.yaml")])
@@ -80,13 +81,6 @@ def test_examples_with_characters_cut_out_and_put_in(text, edits):
     read_or_complain(text)
 
 
-def paths(node, path=()):
-    yield path
-    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-    for key, value in items:
-        yield from paths(value, (*path, key))
-
-
 scalars = st.one_of(
     st.none(),
     st.booleans(),
@@ -96,8 +90,9 @@ scalars = st.one_of(
     st.sampled_from(["", "fir", "white", "D", "1e-3", "zoh", "x", "moments", "least_cost", "best_accuracy"]),
     st.text(max_size=5),
 )
-KEYS = {str(k) for d in DATA for p in paths(d) for k in p} | {"", "x", "1", "table", "max", "min"}
+KEYS = {str(k) for d in DATA for p in places(d) for k in p} | {"", "x", "1", "table", "max", "min"}
 keys = st.sampled_from(sorted(KEYS))
+TARGETS = sorted({"", *(".".join(map(str, p)) for d in DATA for p in places(d))})
 values = st.recursive(
     scalars,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(keys, inner, max_size=3),
@@ -109,7 +104,7 @@ values = st.recursive(
 def mutated(draw):
     data = copy.deepcopy(draw(st.sampled_from(DATA)))
     for _ in range(draw(st.integers(1, 3))):
-        path = draw(st.sampled_from(list(paths(data))))
+        path = draw(st.sampled_from([(), *places(data)]))
         if not path:
             continue
         holder = data
@@ -121,7 +116,7 @@ def mutated(draw):
         elif action == "graft":
             donor = draw(st.sampled_from(DATA))
             part = donor
-            for step in draw(st.sampled_from(list(paths(donor)))):
+            for step in draw(st.sampled_from([(), *places(donor)])):
                 part = part[step]
             holder[path[-1]] = copy.deepcopy(part)
         elif action == "delete":
@@ -142,7 +137,9 @@ def test_examples_with_parts_replaced(data):
 @settings(quick, max_examples=25)
 @given(
     st.sampled_from(TEXTS),
-    st.lists(st.sampled_from(sorted({".".join(map(str, p)) for d in DATA for p in paths(d)})), max_size=3),
+    st.lists(
+        st.sampled_from(sorted({".".join(map(str, p)) for d in DATA for p in [(), *places(d)]})), max_size=3
+    ),
     st.data(),
 )
 def test_random_overrides(text, targets, data):

@@ -120,6 +120,11 @@ def check(design, tolerance=1e-6):
             assert np.all(phi <= level * (1 + 1e-6)) if density.upper else np.all(phi >= level * (1 - 1e-6))
 
 
+def pole_form(Z, C):
+    """The form of |Z x|^2 <= |1 + C x|^2, Z and C (2, k): an error against the distance to a pole."""
+    return np.block([[Z.T @ Z - C.T @ C, -C[:1].T], [-C[:1], -np.ones((1, 1))]])
+
+
 def resonant():
     """A lightly damped OE system, where cheap inputs and quiet outputs are different things."""
     model = PolynomialModel.single([0, 1.0, 0.3], F=[1, -1.4, 0.81], variance=0.2)

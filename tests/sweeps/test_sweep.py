@@ -3,6 +3,7 @@
 import hashlib
 import itertools
 import json
+import multiprocessing
 import pkgutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 
 import inputdesign_cli
 from inputdesign_cli import load_spec, parse_spec, questions, sweep
+from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError
 from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
@@ -21,7 +23,7 @@ from inputdesign_cli.sweeps.points import Layout
 from inputdesign_cli.sweeps.running import list_points, row_of, scalars, table_lines
 from tests.support.processes import running
 from tests.support.refusals import refused
-from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files
+from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files, timeless_rows
 
 TWO = ["experiment.samples=10,20"]
 
@@ -176,6 +178,16 @@ def test_the_table_holds_short_lists_and_the_fewest_digits():
     head, row = table_lines(["samples"], [(("100",), row_of("0", result))])
     found = dict(zip(head.strip().split(","), row.strip().split(","), strict=True))
     assert [found[name] for name in "abcn"] == ["0.1", "0.3333333333333333", "2", "7"]
+
+
+@pytest.mark.slow
+def test_processes_give_what_one_process_gives(spec, tmp_path):
+    settings = ["experiment.samples=50,100,-1", "spectrum.order=1,2"]
+    run_sweep(spec, settings, directory=tmp_path / "one")
+    run_sweep(spec, settings, directory=tmp_path / "two", executor=Processes(2))
+    assert timeless_rows(tmp_path / "one") == timeless_rows(tmp_path / "two")
+    assert timeless_files(tmp_path / "one") == timeless_files(tmp_path / "two")
+    assert multiprocessing.active_children() == []
 
 
 def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):

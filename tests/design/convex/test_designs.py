@@ -191,22 +191,20 @@ def test_weighted_variance_example_of_the_peer():
     assert answer.objective == pytest.approx(0.5692322, rel=1e-5)
 
 
-def test_unreachable_accuracy_is_proved(first_order):
-    """Half the least power: the limits must be doubled, and the proof says so."""
-    least = optimum(first_order, requirements=relative())
+@pytest.mark.parametrize("alone", [False, True])
+def test_what_is_out_of_reach_is_proved(first_order, alone):
+    """Half the least power: limits must be doubled. Of limits alone: input power times the peak of |G|^2 is
+    the most output power there is.
+    """
+    limits = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
+    more = {"basis": anywhere()} if alone else {}
+    if not alone:
+        limits = [PowerLimit("input", 0.5 * optimum(first_order, requirements=relative()))]
     with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), limits=[PowerLimit("input", 0.5 * least)])
-    assert caught.value.nearest.certificate.bound == pytest.approx(2.0, rel=1e-4)
-    assert not caught.value.limits_alone
-
-
-def test_contradictory_limits_are_proved(first_order):
-    """Input power times the peak of |G|^2 is the most output power there is."""
-    floors = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
-    with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), basis=anywhere(), limits=floors)
-    assert caught.value.limits_alone
-    assert caught.value.nearest.certificate.bound == pytest.approx(288.0 / 144.0, rel=1e-4)
+        solve(first_order, requirements=relative(), limits=limits, **more)
+    expected = 288.0 / 144.0 if alone else 2.0
+    assert caught.value.nearest.certificate.bound == pytest.approx(expected, rel=1e-4)
+    assert caught.value.limits_alone == alone
 
 
 def test_too_few_lines_are_refused():
@@ -242,6 +240,32 @@ def test_criteria_agree_with_a_plain_program(letter):
     plain = cp.Problem(cp.Maximize(value), constraints).solve(solver=cp.CLARABEL)
     ours = Criterion(letter, np.eye(3))
     assert ours.value(1 / design.result.objective) == pytest.approx(plain, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_capped_least_cost_agrees_with_a_plain_program():
+    """A cost that pulls one way and a limit that pulls the other: input cost under a cap on the output."""
+    experiment, kind, order = resonant(), "output", 10
+    free = solve(experiment, requirements=relative(0.1), order=order)
+    quiet = solve(experiment, requirements=relative(0.1), order=order, cost={"output": 1.0})
+    loud = free.problem.power(kind).at(free.result.x)
+    assert quiet.result.objective < 0.9 * loud
+    bound = 0.5 * (quiet.result.objective + loud)
+    limits = [PowerLimit(kind, bound)]
+    design = solve(experiment, requirements=relative(0.1), order=order, limits=limits)
+    check(design)
+    assert design.result.objective > free.result.objective
+    problem = design.problem
+    c, M, constraints = gram_program(problem, order, unit=design.result.objective)
+    scale, requirement = design.result.objective, problem.requirements[0]
+    w = np.union1d(np.linspace(0.0, np.pi, 200), design.result.active_frequencies)
+    K = np.linalg.inv(np.linalg.cholesky(design.result.information))
+    for at in w:
+        slack = K @ (M - requirement.cut(float(at)).matrix) @ K.T
+        constraints.append(0.5 * (slack + slack.T) >> 0)
+    constraints.append(problem.power(kind).vector @ c / bound <= 1.0)
+    plain = cp.Problem(cp.Minimize(problem.price.vector @ c / scale), constraints).solve(solver=cp.CLARABEL)
+    assert plain == pytest.approx(1.0, rel=1e-5)
 
 
 def test_density_limits_agree_with_a_plain_program(first_order):

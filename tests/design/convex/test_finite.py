@@ -17,6 +17,7 @@ from inputdesign_cli.design.convex.response_lines import (
     most_accurate,
 )
 from inputdesign_cli.spectrum import Face, smat, svec, svec_length
+from tests.support.convex_designs import pole_form
 
 K = 5
 
@@ -28,12 +29,7 @@ def psd(rng, rank=2, scale=1.0):
 
 def ellipsoid(rng):
     """An error no larger than a fraction of the distance to a pole."""
-    Z, C = 0.3 * rng.normal(size=(2, 2, K))
-    form = np.zeros((K + 1, K + 1))
-    form[:K, :K] = Z.T @ Z - C.T @ C
-    form[:K, K] = form[K, :K] = -C[0]
-    form[K, K] = -1.0
-    return EllipsoidCut(form, 1.2)
+    return EllipsoidCut(pole_form(*(0.3 * rng.normal(size=(2, 2, K)))), 1.2)
 
 
 CUTS = {
