@@ -156,6 +156,7 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
     assert result.gap < 1e-6
 
 
+@pytest.mark.slow
 def test_a_spectrum_of_order_zero_is_white_in_time():
     """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
     costs = [

@@ -288,7 +288,7 @@ def test_a_given_table_is_tried(write):
     np.testing.assert_allclose(simulation["inputs"]["design"]["power"]["input"], [9.0, 4.0], rtol=0.01)
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("spec", "signal"),
     [
