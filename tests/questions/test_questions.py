@@ -221,3 +221,12 @@ def test_what_noise_alone_tells_of_some_parameters_needs_no_excitation(spectrum,
     ).result
     assert (found["cost"] > 0) == needed
     assert (found["status"] == "nothing_needed") != needed
+
+
+def test_relative_criteria_do_not_depend_on_units():
+    """u measured in thousandths: b scales, relative A-optimality does not."""
+    accuracy = "accuracy: {criterion: A, scale: relative}\n"
+    plain = run(accuracy + "limits: {input_power: 1}\n" + FIR)
+    spec = PLANT.replace("3.6", "0.0036") + accuracy + "limits: {input_power: 1.0e+6}\n" + FIR
+    milli = solve(parse_spec(spec)).result
+    assert milli["objective"]["value"] == pytest.approx(plain["objective"]["value"], rel=1e-6)

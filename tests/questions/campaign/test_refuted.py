@@ -84,3 +84,12 @@ def test_right_models_are_seldom_refuted_at_any_part():
             for n in range(40, 601, 20)
         )
     assert refuted <= 4
+
+
+@pytest.mark.slow
+def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
+    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 60, stop: never}"))
+    assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
+    code, result = until_it_ends(run, tmp_path / "c", tmp_path)
+    assert result["samples"] == 200
+    assert code == 5
