@@ -231,3 +231,15 @@ def test_what_a_table_misses_is_of_the_size_of_the_errors_between_its_rows(rows)
 def test_a_flat_spectrum_misses_nothing():
     flat = TabulatedSpectrum.white(np.array([1.0]), (0.0, 3.0))
     assert np.array_equal(flat.raised(0.5).phi, flat.phi)
+
+
+def test_a_flat_table_is_white_noise(tmp_path):
+    table = tmp_path / "phi.csv"
+    rows = "\n".join(f"{w:.17g},1.7" for w in np.linspace(0.0, np.pi, 40))
+    table.write_text("frequency_rad_per_s,phi\n" + rows + "\n", encoding="utf-8")
+    tabulated = analyse(spec_of(f"{{type: table, file: {table}}}"))
+    white = analyse(spec_of(WHITE))
+    np.testing.assert_allclose(
+        tabulated.result["information"]["matrix"], white.result["information"]["matrix"], rtol=1e-9
+    )
+    assert tabulated.result["power"]["output"] == pytest.approx(white.result["power"]["output"])

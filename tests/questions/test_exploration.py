@@ -11,6 +11,7 @@ import scipy.signal
 from typer.testing import CliRunner
 
 from inputdesign_cli.cli import app
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.questions import explore, identify, solve
 from inputdesign_cli.questions.exploration.build import spec_text
@@ -355,3 +356,19 @@ def test_an_output_that_never_changes_is_refused_as_without_a_model(tmp_path):
         told += [(one.code, one.message, one.location) for one in caught.value.diagnostics]
     assert told[0] == told[1]
     assert told[0][0] == "constant-output"
+
+
+@pytest.mark.slow
+def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)
+    pole = np.exp(-0.1)
+    y = scipy.signal.lfilter([0, 1 - pole], [1, -pole], u) + 0.05 * rng.standard_normal(300)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{k},{a:g},{b:.5f}\n" for k, (a, b) in enumerate(zip(u, y, strict=True)))
+    path.write_text(f"time,u,y\n{rows}")
+    found = explore(path).results
+    assert "L 0 +-" in summary(found.outcome, "s", [])
+    (told,) = [one["figures"] for one in found.result["findings"] if one["where"] == "L"]
+    deviation = found.result["identification"]["standard_deviation"]["L"]
+    assert told["at_most"] == pytest.approx(1.96 * deviation, rel=0.01)

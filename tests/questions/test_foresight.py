@@ -85,9 +85,8 @@ def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undeci
     assert assessment.get("causes", []) == (["undetermined"] if undecided else [])
 
 
-@pytest.mark.parametrize(
-    "spectrum", [pytest.param(RICHER, marks=pytest.mark.slow), "{type: multisine, lines: 40}"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("spectrum", [RICHER, "{type: multisine, lines: 40}"])
 def test_where_a_plain_scan_finds_none_none_is_told(spectrum):
     result, u = solved(f"spectrum={spectrum}")
     assert valleys(u) == []
@@ -144,10 +143,8 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["loop", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("duration", "held", "shortest"))],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", OTHERS)
 def test_all_kinds_of_experiments_are_foreseen(kind):
     assert "rivals" in solved(OTHERS[kind])[0]["foreseen"]
 

@@ -1,12 +1,15 @@
 """Specs with several channels, in continuous time and in loops: against their files, alone, in any units."""
 
+import warnings
 from pathlib import Path
 
+import cvxpy as cp
 import numpy as np
 import pytest
 import scipy.integrate
 
 from inputdesign_cli import load_spec, solve
+from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
 from tests.support.matrix_specs import ARX, CONTINUOUS, IN_LOOP, changed
@@ -156,6 +159,7 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
     assert result.gap < 1e-6
 
 
+@pytest.mark.slow
 def test_a_spectrum_of_order_zero_is_white_in_time():
     """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
     costs = [
@@ -229,3 +233,74 @@ def test_the_units_of_the_loop_do_not_make_it_algebraic():
         "experiment.controller.numerator=[[[0.3e-6, -0.25e-6], [0]], [[0], [0.3e+6, -0.2e+6]]]",
     )
     build_convex(scaled)
+
+
+def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
+    """A plain program on a grid with the binding frequencies: block Toeplitz positivity by a Gram matrix."""
+    order = 2
+    spec = load_spec(SPECS / "two_by_two_arx.yaml", [f"spectrum.order={order}"])
+    result = solve(spec).result
+    assert result["objective"]["relative_gap"] <= 1e-5
+    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    task = build_convex(spec)
+    experiment = task.simulation.nominal.whitened(result["baseline"]["white"]["cost"])
+    basis, k = task.asked.question.basis, experiment.size
+    maps = basis.integrals(experiment.information_density, experiment.singularities)
+    power = basis.integrals(lambda w: experiment.power_density("input", w), experiment.singularities)
+    scale = result["baseline"]["white"]["cost"]
+    r, n = 2, 2 * (order + 1)
+    gram = cp.Variable((n, n), PSD=True)
+    blocks = [
+        sum(gram[r * (s + t) : r * (s + t + 1), r * s : r * (s + 1)] for s in range(order + 1 - t))
+        for t in range(order + 1)
+    ]
+    x = cp.hstack(
+        [
+            blocks[0][0, 0],
+            blocks[0][0, 1],
+            blocks[0][1, 1],
+            *(b[i, j] for b in blocks[1:] for i in range(r) for j in range(r)),
+        ]
+    )
+    M = experiment.baseline_information + cp.reshape(
+        scale * maps.reshape(len(maps), -1).T @ x, (k, k), order="C"
+    )
+    constraints = []
+    grid = np.concatenate(
+        [np.linspace(1e-9, np.pi, 5), np.array(result["model_error"]["active_frequencies"])]
+    )
+    for make in task.asked.question.requirements:
+        requirement = make(experiment)
+        for w in grid:
+            R = requirement.cut(float(w)).matrix
+            constraints.append(0.5 * (M + M.T) - R >> 0)
+    problem = cp.Problem(cp.Minimize(power @ x), constraints)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that it may be inaccurate; four digits are compared
+        problem.solve(solver=cp.CLARABEL)
+    assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_single_samples_of_u_are_limited():
+    """What r causes at u, by the recursion of the loop, obeys the limits; the accuracy is met still."""
+    free = solve(in_loop("signal.candidates=2")).result["signal"]
+    amplitude, rate = 0.8 * np.array(free["input_peak"]), 0.8 * np.array(free["input_move"])
+    limits = f"limits={{amplitude: {{input: {amplitude.tolist()}}}, rate: {rate.tolist()}}}"
+    spec = in_loop(limits, "signal.candidates=2")
+    outcome = solve(spec)
+    r = np.stack([outcome.tables["signal"].columns[name] for name in ("r1", "r2")], axis=1)
+    _, u = build_experiment(spec).loop.signals(r, 0.0 * r)
+    assert np.all(np.abs(u).max(axis=0) <= amplitude * (1 + 1e-10))
+    assert np.all(np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0) <= rate * (1 + 1e-10))
+    assert outcome.result["signal"]["worst_ratio"] <= 1 + 1e-9
+    assert outcome.result["signal"]["input_peak"] == pytest.approx(np.abs(u).max(axis=0))
+
+
+def test_limits_bind_what_r_causes():
+    free = solve(in_loop()).result
+    most = 0.99 * free["power"]["input"][1]
+    held = solve(in_loop(f"limits.input_power=[1e6, {most}]")).result
+    assert held["power"]["input"][1] == pytest.approx(most, rel=1e-6)
+    assert held["cost"] > free["cost"]
+    assert held["objective"]["relative_gap"] < 1e-6

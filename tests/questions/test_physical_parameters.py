@@ -42,7 +42,8 @@ def test_information_of_a_dead_time_is_that_of_the_closed_form():
     text = (
         "plant: {continuous: {numerator: [1], denominator: [1], delay: 0.7}, known: [b0]}\n"
         "noise: {variance: 0.1}\nexperiment: {samples: 300}\nlimits: {band: [0, 2]}\nsample_time: 0.5\n"
-        "accuracy: {standard_deviation: {delay: 0.01}}\nspectrum: {type: white}"
+        "accuracy: {standard_deviation: {delay: 0.01}}\nspectrum: {type: white}\n"
+        "solver: {any_spectrum: false}"
     )
     power = solve(parse_spec(text)).result["cost"]
     assert power == pytest.approx(0.1 / (300 * 2.0**2 / 3.0 * 0.01**2), rel=1e-9)
@@ -55,7 +56,7 @@ def record_of(model, samples=600, seed=0):
     return u, sum(model.simulate(u, e, 1.0))
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("nominal", ["[2.0, 3.0, 1.685]", "[1.0, 8.0, 9.0]"])
 def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
     """Within four standard deviations, whatever the nominal values."""

@@ -87,6 +87,7 @@ DATA = {
     "accuracy": {"standard_deviation": {"b1": 0.01}},
     "spectrum": {"type": "fir", "order": 3},
     "signal": {"samples": 100, "seed": 1},
+    "solver": {"any_spectrum": False},
 }
 
 
@@ -131,6 +132,7 @@ def test_the_power_of_a_line_is_found_by_the_digits_that_people_write():
         "experiment": {"samples": 720},
         "accuracy": {"standard_deviation": {"gain": 0.05, "dead_time": 2}},
         "spectrum": {"type": "multisine", "lines": 60},
+        "solver": {"any_spectrum": False},
     }
     outcome = solve(Spec.from_dict(spec))
     columns = outcome.tables["spectrum"].columns

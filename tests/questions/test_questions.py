@@ -235,3 +235,12 @@ def test_a_command_takes_a_spec_its_file_or_its_content(tmp_path):
     with pytest.raises(SpecError) as caught:
         solve(str(tmp_path / "other.yaml"))
     assert caught.value.diagnostics[0].code == "file-missing"
+
+
+def test_relative_criteria_do_not_depend_on_units():
+    """u measured in thousandths: b scales, relative A-optimality does not."""
+    accuracy = "accuracy: {criterion: A, scale: relative}\n"
+    plain = run(accuracy + "limits: {input_power: 1}\n" + FIR)
+    spec = PLANT.replace("3.6", "0.0036") + accuracy + "limits: {input_power: 1.0e+6}\n" + FIR
+    milli = solve(parse_spec(spec)).result
+    assert milli["objective"]["value"] == pytest.approx(plain["objective"]["value"], rel=1e-6)

@@ -440,3 +440,15 @@ def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
     ]
     assert found["lost"]
     assert found["peak"] == pytest.approx(peak(found["parameters"]["b1"], -0.8, 0.4, 0.95), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
+    found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
+    robust = found["robust"]
+    assert robust["worst_share"] == pytest.approx(1.0, abs=1e-6)
+    assert robust["fresh"]["draws"] == 120
+    low, high = robust["fresh"]["limits"]
+    assert low <= robust["fresh"]["share"] <= high
+    assert robust["fresh"]["share"] <= robust["risk"]["after"] <= robust["risk"]["before"]
+    assert found["cost"] > 1.05 * solved(FIRST)["cost"]

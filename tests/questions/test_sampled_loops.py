@@ -1,7 +1,12 @@
 """Plants in s under digital controllers, in polynomials and in the words of engineers."""
 
+import warnings
+
+import cvxpy as cp
 import numpy as np
 import pytest
+import scipy.signal
+import scipy.stats
 
 from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
@@ -69,7 +74,15 @@ def test_what_does_not_depend_on_coordinates_is_that_of_polynomials(overrides):
 
 def test_a_limit_on_the_output_holds_for_the_record():
     """What the record causes is had from the loop, sample by sample."""
-    spec = load_spec(MOTOR, ["limits.amplitude.output=0.02", "spectrum.order=5", "signal.candidates=2"])
+    spec = load_spec(
+        MOTOR,
+        [
+            "limits.amplitude.output=0.02",
+            "spectrum.order=5",
+            "signal.candidates=2",
+            "solver.any_spectrum=false",
+        ],
+    )
     outcome = solve(spec)
     r = np.asarray(outcome.tables["signal"].columns["r1"])[:, None]
     y, u = build_experiment(spec).loop.signals(r, np.zeros_like(r))
@@ -140,3 +153,49 @@ def test_loops_are_a_matrix():
     gradients = [experiment.excitation_gradient(w) for experiment in made]
     np.testing.assert_allclose(gradients[0], gradients[1], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(made[0].noise_information, made[1].noise_information, rtol=1e-9, atol=1e-12)
+
+
+def motor(theta, w):
+    """G of the motor at theta = (b0, a0, a1), by scipy."""
+    top, bottom, _ = scipy.signal.cont2discrete(([theta[0]], [1, theta[2], theta[1]]), 0.05, "zoh")
+    return scipy.signal.freqz(top[0], bottom, w)[1]
+
+
+@pytest.mark.slow
+def test_the_motor_against_a_plain_program():
+    """The least cost of r of order 3: relative parameters, sums over a circle, LMIs at 180 frequencies."""
+    spec = load_spec(MOTOR, ["spectrum.order=3"])
+    found = build_convex(spec).designed().design.result
+    theta, samples, variance, order = np.array([2.0, 20.02, 12.0]), 600, 2.5e-5, 3
+
+    def gradient(w):
+        steps = 1e-5 * np.diag(theta)
+        return np.array([(motor(theta + h, w) - motor(theta - h, w)) / 2e-5 for h in steps])
+
+    def controller(w):
+        return (40 - 36.2 * np.exp(-1j * w)) / (1 - np.exp(-1j * w))
+
+    w = (np.arange(8192) + 0.5) * 2 * np.pi / 8192  # beside the integrator
+    G, C, D = motor(theta, w), controller(w), gradient(w)
+    S = 1 / (1 + C * G)
+    cosines = np.array([np.ones(w.size)] + [2 * np.cos(k * w) for k in range(1, order + 1)])
+    price = cosines @ (np.abs(S) ** 2 * (1 + 1000 * np.abs(G) ** 2)) / w.size
+    noise = samples / w.size * ((D * C * S) @ (D * C * S).conj().T).real
+    maps = [samples / variance / w.size * ((D * S * c) @ (D * S).conj().T).real for c in cosines]
+    at = np.concatenate(
+        [np.geomspace(1e-3, np.pi, 60), np.linspace(0.2, 0.9, 60), np.linspace(0.465, 0.478, 60)]
+    )
+    r_adm = (np.abs(1 + controller(at) * motor(theta, at)) - 10 ** (-5 / 20)) / np.abs(controller(at))
+    T = gradient(at) * np.sqrt(scipy.stats.chi2.ppf(0.95, 3)) / r_adm
+    x = cp.Variable(order + 1)
+    scale = np.sqrt(np.diag(maps[0]))
+    M = (noise + sum(x[k] * maps[k] for k in range(order + 1))) / np.outer(scale, scale)
+    grid = np.linspace(0, np.pi, 500)
+    constraints = [1 * x[0] + sum(2 * np.cos(k * grid) * x[k] for k in range(1, order + 1)) >= 0]
+    for column in T.T:
+        R = np.stack([column.real, column.imag]) / scale
+        constraints.append((M + M.T) / 2 - R.T @ R >> 0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        expected = cp.Problem(cp.Minimize(price @ x), constraints).solve(solver=cp.CLARABEL)
+    assert found.objective == pytest.approx(expected, rel=2e-5)

@@ -12,7 +12,7 @@ import pytest
 import scipy.signal
 import yaml
 
-from inputdesign_cli import analyse, load_spec
+from inputdesign_cli import analyse, load_spec, solve
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 
@@ -62,16 +62,29 @@ def held_lag(K, T, L, h, z):
     return K * (early * z ** -(d + 1) + (1.0 - a - early) * z ** -(d + 2)) / (1.0 - a / z)
 
 
-@pytest.mark.parametrize(("name", "samples"), [("heater", 720), ("heater_drift", int(3600 / 4.76))])
-def test_heater(name, samples):
+HEATERS = {"heater": 720, "heater_drift": int(3600 / 4.76)}
+
+
+def heater_cost(name):
     """With drift, prediction errors are (1 - q^-1) / (1 - 0.8 q^-1) times the errors of the output."""
-    h = 4.76
+    h, samples = 4.76, HEATERS[name]
     z = np.exp(1j * np.arange(1, 121) * np.pi / 120)
     F = slopes(lambda x: held_lag(*x, h, z), [2.1, 180.0, 25.0], 1e-3)
     F = F * ((1 - 1 / z) / (1 - 0.8 / z))[:, None] if name == "heater_drift" else F
     information = samples / 0.04 * np.einsum("nk,nl->nkl", F, F.conj()).real
-    value = least_cost(information, np.ones(120), np.zeros((3, 3)), np.array([0.05, 6.0, 0.5]))
-    assert golden(name)["cost"] == pytest.approx(value, rel=1e-6)
+    return least_cost(information, np.ones(120), np.zeros((3, 3)), np.array([0.05, 6.0, 0.5]))
+
+
+@pytest.mark.parametrize("name", HEATERS)
+def test_heater(name):
+    assert golden(name)["cost"] == pytest.approx(heater_cost(name), rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HEATERS)
+def test_the_heater_is_designed_as_by_a_plain_program(name):
+    found = solve(load_spec(f"specs/{name}.yaml")).result
+    assert found["cost"] == pytest.approx(heater_cost(name), rel=1e-5)
 
 
 def loop_design(response, theta, most, controller, h, samples, variance):

@@ -129,6 +129,7 @@ solver: {any_spectrum: false}
 """
 
 
+@pytest.mark.slow
 def test_a_long_shortest_record_takes_few_records_of_its_length():
     """The work is counted in samples of records that are made, in lengths of the one that is found."""
     made, plain = [], SignalGenerator.values

@@ -195,3 +195,9 @@ def test_bad_tables(tmp_path, of, content, code, words):
 @pytest.mark.parametrize("path", sorted((ROOT / "specs").glob("*.yaml")), ids=lambda p: p.stem)
 def test_shipped_specs_validate(path):
     validate(load_spec(path))
+
+
+def test_confidence_sets_alpha():
+    """Two parameters in G: the 95 % quantile of chi-squared with two degrees of freedom is 5.991."""
+    spec = parse_spec(SMALL.replace("alpha: 2.45", "confidence: 0.95"))
+    assert solve(spec).result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)), rel=1e-12)
