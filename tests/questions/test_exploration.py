@@ -17,8 +17,8 @@ from inputdesign_cli.questions import explore, identify, solve
 from inputdesign_cli.questions.exploration.build import spec_text
 from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
-from tests.explore.plants import siso
 from tests.support.logs import lag_log
+from tests.support.plants import stated
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
 
@@ -262,7 +262,7 @@ def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
     u = np.array([[1e5], [1e5 + 2.0], [1e5 + 1.0]])
     log = SimpleNamespace(u=u, y=u, step=1e-5, time_unit="s", names={"u1": "a: #\nb", "y1": "y"})
     taken = (SimpleNamespace(orders=SimpleNamespace(physical=False, family="OE")),)
-    found = SimpleNamespace(model=siso([0.0, 1.0], [1.0, -0.5]), taken=taken, integrates=())
+    found = SimpleNamespace(model=stated("plant: {B: [0, 1], F: [1, -0.5]}"), taken=taken, integrates=())
     text = spec_text(log, found, [Path('title: "odd".csv')], reasons, loop=loop)
     spec = parse_spec(text)
     doubted = "On a model that deserves no trust: " if reasons else ""

@@ -1,5 +1,6 @@
 """Met, missed or undecided: what is said of records, of models, and of the plant of the spec."""
 
+import shlex
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,9 +26,12 @@ def test_a_right_model_is_met(heater_record):
 
 
 @pytest.mark.first(1)
-@pytest.mark.parametrize("drift", [0.0, 1.0])
-def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
-    found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True, drift=drift))
+@pytest.mark.parametrize(
+    ("drift", "following"), [(0.0, "idesign explore {}"), (1.0, "idesign assess SPEC {} --detrend linear")]
+)
+def test_a_missing_lag_leaves_the_verdict_undecided(drift, following, heater_record):
+    record = heater_record("a.csv", 720, 1, lag=True, drift=drift)
+    found = assess(parse_spec(HEATER), record)
     result = found.results.result
     assert (found.verdict, result["status"]) == ("undecided", "undecided")
     assert "recent_inputs" in result["identification"]["failed"]
@@ -38,7 +42,7 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
     assert "signal" not in found.results.tables
     assert result["assessment"]["verdict"] == "undecided"
     assert result["assessment"]["causes"] == ["contradicted"]
-    assert result["assessment"]["next"] == "idesign explore a.csv"
+    assert result["assessment"]["next"] == following.format(shlex.quote(str(record)))
 
 
 @pytest.mark.slow
