@@ -13,7 +13,7 @@ from inputdesign_cli.wizard.questions import bad_answer
 
 # Sizes beyond these would overflow, or vanish, where they are squared.
 LARGEST, SMALLEST = 1e15, 1e-15
-_DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"([-+]?{_DIGITS})"
 ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 PLUS_MINUS = r"(?:plus(?:/| or | )minus|\+/?-|±)"
@@ -49,7 +49,7 @@ _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, 
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
-AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+\.?\d*|\.\d+)\s*){UNIT_OF_TIME}"
+AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
 SIGNAL = "(?:level|temperature|speed|pressure|flow|position|concentration|output|sensor|measurement)"
 DRIVE = (
