@@ -58,12 +58,11 @@ def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]
 
     The accuracy of a spectrum holds for long records. A short one loses the response after its end.
     """
-    damping, samples = np.abs(experiment.singularities.imag), experiment.samples
-    slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
-    if experiment.model.continuous or samples == 1 or slowest * samples >= _SETTLED:
+    slowest, samples = experiment.slowest, experiment.samples
+    if experiment.model.continuous or samples == 1 or _SETTLED * slowest <= samples:
         return []
-    fact = f"the slowest time constant is {1.0 / slowest:.2g} samples, and the record has {samples}"
-    return [kind.found(fact, time_constant=1.0 / slowest, samples=samples)]
+    fact = f"the slowest time constant is {slowest:.2g} samples, and the record has {samples}"
+    return [kind.found(fact, time_constant=slowest, samples=samples)]
 
 
 @finding(

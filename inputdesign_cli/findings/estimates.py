@@ -65,17 +65,16 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
     "short-record",
     "Take a longer record for smaller ones. Accuracy is judged by the scatter of the simulated estimates.",
 )
-def scattered(kind: FindingKind, factor: float, runs: int, *, none: bool) -> list[Finding]:
+def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, none: bool) -> list[Finding]:
     """The errors of the estimate are larger than first-order theory states, as the record is short.
 
     Records of the estimated model were simulated and estimated again; their scatter is taken instead.
     """
-    fact = f"{factor:.3g} times as large by {runs} simulated records"
-    if none:  # nothing was measured: the number says only that they are large
-        fact = (
-            f"most of {runs} simulated records give no estimate, so that {factor:.3g} times as large is taken"
-        )
-    return [kind.found(fact, factor=factor, runs=runs)]
+    larger = f"{factor:.3g} times as large, of the noise model {of_noise:.3g} times,"
+    fact = f"{larger} by {runs} simulated records"
+    if none:  # nothing was measured: the numbers say only that they are large
+        fact = f"most of {runs} simulated records give no estimate, so that {larger[:-1]} is taken"
+    return [kind.found(fact, factor=factor, of_noise=of_noise, runs=runs)]
 
 
 @finding(

@@ -21,8 +21,10 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature, Values, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
+from inputdesign_cli.plant.frequencies import logarithmic_distance
 
 _AT_ONCE = 2**13  # numbers of gradients, so that they stay in the cache of the processor
+_INTEGRATES = 1e-9  # a pole that fades no faster
 _ROUNDING = 1e-15  # shares of the largest gradient of an output
 _RANK_TOLERANCE = 1e-11
 # Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.
@@ -109,6 +111,18 @@ class Experiment:
     def singularities(self) -> ComplexArray:
         """Return poles of all densities below, as points frequency + j damping of the frequency plane."""
         return self._source.singularities
+
+    @property
+    def slowest(self) -> float:
+        """Return the slowest time constant of plant or loop, in samples or time units; 0 without one.
+
+        Integrators, and poles of the noise alone, do not count.
+        """
+        points = self.model.plant_points
+        if self.loop is not None:
+            points = logarithmic_distance(self.loop.closed_poles)
+        damping = np.abs(points.imag)
+        return float(np.max(1.0 / damping[damping > _INTEGRATES], initial=0.0))
 
     @property
     def memory(self) -> float:

@@ -178,6 +178,11 @@ class ContinuousModel(WhiteNoise):
         """See `Model`."""
         return float(np.exp(np.max(self.poles.real, initial=-np.inf)))
 
+    @property
+    def plant_points(self) -> ComplexArray:
+        """Return the poles of G alone, as points of the frequency plane."""
+        return frequency_plane(self.poles)
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         return frequency_plane(

@@ -91,6 +91,11 @@ class Model(Protocol):
         """Return the poles of G and of all gradients, as points of the frequency plane."""
         return _inner(self).singularities
 
+    @property
+    def plant_points(self) -> ComplexArray:
+        """Return the poles of G alone, as points of the frequency plane."""
+        return _inner(self).plant_points
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         return _inner(self).entry_singularities(output, input)

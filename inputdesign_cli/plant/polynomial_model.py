@@ -158,6 +158,11 @@ class PolynomialModel(Parametrised):
         """See `Model`."""
         return float(np.abs(self.poles).max(initial=0.0))
 
+    @property
+    def plant_points(self) -> ComplexArray:
+        """Return the poles of G alone, as points of the frequency plane."""
+        return logarithmic_distance(all_roots([*self.A, *(f for row in self.F for f in row)]))
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         polynomials = (self.row(self.A, output), self.F[output][input], self.B[output][input])

@@ -135,6 +135,11 @@ class SampledModel(WhiteNoise):
         """Return the poles of G and of all gradients, as points of the frequency plane."""
         return logarithmic_distance(self.poles)
 
+    @property
+    def plant_points(self) -> ComplexArray:
+        """Return the poles of G alone, as points of the frequency plane."""
+        return logarithmic_distance(self.poles)
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         entry = self._entries.get((output, input))

@@ -211,6 +211,11 @@ class StateSpaceModel(Parametrised):
         near = logarithmic_distance(np.concatenate([self.poles, self.predictor_poles]))
         return np.where(np.abs(near) < _INTEGRATES, 0.0, near)
 
+    @property
+    def plant_points(self) -> ComplexArray:
+        """Return the poles of G alone, as points of the frequency plane."""
+        return logarithmic_distance(self.poles)
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Return the poles and zeros of one entry of G, as points of the frequency plane."""
         A, early, late = self.held

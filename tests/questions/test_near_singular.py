@@ -88,11 +88,14 @@ def test_what_another_excitation_could_tell_is_not_called_impossible():
     assert result["findings"][0]["code"] == "experiment-short"
 
 
-@pytest.mark.parametrize(("pole", "told"), [(0.5, False), (0.99, False), (0.999, True)])
-def test_an_experiment_shorter_than_its_slowest_mode_is_told(pole, told):
+@pytest.mark.parametrize(
+    ("pole", "of_noise", "told"), [(0.5, 0, False), (0.99, 0, False), (0.999, 0, True), (0.5, 0.999, False)]
+)
+def test_an_experiment_shorter_than_its_slowest_mode_is_told(pole, of_noise, told):
+    """Noise may fade as slowly as it likes."""
     spec = f"""
 plant: {{B: [0, 1], F: [1, {-pole}]}}
-noise: {{variance: 1}}
+noise: {{variance: 1, D: [1, {-of_noise}]}}
 experiment: {{samples: 500}}
 accuracy: {{model_error: {{relative: 0.1, band: [0.01, 3]}}}}
 spectrum: {{type: fir, order: 3}}

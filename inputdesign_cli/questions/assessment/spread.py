@@ -30,13 +30,14 @@ _WIDEST = 6.0  # plants are drawn from the region as simulated, no wider than by
 # Smaller factors are luck of the runs; a record without an estimate as a rule has the largest.
 _LUCK, _MOST = 1.05, 1e4
 _SETTLED = 0.5
+_ROUNDING = 1e-9
 
 
 def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tuple[Estimate, list[Finding]]:
     """Return the estimate with the scatter of simulated estimates, and a finding where it is larger.
 
-    The confidence region of the stated covariance is enlarged until it holds 95 % of the simulated estimates.
-    Each of them is judged by its own covariance, as the estimate itself is.
+    The confidence regions of the plant and of the noise are enlarged until each holds 95 % of the simulated
+    estimates. Each of these is judged by its own covariance, as the estimate itself is.
 
     Args:
         u: the inputs (N, r) of the data, applied in open loop.
@@ -44,16 +45,18 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     """
     if estimate.errors.size >= _PLENTY * estimate.theta.size or not estimate.search.converged:
         return estimate, []
-    factor, fast = _scatter(model, u, step, _RUNS, free=estimate.start.free)
-    if factor <= _LUCK:
+    factors, fast = _scatter(model, u, step, _RUNS, free=estimate.start.free)
+    if np.all(factors <= _LUCK):
         return estimate, []
-    each = [factor]
-    for other in _possible(model, min(factor, _WIDEST) * estimate.covariance) if fast else ():
+    each, root = [factors], np.sqrt(np.minimum(factors, _WIDEST))[:, None]
+    for other in _possible(model, root * estimate.covariance * root.T) if fast else ():
         with suppress(ArithmeticError, RuntimeWarning):  # a plant whose numbers have no end
             each.append(_scatter(other, u, step, _EACH, free=estimate.start.free)[0])
-    factor = max(factor, float(np.quantile(each, _MOST_OF_THEM)))
-    wider = replace(estimate, factor=estimate.factor / np.sqrt(factor))
-    return wider, scattered(float(np.sqrt(factor)), _RUNS, none=factor >= _MOST)
+    times = np.sqrt(np.maximum(factors, np.quantile(each, _MOST_OF_THEM, axis=0)))
+    wider = replace(estimate, factor=estimate.factor / times[:, None])
+    of_plant, of_noise = (float(times[part].max(initial=1.0)) for part in (model.in_plant, ~model.in_plant))
+    none = bool(times.max() ** 2 >= _MOST * (1.0 - _ROUNDING))
+    return wider, scattered(of_plant, of_noise, _RUNS, none=none)
 
 
 def _possible(model: Model, covariance: Array) -> list[Model]:
@@ -68,21 +71,28 @@ def _possible(model: Model, covariance: Array) -> list[Model]:
     return found
 
 
-def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> tuple[float, bool]:
-    """Return the 95 % quantile of squared distances from the model over that of first-order theory.
+def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> tuple[Array, bool]:
+    """Return the 95 % quantiles (k,) of squared distances from the model over those of first-order theory.
 
-    Then whether the estimates took a moment, since all records were estimated in one pass.
+    Parameters of the plant share one, and those of the noise alone share one. Then whether the estimates took
+    a moment, since all records were estimated in one pass.
     """
-    rng = np.random.default_rng(0)
+    rng, nothing = np.random.default_rng(0), (np.full(model.theta.size, _MOST), False)
     e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
     try:
         found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free)
+        away = (found.theta - model.theta)[found.converged]
+        spread = np.linalg.inv(found.information[found.converged])
     except np.linalg.LinAlgError:  # records as short as this determine no estimate
-        return _MOST, False
-    away = (found.theta - model.theta)[found.converged]
+        return nothing
     if len(away) < _SETTLED * runs:
-        return _MOST, False
-    squares = np.einsum("ri,rij,rj->r", away, found.information[found.converged], away)
-    factor = float(np.quantile(squares, _LEVEL) / scipy.stats.chi2.ppf(_LEVEL, model.theta.size))
-    return min(factor, _MOST) if np.isfinite(factor) else _MOST, found.fast
+        return nothing
+    factors = np.ones(model.theta.size)
+    for part in map(np.flatnonzero, (model.in_plant, ~model.in_plant)):
+        if part.size:
+            own, off = spread[:, part[:, None], part], away[:, part]
+            squares = np.einsum("ri,ri->r", off, np.linalg.solve(own, off[:, :, None])[:, :, 0])
+            quantile = np.quantile(squares, _LEVEL) / scipy.stats.chi2.ppf(_LEVEL, part.size)
+            factors[part] = min(quantile, _MOST) if np.isfinite(quantile) else _MOST
+    return factors, found.fast

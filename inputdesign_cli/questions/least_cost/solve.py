@@ -227,10 +227,8 @@ class ConvexTask(SpectrumTask):
             signal = replace(signal, distance_to_best=distance)
             bound, free = done.design.any_record, done.design.any_spectrum
             if bound is not None and free is not None and bound.bound <= _GAINED * free.certificate.bound:
-                radius = problem.experiment.model.radius
-                remembered = -1.0 / np.log(radius) if 0.0 < radius < 1.0 else np.inf
                 seen = bound.length * request.settings.hold
-                findings += of_records.short_windows(seen, remembered, distance)
+                findings += of_records.short_windows(seen, problem.experiment.slowest, distance)
             spectral = problem.goal == "factor" and problem.demands.criterion is None
             near = distance is not None and distance <= _NEAR
             if spectral and not near:  # a record that is near the best there is needs no other
