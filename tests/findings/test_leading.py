@@ -86,6 +86,7 @@ def test_the_command_ends_the_matter(fault, seed, tmp_path):
     assert ended(fault, IN_Q, seed, tmp_path)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("fault", ["drift", "delay"])
 def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys):
     """In the folder of the user, with names that have blanks, and with the options that were typed."""
