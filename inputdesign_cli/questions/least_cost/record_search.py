@@ -359,6 +359,9 @@ def _impossible(request: RecordRequest, question: Question, samples: int) -> str
     The best accuracy of all records is bounded, and so is the number of samples that meet it.
     """
 
+    if not any(limit.upper for limit in question.limits):  # a converter alone bounds no spectrum
+        return ""
+
     def bounded(goal: Goal, length: int) -> RecordBound | None:
         best = solve_design(replace(question.of_length(length), goal=goal), tolerance=_TOLERANCE)
         if best.any_spectrum is None or best.problem.demands.criterion is not None:
