@@ -212,8 +212,10 @@ def test_the_fan_shows_every_plant_and_names_those_that_bind():
     assert curves.ratios.shape == (2, curves.frequency.size)
     np.testing.assert_allclose(columns["largest"], np.maximum(curves.ratios.max(axis=0), curves.nominal))
     assert columns["largest"].max() == pytest.approx(1.0, abs=1e-3)
-    names = {f"plant {item['scenario']}" for item in found.result["robust"]["active"] if item["scenario"]}
-    assert set(curves.active) == names
+    numbers = {item["scenario"] for item in found.result["robust"]["active"] if item["scenario"]}
+    named = [label.split(", ") for label in curves.active]
+    assert {label[0] for label in named} == {f"plant {number}" for number in numbers}
+    assert all(f"b1[1,1] {(0.8, 1.1)[int(label[0][-1]) - 1]}" in label for label in named)
     assert draw_all(found)["fan.png"].startswith(b"\x89PNG")
 
 
