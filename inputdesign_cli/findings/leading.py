@@ -29,8 +29,9 @@ _NEXT = {
     "input-logged-late": _EXPLORE,
     "input-answers-output": _AGAIN
     + '--set "experiment.controller={{numerator: [..], denominator: [..]}}"  # the controller of the loop',
-    "input-without-effect": _EXPLORE,
+    # Effects that differ may cancel in the estimate from all records.
     "records-differ": _ALONE,
+    "input-without-effect": _EXPLORE,
     "prior-of-these-data": _AGAIN + "--set experiment.prior=null",
     "prior-contradicted": _AGAIN + "--set experiment.prior=null",
     "level-shift": _AGAIN + "{rows}",

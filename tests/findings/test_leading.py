@@ -143,6 +143,7 @@ def test_every_kind_that_leaves_a_verdict_open_names_a_command():
         (["plant-nonlinear", "drift", "noise-structure"], "drift"),
         (["plant-structure", "input-logged-late"], "input-logged-late"),
         (["no-accuracy-here", "search-not-settled"], "search-not-settled"),
+        (["input-without-effect", "records-differ"], "records-differ"),
     ],
 )
 def test_what_explains_the_others_comes_first(codes, first):
