@@ -358,7 +358,6 @@ def _impossible(request: RecordRequest, question: Question, samples: int) -> str
 
     The best accuracy of all records is bounded, and so is the number of samples that meet it.
     """
-
     if not any(limit.upper for limit in question.limits):  # a converter alone bounds no spectrum
         return ""
 
