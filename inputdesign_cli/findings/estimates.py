@@ -70,10 +70,10 @@ def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, n
 
     Records of the estimated model were simulated and estimated again; their scatter is taken instead.
     """
-    larger = f"{factor:.3g} times as large, of the noise model {of_noise:.3g} times,"
-    fact = f"{larger} by {runs} simulated records"
+    times = f"{factor:.3g} times for the plant, {of_noise:.3g} times for the noise"
+    fact = f"{times}, by {runs} simulated records"
     if none:  # nothing was measured: the numbers say only that they are large
-        fact = f"most of {runs} simulated records give no estimate, so that {larger[:-1]} is taken"
+        fact = f"most of {runs} simulated records give no estimate, so that {factor:.3g} times is taken"
     return [kind.found(fact, factor=factor, of_noise=of_noise, runs=runs)]
 
 

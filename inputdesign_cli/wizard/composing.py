@@ -122,12 +122,7 @@ def compose(
     said = asking.complete(answers)
     plant = plant or understand_plant(said["plant"], stem, folder)
     span, there = input_range(said["range"], plant), Phrase(said["time"], "time", plant.clock).lasting()
-    step, why, unit = plant.sample_time, plant.why_sampling, plant.time_unit
-    if plant.sampling is None:
-        why = f"a twentieth of the time constant of {short(plant.slow)} {unit}, or a little less"
-    if there < LEAST * step:
-        short_of = f"{short(there)} {unit} are less than {LEAST} samples, one every {short(step)} {unit}"
-        raise bad_answer("time", f"{short_of} ({why})")
+    step, why = plant.sample_time, _reason_of_sampling(plant, there)
     hold, control = dwell(said["hold"], plant), controller(said["loop"], plant)
     vague = plant.covariance is not None or bool(plant.intervals)
     most = _MOST_IN_LOOP if vague and control is not None else _MOST
@@ -136,9 +131,7 @@ def compose(
     rate, output = limited(said["limits"], plant)
     made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
-    heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values()))]
-    if "slope" in plant.values and control is not None and control == plant.controller:
-        heard += [f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"]
+    heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values())), *_own_controller(plant, control)]
     facts = {
         "said": said,
         "plant": plant,
@@ -167,6 +160,24 @@ def compose(
     spectrum = None if nonparametric else "{type: fir, order: 20}"
     notes = (*heard, *against, *[_UNUSED] * unused)
     return Draft(facts, plant.files, spectrum, folder, said, there, notes)
+
+
+def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
+    """Return why the sample time is as it is; raise `bad-answer` if the time holds too few samples."""
+    step, unit, why = short(plant.sample_time), plant.time_unit, plant.why_sampling
+    if plant.sampling is None:
+        why = f"a twentieth of the time constant of {short(plant.slow)} {unit}, or a little less"
+    if there < LEAST * plant.sample_time:
+        few = f"{short(there)} {unit} are less than {LEAST} samples, one every {step} {unit}"
+        raise bad_answer("time", f"{few} ({why})")
+    return why
+
+
+def _own_controller(plant: PlantAnswer, control: str | None) -> list[str]:
+    """Return the remark on the controller that is taken for a plant that integrates, if it is."""
+    if "slope" not in plant.values or control is None or control != plant.controller:
+        return []
+    return [f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"]
 
 
 def _points(span: Range) -> str:

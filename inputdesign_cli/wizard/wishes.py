@@ -76,19 +76,19 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
     """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
-    told = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
-    told |= {channel: (header, "") for channel, header in plant.called.items()}
+    named = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
+    named |= {channel: (header, "") for channel, header in plant.called.items()}
     parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
     if len(parts) == plant.channels == 1 and parts[0][2]:  # "level in cm": the other is as said
         name, _, unit = parts[0]
         own = "u1" if name.lower() == span.name.lower() else "y1"
-        Phrase(said["names"], "names", unit=told[own][1]).sized(1.0, unit)
-        told[own] = (name, told[own][1] or unit)
+        Phrase(said["names"], "names", unit=named[own][1]).sized(1.0, unit)
+        named[own] = (name, named[own][1] or unit)
     elif said["names"].lower() != "as said":
         if len(parts) != len(names) or not all(name for name, _, _ in parts):
             raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
-        told = {name: (called, unit.strip()) for name, (called, _, unit) in zip(names, parts, strict=True)}
-    rows = {name: {"name": called, "unit": unit} for name, (called, unit) in told.items()}
+        named = {name: (called, unit.strip()) for name, (called, _, unit) in zip(names, parts, strict=True)}
+    rows = {name: {"name": called, "unit": unit} for name, (called, unit) in named.items()}
     return {name: kept for name, row in rows.items() if (kept := {k: v for k, v in row.items() if v})}
 
 

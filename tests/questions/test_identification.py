@@ -8,20 +8,11 @@ import yaml
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.questions.building.system import build_experiment, build_model
+from tests.support.matrix_specs import JENKINS
 from tests.support.records import simulated
 
 SPEC = "specs/first_order.yaml"
 ARX = "specs/two_by_two_arx.yaml"
-# Every polynomial, one of them common, and an entry that is zero.
-JENKINS = """
-plant:
-  B: [[[0, 1.0], [0, 0.5]], [[0, 0, 0.7], [0]]]
-  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1]]]
-noise: {C: [[1, 0.5], [1, -0.3]], D: [1, -0.6], variance: [[0.2, 0.05], [0.05, 0.1]]}
-experiment: {samples: 400}
-accuracy: {model_error: {relative: 0.1}}
-spectrum: {type: fir, order: 4}
-"""
 IN_S = """
 sample_time: 0.5
 plant:

@@ -8,6 +8,7 @@ import pytest
 from inputdesign_cli import load_spec, parse_spec, simulate
 from inputdesign_cli.compute.executor import Finished
 from inputdesign_cli.errors import SpecError
+from tests.support.matrix_specs import JENKINS
 from tests.support.refusals import refusal
 
 FLEXIBLE = "specs/flexible_transmission.yaml"
@@ -15,16 +16,6 @@ FIRST = "specs/first_order.yaml"
 ARX = "specs/two_by_two_arx.yaml"
 LOOP = "specs/two_by_two_loop.yaml"
 MOTOR = "specs/motor_loop.yaml"
-JENKINS = """
-plant:
-  B: [[[0, 1.0], [0, 0.5]], [[0, 0, 0.7], [0]]]
-  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1]]]
-noise: {C: [[1, 0.5], [1, -0.3]], D: [1, -0.6], variance: [[0.2, 0.05], [0.05, 0.1]]}
-experiment: {samples: 400}
-accuracy: {model_error: {relative: 0.1}}
-spectrum: {type: fir, order: 4}
-simulation: {runs: 100, seed: 2}
-"""
 IN_SECONDS = """
 sample_time: 0.5
 plant: {continuous: {numerator: [[[3.1], [1, 3.2]]], denominator: [1, 1.5, 1.5]}}
@@ -173,7 +164,12 @@ def test_the_promise_is_kept_on_the_design_model(studied):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("spec", "overrides"), [(JENKINS, []), (IN_SECONDS, []), (IN_SECONDS, ["plant.sample=zoh"])]
+    ("spec", "overrides"),
+    [
+        (JENKINS + "simulation: {runs: 100, seed: 2}\n", []),
+        (IN_SECONDS, []),
+        (IN_SECONDS, ["plant.sample=zoh"]),
+    ],
 )
 def test_plants_of_other_kinds_keep_their_promise(spec, overrides):
     simulation = simulated(spec, *overrides).result["simulation"]

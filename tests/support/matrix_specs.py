@@ -34,3 +34,15 @@ spectrum: {type: polynomial, order: 4, band: [0, 2.0]}
 def changed(text, *overrides):
     """The spec of a text with overrides."""
     return parse_spec(text, overrides=list(overrides))
+
+
+# Every polynomial, one of them common, and an entry that is zero.
+JENKINS = """
+plant:
+  B: [[[0, 1.0], [0, 0.5]], [[0, 0, 0.7], [0]]]
+  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1]]]
+noise: {C: [[1, 0.5], [1, -0.3]], D: [1, -0.6], variance: [[0.2, 0.05], [0.05, 0.1]]}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 4}
+"""

@@ -2,8 +2,8 @@
 
 First-order theory states a covariance of the estimate. A short record may hold too little noise to average,
 and the likelihood may be no parabola. Then records of the estimated model are simulated and estimated again.
-How far they scatter depends on the plant, so that plants of the confidence region are simulated as well,
-where that takes a moment.
+Their scatter depends on the plant. Other plants of the confidence region are therefore simulated too, if all
+their records can be estimated in one pass.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ _LEVEL = 0.95
 # Other plants and the runs of each; a quarter of them may scatter more than is stated.
 _OTHERS, _EACH, _MOST_OF_THEM = 8, 100, 0.75
 _TRIES = 10  # draws for each of the other plants, of which some are unstable
-_WIDEST = 6.0  # plants are drawn from the region as simulated, no wider than by this factor
+_WIDEST = 6.0  # plants are drawn from a region whose variances are at most this many times those of theory
 # Smaller factors are luck of the runs; a record without an estimate as a rule has the largest.
 _LUCK, _MOST = 1.05, 1e4
 _SETTLED = 0.5
-_ROUNDING = 1e-9
+_SINGULAR = 1e14  # condition number of the information, without units
+_NO_NUMBERS = (ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)  # of a plant far from any real one
 
 
 def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tuple[Estimate, list[Finding]]:
@@ -48,46 +49,51 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     factors, fast = _scatter(model, u, step, _RUNS, free=estimate.start.free)
     if np.all(factors <= _LUCK):
         return estimate, []
-    each, root = [factors], np.sqrt(np.minimum(factors, _WIDEST))[:, None]
-    for other in _possible(model, root * estimate.covariance * root.T) if fast else ():
-        with suppress(ArithmeticError, RuntimeWarning):  # a plant whose numbers have no end
+    each = [factors]
+    for other in _possible(model, estimate, np.minimum(factors, _WIDEST)) if fast else ():
+        with suppress(*_NO_NUMBERS):
             each.append(_scatter(other, u, step, _EACH, free=estimate.start.free)[0])
-    times = np.sqrt(np.maximum(factors, np.quantile(each, _MOST_OF_THEM, axis=0)))
+    factors = np.maximum(factors, np.quantile(each, _MOST_OF_THEM, axis=0))
+    times = np.sqrt(np.maximum(factors, 1.0))  # nothing is stated more sharply than by theory
     wider = replace(estimate, factor=estimate.factor / times[:, None])
     of_plant, of_noise = (float(times[part].max(initial=1.0)) for part in (model.in_plant, ~model.in_plant))
-    none = bool(times.max() ** 2 >= _MOST * (1.0 - _ROUNDING))
-    return wider, scattered(of_plant, of_noise, _RUNS, none=none)
+    return wider, scattered(of_plant, of_noise, _RUNS, none=bool(factors.max() >= _MOST))
 
 
-def _possible(model: Model, covariance: Array) -> list[Model]:
-    """Return plants of this structure about a model, drawn with the covariance (k, k); none is unstable."""
-    rng, root, found = np.random.default_rng(1), np.linalg.cholesky(covariance), list[Model]()
+def _possible(model: Model, estimate: Estimate, factors: Array) -> list[Model]:
+    """Return stable plants about a model, drawn with the covariance of its estimate times `factors` (k,)."""
+    rng, found = np.random.default_rng(1), list[Model]()
     for _ in range(_TRIES * _OTHERS):
-        drawn = model.at(model.theta + root @ rng.standard_normal(len(root)))
-        if drawn.flaw is None and drawn.radius < 1.0:
-            found.append(drawn)
+        off = scipy.linalg.solve_triangular(estimate.factor.T, rng.standard_normal(factors.size))
+        with suppress(*_NO_NUMBERS):
+            drawn = model.at(model.theta + np.sqrt(factors) * off)
+            if drawn.flaw is None and drawn.radius < 1.0:
+                found.append(drawn)
         if len(found) == _OTHERS:
             break
     return found
 
 
 def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> tuple[Array, bool]:
-    """Return the 95 % quantiles (k,) of squared distances from the model over those of first-order theory.
+    """Return by how much simulated estimates scatter more than first-order theory states, (k,).
 
-    Parameters of the plant share one, and those of the noise alone share one. Then whether the estimates took
-    a moment, since all records were estimated in one pass.
+    It is the ratio of 95 % quantiles of squared distances, one for the plant and one for the noise alone. The
+    second value says whether all records were estimated in one pass.
     """
-    rng, nothing = np.random.default_rng(0), (np.full(model.theta.size, _MOST), False)
+    rng, unknown = np.random.default_rng(0), (np.full(model.theta.size, _MOST), False)
     e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
     try:
         found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free)
-        away = (found.theta - model.theta)[found.converged]
-        spread = np.linalg.inv(found.information[found.converged])
     except np.linalg.LinAlgError:  # records as short as this determine no estimate
-        return nothing
-    if len(away) < _SETTLED * runs:
-        return nothing
+        return unknown
+    sizes = np.sqrt(np.maximum(np.einsum("rkk->rk", found.information), np.finfo(float).tiny))
+    scaled = found.information / (sizes[:, :, None] * sizes[:, None, :])
+    usable = found.converged & (np.linalg.cond(scaled) < _SINGULAR)
+    if np.sum(usable) < _SETTLED * runs:
+        return unknown
+    # Without units: the covariance, and the distance from the model.
+    spread, away = np.linalg.inv(scaled[usable]), (sizes * (found.theta - model.theta))[usable]
     factors = np.ones(model.theta.size)
     for part in map(np.flatnonzero, (model.in_plant, ~model.in_plant)):
         if part.size:
