@@ -1,4 +1,4 @@
-"""Say a result in words and in tables, for the terminal and for a page; see `templates/result.txt`."""
+"""Say a result in words and in tables, for the terminal and for a page; see `templates`."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss, objecti
 from inputdesign_cli.outcome.sentences import sentences, shown, spoken
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 
+# The template of each part of a result: what a run does not need is not compiled.
+_TEMPLATES = {
+    **dict.fromkeys(("asked", "facts", "proofs"), "design.txt"),
+    **dict.fromkeys(("estimate", "verdict", "campaign_stands", "next"), "data.txt"),
+    **dict.fromkeys(("answer", "assumptions"), "answer.txt"),
+}
 # The status of an excitation that was given, in words.
 _GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
 BREAK = "\n"  # within a cell: what follows is a remark
@@ -31,12 +37,16 @@ class Fact(NamedTuple):
 
 
 def said(part: str, outcome: Outcome, **more: object) -> list[str]:
-    """Return the sentences of a part of the template about a result.
+    """Return the sentences of a part of the templates about a result.
 
     Args:
         part: asked, proofs (what is proved of all other experiments), verdict, assumptions, ..
         more: what else the part knows by name.
     """
+    template = _TEMPLATES[part]
+    of_data = outcome.identification, outcome.assessment, outcome.validation, outcome.campaign
+    if template == "data.txt" and not any(section is not None for section in of_data):
+        return []
     kind = None if outcome.objective is None else outcome.objective.kind
     known = vars(outcome) | {
         "kind": kind,
@@ -44,7 +54,7 @@ def said(part: str, outcome: Outcome, **more: object) -> list[str]:
         "length": outcome.samples if outcome.signal is None else outcome.signal.samples,
         "given": None if outcome.identification is not None else _GIVEN.get(outcome.status or ""),
     }
-    return sentences("inputdesign_cli.report", "result.txt", part, known | more)
+    return sentences("inputdesign_cli.report", template, part, known | more)
 
 
 def facts(outcome: Outcome, time_unit: str = "", part: str = "facts") -> list[Fact]:
