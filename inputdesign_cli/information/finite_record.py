@@ -31,11 +31,18 @@ class RecordTransforms:
     In discrete time a long memory is forgotten within a padding of three records: samples are weighted with
     e^(-rho t), what they cause with e^(rho t). In continuous time the plant is driven by the band-limited
     interpolation of the samples, `step` apart, and its outputs are read at the same instants.
+
+    Several experiments share the transforms: their channels stand one after the other.
     """
 
-    experiment: Experiment
+    experiments: tuple[Experiment, ...]
     samples: int
     step: float
+
+    @property
+    def experiment(self) -> Experiment:
+        """Return the first of the experiments, which alone has a gradient here."""
+        return self.experiments[0]
 
     def signals(self, of: PowerKind, record: Array) -> Array:
         """Return the response of inputs or outputs to the samples (n, r) alone, (n, channels)."""
@@ -91,18 +98,18 @@ class RecordTransforms:
     @property
     def _integrates(self) -> bool:
         """Return whether there is no response at frequency zero."""
-        return float(np.min(np.abs(self.experiment.singularities), initial=1.0)) < 1e-9
+        distances = [np.min(np.abs(one.singularities), initial=1.0) for one in self.experiments]
+        return float(min(distances)) < 1e-9
 
     @cached_property
     def _padded(self) -> int:
-        """Return a length past the memory of the plant, a power of two."""
-        experiment = self.experiment
-        damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
-            self.step if experiment.model.continuous else 1.0
-        )
-        further = experiment.memory / (self.step if experiment.model.continuous else 1.0)
-        memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9) + further)), _LONGEST_MEMORY)
-        return int(2 ** np.ceil(np.log2(self.samples + memory)))
+        """Return a length past the memory of the plants, a power of two."""
+        memory = 0.0
+        for one in self.experiments:
+            unit = self.step if one.model.continuous else 1.0
+            damping = float(np.min(one.singularities.imag, initial=1.0)) * unit
+            memory = max(memory, _FORGOTTEN / max(damping, 1e-9) + one.memory / unit)
+        return int(2 ** np.ceil(np.log2(self.samples + min(int(np.ceil(memory)), _LONGEST_MEMORY))))
 
     @cached_property
     def _frequencies(self) -> Array | ComplexArray:
@@ -115,9 +122,10 @@ class RecordTransforms:
         return {}
 
     def _responses(self, of: PowerKind) -> ComplexArray:
-        """Return the responses (n, channels, r) at all frequencies of the transform."""
+        """Return the responses (n, channels of all experiments, r) at all frequencies of the transform."""
         if of not in self._kept:
-            self._kept[of] = self.experiment.response(of, self._frequencies)
+            responses = [one.response(of, self._frequencies) for one in self.experiments]
+            self._kept[of] = np.concatenate(responses, axis=1)
         return self._kept[of]
 
     @cached_property
@@ -243,19 +251,26 @@ class FiniteRecord:
         """Return the powers of these signals (channels,)."""
         return np.mean(self.signals(of, record) ** 2, axis=0)
 
-    @property
-    def each(self) -> list[FiniteRecord]:
-        """Return one `FiniteRecord` for every plant."""
-        return [self]
+    def plants_with_own(self, of: PowerKind) -> int:
+        """Return the number of plants with signals of their own: one if the record itself has them."""
+        return 1
+
+    def signals_of_each(self, of: PowerKind, record: Array) -> Array:
+        """Return `signals` at every plant, side by side, or once if the record itself has them."""
+        return self.signals(of, record)
 
     def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
         """Return the powers (plants, channels) at every plant, or once if the record itself has them."""
-        plants = self.each[:1] if self._is_record(of) else self.each
-        return np.array([plant.mean_squares(of, record) for plant in plants])
+        powers = np.mean(self.signals_of_each(of, record) ** 2, axis=0)
+        return np.asarray(powers.reshape(self.plants_with_own(of), -1))
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """Return the transpose of `signals`, applied to weights (n, channels), (n, r)."""
         return weights if self._is_record(of) else self._answers.adjoint(of, weights)
+
+    def adjoint_of_each(self, of: PowerKind, weights: Array) -> Array:
+        """Return the transpose of `signals_of_each`, applied to weights (n, columns), (n, r)."""
+        return self.adjoint(of, weights)
 
     def _is_record(self, of: PowerKind) -> bool:
         """Return whether a signal is the excitation itself."""
@@ -264,7 +279,7 @@ class FiniteRecord:
     @cached_property
     def _answers(self) -> RecordFilters | RecordTransforms:
         filters = RecordFilters.of(self.experiment)
-        return filters or RecordTransforms(self.experiment, self.samples, self.step)
+        return filters or RecordTransforms((self.experiment,), self.samples, self.step)
 
 
 @dataclass(frozen=True)
@@ -278,15 +293,42 @@ class FiniteRecords(FiniteRecord):
 
     def information(self, record: Array) -> NDArray[np.float64]:
         """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
-        return np.array([plant.information(record) for plant in self.each])
+        return np.array([plant.information(record) for plant in self._each])
 
     @cached_property
     def known(self) -> NDArray[np.float64]:
         """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
-        return np.array([plant.known for plant in self.each])
+        return np.array([plant.known for plant in self._each])
 
     @cached_property
-    def each(self) -> list[FiniteRecord]:
+    def _each(self) -> list[FiniteRecord]:
         """Return one `FiniteRecord` for every plant, the first for the plant of `experiment`."""
         plants = (self.experiment, *self.others)
         return [FiniteRecord(plant, self.samples, self.step) for plant in plants]
+
+    def signals_of_each(self, of: PowerKind, record: Array) -> Array:
+        """Return `signals` at every plant, side by side, or once if the record itself has them."""
+        if self._is_record(of):
+            return record
+        return np.concatenate([one.signals(of, record) for one in self._together], axis=1)
+
+    def adjoint_of_each(self, of: PowerKind, weights: Array) -> Array:
+        """Return the transpose of `signals_of_each`, applied to weights (n, columns), (n, r)."""
+        if self._is_record(of):
+            return weights
+        parts = np.split(weights, len(self._together), axis=1)
+        each = zip(self._together, parts, strict=True)
+        return np.asarray(sum(one.adjoint(of, part) for one, part in each))
+
+    def plants_with_own(self, of: PowerKind) -> int:
+        """Return the number of plants with signals of their own: one if the record itself has them."""
+        return 1 if self._is_record(of) else 1 + len(self.others)
+
+    @cached_property
+    def _together(self) -> list[RecordFilters | RecordTransforms]:
+        """Return the filters of each plant, or the transforms that all of them share."""
+        plants = (self.experiment, *self.others)
+        filters = [one for one in map(RecordFilters.of, plants) if one is not None]
+        return (
+            [*filters] if len(filters) == len(plants) else [RecordTransforms(plants, self.samples, self.step)]
+        )

@@ -28,6 +28,7 @@ _NO_PART = 1e-15  # a share of the largest gradient of an output
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
 _AT_ONCE, _AT_ONCE_OF_SEVERAL = 2048, 256  # nodes
+_NUMBERS_AT_ONCE = 2**14  # of values that may be large: they stay in the cache of the processor
 
 Values = Callable[[Array], NDArray]
 """Values (n, ...) of an integrand at frequencies (n,)."""
@@ -158,7 +159,7 @@ def integrate(
 
     Args:
         functions: against which the values are integrated, (n, f) at frequencies (n,); None: one (n, 1).
-        several: values are large, as for several channels: they are computed at few nodes at a time.
+        several: values may be large, as for several channels: these are computed at few nodes at a time.
         unit: of the frequencies of `values` and `functions`; all other frequencies are divided by it.
 
     Raises:
@@ -218,7 +219,8 @@ def _summed(
     nodes = np.concatenate([rule.nodes for rule in rules])
     ends = np.cumsum([rule.nodes.size for rule in rules]).tolist()
     found: list[list[NDArray]] = [[] for _ in rules]
-    for start in range(0, nodes.size, at_once):
+    start = 0
+    while start < nodes.size:
         w = nodes[start : start + at_once] * unit
         here, table = values(w), np.ones((w.size, 1)) if functions is None else functions(w)
         for rule, end, parts in zip(rules, ends, found, strict=True):
@@ -227,6 +229,8 @@ def _summed(
             if lo < hi:
                 weights, part = rule.weights[lo - first : hi - first] * unit, slice(lo - start, hi - start)
                 parts.append(sums(table[part] * weights[:, None], here[part]))
+        start += len(here)
+        at_once = max(at_once, min(_AT_ONCE, _NUMBERS_AT_ONCE // max(here[0].size, 1)))
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in found]
 
 

@@ -16,6 +16,8 @@ from inputdesign_cli.plant.held import HeldEntry, Intersample, integrators
 from inputdesign_cli.plant.model import Parameter, WhiteNoise
 from inputdesign_cli.plant.transfer import Drive, StateSpace
 
+_KEPT = 2**14  # points of the unit circle whose responses are kept
+
 
 @dataclass(frozen=True)
 class SampledModel(WhiteNoise):
@@ -154,17 +156,35 @@ class SampledModel(WhiteNoise):
         """Return the frequency response G as (n, p, r)."""
         z = np.exp(1j * np.asarray(w))
         G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
-        for (i, j), entry in self._entries.items():
-            G[:, i, j] = entry.responses(z) @ entry.gain
+        for place, responses in self._responses(z).items():
+            G[:, place[0], place[1]] = responses @ self._entries[place].gain
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return the gradient dG/dtheta as (n, k, p, r)."""
         z = np.exp(1j * np.asarray(w))
         gradient = np.zeros((z.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
-        responses = {place: entry.responses(z) for place, entry in self._entries.items()}
+        responses = self._responses(z)
         for index, parameter in enumerate(self.parameters):
             for place in parameter.places:
                 row = self._entries[place].gradient(parameter.letter, parameter.power)
                 gradient[:, index, place[0], place[1]] = responses[place] @ row
         return gradient
+
+    def _responses(self, z: ComplexArray) -> dict[tuple[int, int], ComplexArray]:
+        """Return the responses (n, columns) of each entry at points z of the unit circle.
+
+        A loop asks for G and its gradient at the same points, one after the other: the last ones are kept.
+        """
+        key = z.tobytes()
+        if key not in self._latest:
+            self._latest.clear()
+            responses = {place: entry.responses(z) for place, entry in self._entries.items()}
+            if z.size > _KEPT:
+                return responses
+            self._latest[key] = responses
+        return self._latest[key]
+
+    @cached_property
+    def _latest(self) -> dict[bytes, dict[tuple[int, int], ComplexArray]]:
+        return {}

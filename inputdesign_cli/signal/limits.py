@@ -216,14 +216,11 @@ def _constraints(plant: FiniteRecord, hold: int, bounds: Bounds) -> tuple[Signal
     open_loop = plant.experiment.loop is None
     if bounds.output is None and open_loop:
         return ()
-    found = (
-        [] if bounds.output is None else [_signals(one, "output", hold, bounds.output) for one in plant.each]
-    )
-    for one in plant.each[:1] if open_loop else plant.each:
-        if bounds.amplitude is not None:
-            found.append(_signals(one, "input", hold, bounds.amplitude))
-        if bounds.rate is not None:
-            found.append(_moves(_signals(one, "input", hold, bounds.rate)))
+    found = [] if bounds.output is None else [_signals(plant, "output", hold, bounds.output)]
+    if bounds.amplitude is not None:
+        found.append(_signals(plant, "input", hold, bounds.amplitude))
+    if bounds.rate is not None:
+        found.append(_moves(_signals(plant, "input", hold, bounds.rate)))
     return tuple(found)
 
 
@@ -233,13 +230,16 @@ def peak_share(plant: FiniteRecord, bounds: Bounds, samples: Array) -> float:
 
 
 def _signals(plant: FiniteRecord, of: PowerKind, hold: int, bound: Array) -> SignalConstraint:
-    """Return the map from the values, each held, to the signals that they cause."""
+    """Return the map from the values, each held, to the signals that they cause at every plant."""
+
+    def apply(values: Array) -> Array:
+        return plant.signals_of_each(of, np.repeat(values, hold, axis=0))
 
     def adjoint(weights: Array) -> Array:
-        each = plant.adjoint(of, weights)
+        each = plant.adjoint_of_each(of, weights)
         return each.reshape(-1, hold, each.shape[1]).sum(axis=1)
 
-    return SignalConstraint(lambda values: plant.signals(of, np.repeat(values, hold, axis=0)), adjoint, bound)
+    return SignalConstraint(apply, adjoint, np.tile(bound, plant.plants_with_own(of)))
 
 
 def _moves(signals: SignalConstraint) -> SignalConstraint:

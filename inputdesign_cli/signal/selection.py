@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -243,38 +243,45 @@ class _Candidates:
             samples = limiter.record(_of_peaks(values, settings.level), 1.0)
             return samples, evaluator.figure(samples) <= 1.0
         if not evaluator.target.meets:
-            return (self._affordable(values, 1.0) if limiter.plain else self._best_within(values)), True
+            record = self._at_levels(values)
+            return (self._affordable(record, 1.0) if limiter.plain else self._best_within(values)), True
         held = np.repeat(values, settings.hold, axis=0)
         level = evaluator.needed_level(held)
         if level is None:
             return held, False
-        samples = limiter.record(values, level)
-        if evaluator.figure(samples) <= 1.0:
-            return samples, True
+        record = self._at_levels(values)
+        if evaluator.figure(record(level)) <= 1.0:
+            return record(level), True
         kind = self.generator.kind
-        if kind.few_levels and evaluator.ratio(limiter.record(values, _FAR * level)) > MET:
+        if kind.few_levels and evaluator.ratio(record(_FAR * level)) > MET:
             # More of the same levels is always better, and there is no more.
             if kind.switched and switched:
                 values = self._switched(values, _FAR * level, rng)
-            if evaluator.figure(limiter.record(values, _FAR * level)) > 1.0:
-                return self._affordable(values, _FAR * level), False
+                record = self._at_levels(values)
+            if evaluator.figure(record(_FAR * level)) > 1.0:
+                return self._affordable(record, _FAR * level), False
         if not limiter.plain:
-            values = self._lowered(values, level)
-            level, met = first_level(lambda a: evaluator.figure(limiter.record(values, a)), 0.98 * level)
+            record = self._at_levels(self._lowered(values, level))
+            level, met = first_level(lambda a: evaluator.figure(record(a)), 0.98 * level)
             if met:
-                return limiter.record(values, level), True
-        return self._affordable(values, level), False
+                return record(level), True
+        return self._affordable(record, level), False
+
+    def _at_levels(self, values: Array) -> Callable[[float], Array]:
+        """Return the record of the values (m, r) at each level; none is limited twice."""
+        return cache(partial(self.limiter.record, values))
 
     def _best_within(self, values: Array) -> Array:
         """Return the most informative record between the highest that fits and one of the designed power.
 
         A record clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
-        strongest = self._of_designed_power(values)
+        record = self._at_levels(values)
+        strongest = self._of_designed_power(record)
         if self.generator.kind.of_levels:
             return strongest
         fit = self._fitting(values)
-        tried = [strongest, *(self._affordable(values, share * fit) for share in _CLIPPED)]
+        tried = [strongest, *(self._affordable(record, share * fit) for share in _CLIPPED)]
         within = [samples for samples in tried if _power(samples) <= _power(strongest) * MET]
         return min(within, key=self.evaluator.ratio)
 
@@ -283,15 +290,13 @@ class _Candidates:
         limiter = self.limiter
         return min(limiter.factor(values), 1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
 
-    def _of_designed_power(self, values: Array) -> Array:
+    def _of_designed_power(self, record: Callable[[float], Array]) -> Array:
         """Return the record of the power of the design, or of the most below that the limits allow."""
-        record, power = self.limiter.record, self.generator.spectrum.power
-        level = level_of_power(lambda a: _power(record(values, a)), power, 1.0)
-        samples = record(values, level)
-        while _power(samples) > power * MET:
+        power = self.generator.spectrum.power
+        level = level_of_power(lambda a: _power(record(a)), power, 1.0)
+        while _power(record(level)) > power * MET:
             level *= 1.0 - 1e-3
-            samples = record(values, level)
-        return self._affordable(values, level)
+        return self._affordable(record, level)
 
     def _lowered(self, values: Array, level: float) -> Array:
         """Lower the peak of the values towards the limits, if that keeps their kind."""
@@ -302,16 +307,15 @@ class _Candidates:
             return values
         return compressed(values[:, 0], reach / level)[:, None]
 
-    def _affordable(self, values: Array, level: float) -> Array:
+    def _affordable(self, record: Callable[[float], Array], level: float) -> Array:
         """Return the record at this level, or as much of it as the limits on the powers allow."""
-        record, share_of = self.limiter.record, self.evaluator.share
-        samples = record(values, level)
-        share = share_of(samples)
+        share_of = self.evaluator.share
+        share = share_of(record(level))
         if share >= 1.0:
-            return samples
+            return record(level)
         if self.limiter.plain:
-            return record(values, level * np.sqrt(share))
-        return record(values, last_level(lambda a: share_of(record(values, a)) >= 1.0, level))
+            return record(level * float(np.sqrt(share)))
+        return record(last_level(lambda a: share_of(record(a)) >= 1.0, level))
 
 
 def _of_peaks(values: Array, peaks: Array) -> Array:
