@@ -73,10 +73,22 @@ def test_the_motor_of_mechatronics_is_identified_and_its_margin_kept():
     assert np.max(1 / np.abs(1 + plant * controller)) < 10 ** (6 / 20)
 
 
-def test_the_board_of_the_tutorial_is_that_of_its_log():
-    """The energy balance follows the real temperature to half a degree."""
-    parameters, step = make_tutorial.fitted_board()
-    _, u1, _, y1, y2 = np.loadtxt(make_tutorial.LOG, delimiter=",", skiprows=1).T
-    error = make_tutorial.answer(u1, y2, step, parameters, y1[0]) - y1
-    assert np.sqrt(np.mean(error**2)) < 0.6
-    assert 20.0 < parameters[3] < 40.0
+def test_the_log_of_the_tutorial_is_that_of_the_script():
+    assert make_tutorial.LOG.read_text(encoding="utf-8") == make_tutorial.log_text()
+
+
+def test_the_plant_of_the_tutorial_answers_a_step_as_its_numbers_say():
+    """A lag behind a dead time: K (1 - exp(-(t - L) / T)) per unit of the step, within the noise."""
+    valve = np.repeat([45.0, 46.0], [100, 3000])
+    found = np.mean([make_tutorial.answer(valve, np.random.default_rng(n)) for n in range(50)], axis=0) - 82.0
+    late = np.maximum(np.arange(-100, 3000) - make_tutorial.DEAD, 0)
+    wanted = make_tutorial.GAIN * -np.expm1(-late / make_tutorial.LAG)
+    assert np.abs(found - wanted).max() < 6 * make_tutorial.NOISE / np.sqrt(50)
+
+
+def test_the_tutorial_finds_what_was_played():
+    """Every estimate on the page is within three of its standard deviations of the truth."""
+    truth = {"K": make_tutorial.GAIN, "T": make_tutorial.LAG, "L": make_tutorial.DEAD}
+    found = re.findall(r"\b([KTL]) ([\d.]+) \+- ([\d.]+)", written("tutorial"))
+    assert len(found) == 9
+    assert all(abs(float(value) - truth[name]) < 3 * float(spread) for name, value, spread in found)

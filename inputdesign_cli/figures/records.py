@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures import style
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE
@@ -131,6 +132,8 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         residual = curves.panels[0].y - curves.panels[0].predicted
         axes[1].plot(*_drawn(curves, residual, whole), color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
+        # As many steps whatever its height: the page is laid out for the numbers of the first height.
+        axes[1].yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
     ends = np.concatenate([curves.time[[0, -1]], curves.left_out])
     over, last = (axes[:2], axes[1]) if single else (axes, axes[-1])
     for place in axes:
