@@ -18,7 +18,7 @@ _MAX_STEPS = 200
 _SETTLED = 1e-13
 # A multiplier may fall by this factor in one step: limits that do not bind fade out geometrically.
 _LEAST_SHARE = 0.02
-_SUFFICIENT, _SHORTEST = 1e-4, 1e-10
+_SUFFICIENT, _SHORTEST, _ROUNDING = 1e-4, 1e-10, 1e-12
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,11 @@ class _Dual:
             if np.array_equal(trial, share):
                 return None
             there = self.at(trial)
-            if there.value >= point.value + _SUFFICIENT * float(gradient @ (trial - share)):
+            gain = float(gradient @ (trial - share))
+            if there.value >= point.value + _SUFFICIENT * gain:
+                return there
+            # The dual hides a gain below its rounding; the gap still shows it.
+            if abs(gain) <= _ROUNDING * abs(point.value) and there.gap < point.gap:
                 return there
             length *= 0.5
         return None
