@@ -157,12 +157,11 @@ def log_text(seed: int = 4) -> str:
 
 def experiment(signal: Path, record: Path, seed: int) -> None:
     """Apply a signal to the settled plant and write the record."""
-    applied = csv_columns(signal.read_bytes())
-    time, u = applied["time_s"], applied["u1"]
+    time, u = csv_columns(signal.read_bytes()).values()
     every = round(float(time[1] - time[0]))
     y = answer(np.repeat(u, every), np.random.default_rng(seed))[::every]
     read = DIGIT * np.round(y / DIGIT)
-    record.write_text(csv_text(Table({"time_s": time, "u1": u, "y1": read})), encoding="utf-8")
+    record.write_text(csv_text(Table({"Time (s)": time, "Valve (%)": u, "Temperature (degC)": read})), encoding="utf-8")
 
 
 def tutorial(folder: Path, images: Path) -> str:

@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from inputdesign_cli.findings.prepared_records import name_and_unit
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
 from inputdesign_cli.wizard.grammar import ALONE, DRIVE, NUMBER, PLUS_MINUS, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer
@@ -77,7 +78,7 @@ def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dic
     """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
     named = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
-    named |= {channel: (header, "") for channel, header in plant.called.items()}
+    named |= {channel: name_and_unit(header) for channel, header in plant.called.items()}
     parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
     if len(parts) == plant.channels == 1 and parts[0][2]:  # "level in cm": the other is as said
         name, _, unit = parts[0]

@@ -189,6 +189,23 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
             read(path)
 
 
+@pytest.mark.parametrize(
+    ("head", "channels"),
+    [
+        ("Valve [%];Level (cm)", {"u1": ("Valve", "%"), "y1": ("Level", "cm")}),
+        ("u;y", {}),
+        (f"Valve;{'level ' * 8}", {"u1": ("Valve", None)}),
+    ],
+)
+def test_the_spec_calls_its_channels_as_the_log_does(head, channels, tmp_path):
+    log = lag_log(tmp_path / "log.csv", samples=120)
+    rows = log.read_text().replace(",", ";").split("\n", 1)[1]
+    log.write_text(f"time_min;{head}\n{rows}")
+    columns = dict(zip(("time", "u1", "y1"), ("1", "2", "3"), strict=True))
+    spec = parse_spec(explore(log, Preparation(columns=columns)).results.resolved_spec)
+    assert {name: (one.name, one.unit) for name, one in (spec.channels or {}).items()} == channels
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("inputs", [1, 2])
 def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):

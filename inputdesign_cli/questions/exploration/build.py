@@ -14,6 +14,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError, bad_spec
 from inputdesign_cli.explore import Found, output_error_form
+from inputdesign_cli.findings.prepared_records import name_and_unit
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import Model
@@ -22,6 +23,7 @@ from inputdesign_cli.questions.assessment.identify import Identification
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.records import Record
 from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification.models.experiment import is_label
 
 _MOST_SAMPLES = 100_000
 _DIGITS = 6
@@ -50,6 +52,10 @@ def spec_text(
     if not any(c.orders.physical for c in found.taken):
         kind = "A y = (B/F) u + (C/D) e, polynomials in q^-1"
     blocks, (power, level, width) = blocks_of(found.model), _usual(log)
+    named = _channels(log)
+    others = [
+        f"{x} is {' '.join(name.split())}" for x, name in log.names.items() if x != "time" and x not in named
+    ]
     blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
     comments = {
         "title": [
@@ -58,10 +64,7 @@ def spec_text(
             *(_UNTRUSTED + one for one in reasons),
             *([_LOOP] if loop else []),
         ],
-        "plant": [
-            f"Known from the record: {kind} ({families}).",
-            ", ".join(f"{x} is {' '.join(name.split())}" for x, name in log.names.items() if x != "time"),
-        ],
+        "plant": [f"Known from the record: {kind} ({families}).", *([", ".join(others)] if others else [])],
         "noise": [
             f"Roots of {one} on the circle were drawn into it by one in {len(log.y)}." for one in drawn
         ],
@@ -78,6 +81,7 @@ def spec_text(
         "title": f"{_DOUBTED * bool(reasons)}The next experiment after {source}",
         "sample_time": log.step,
         "time_unit": log.time_unit,
+        **({"channels": named} if named else {}),
         **blocks,
         "experiment": {"samples": min(len(log.y), _MOST_SAMPLES)},
         "accuracy": {"criterion": "D"},
@@ -89,6 +93,18 @@ def spec_text(
         sections["spectrum"] = {"type": "multisine", "lines": 100}
         sections["signal"] = {"type": "multisine", "seed": 1, "offset": level}
     return _commented(sections, comments)
+
+
+def _channels(log: Record) -> dict[str, dict[str, str]]:
+    """Return names and units of the channels as the header of the log states them, where a spec may."""
+    found = {}
+    for channel, header in log.names.items():
+        name, unit = name_and_unit(" ".join(header.split()))
+        stated = {"name": name, "unit": unit} if unit else {"name": name}
+        own = channel[0] in "uy" and name.lower() not in (channel, channel[0]) and not name.isdigit()
+        if own and all(is_label(text) for text in stated.values()):
+            found[channel] = stated
+    return found
 
 
 def _usual(log: Record) -> list[float | list[float]]:

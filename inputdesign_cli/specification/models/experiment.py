@@ -203,9 +203,14 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
         yield PathDiagnostic("wrong-shape", message, hint, ("parameters",))
 
 
+def is_label(text: str) -> bool:
+    """Return whether a text may stand in the header of a table."""
+    return bool(text.strip()) and len(text) <= 40 and not any(c in '",;\t\r\n' for c in text)
+
+
 def _one_line(text: str) -> str:
     """Return a text if it may stand in the header of a table; refuse it otherwise."""
-    if any(c in '",;\t\r\n' for c in text) or len(text) > 40:
+    if not is_label(text):
         message = "{key} must be one line of at most 40 characters without commas and quotes"
         raise fail("bad-name", message, "shorten it: it stands in headers of tables")
     return text
