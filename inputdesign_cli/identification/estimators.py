@@ -21,7 +21,7 @@ from inputdesign_cli.identification.checks import check_length, check_noisy, che
 from inputdesign_cli.identification.derived import Derived
 from inputdesign_cli.identification.directed import alternative, variations
 from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.gauss_newton import SETTLED, minimise
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.records import (
@@ -215,7 +215,14 @@ def identify(
 
 
 def fit_batch(
-    model: Model, u: ArrayLike, y: ArrayLike, step: float = 1.0, *, start: ArrayLike, free: bool = False
+    model: Model,
+    u: ArrayLike,
+    y: ArrayLike,
+    step: float = 1.0,
+    *,
+    start: ArrayLike,
+    free: bool = False,
+    settled_at: float = SETTLED,
 ) -> BatchEstimate:
     """Estimate many records in one pass, each from a single start, without checks.
 
@@ -225,6 +232,7 @@ def fit_batch(
         y: (runs, N, p).
         start: (k,) for all runs, or (runs, k).
         free: whether each record begins in an unknown state about an unknown level, not at rest about zero.
+        settled_at: see `gauss_newton.minimise`.
     """
     kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
@@ -234,7 +242,7 @@ def fit_batch(
     if problem is None:
         runs = zip(inputs, outputs, strict=True)
         problem = RecordProblem(tuple(Records(kind, (run,), free=free) for run in runs))
-    found = minimise(problem, np.array(begin))
+    found = minimise(problem, np.array(begin), settled_at=settled_at)
     theta, fast = found.theta, together is not None
     return BatchEstimate(theta, *problem.concluded(theta), found.converged, found.steps, fast)
 

@@ -16,7 +16,7 @@ from inputdesign_cli.arrays import Array
 
 # Settled: the next step, squared and in standard deviations of the estimate, is this small. It is still
 # taken; the steps shrink at least tenfold where the model fits, so that what is left is far smaller.
-_SETTLED = 1e-10
+SETTLED = 1e-10
 MOST_STEPS = 150
 _FIRST_DAMPING = 1e-3
 _LEAST_DAMPING = 1e-8
@@ -66,10 +66,13 @@ class Minimum(NamedTuple):
         return Minimum(*(np.concatenate([mine, its[runs]]) for mine, its in zip(self, other, strict=True)))
 
 
-def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: float = 0.0) -> Minimum:
+def minimise(
+    problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: float = 0.0, settled_at: float = SETTLED
+) -> Minimum:
     """Minimise the cost of every run from `start` (runs, k), in `most` steps at most.
 
     Args:
+        settled_at: the square of the last step, in standard deviations of the estimate.
         idle: the decrease of -2 log likelihood in ten steps below which a run has settled. It has settled as
             well where no step, however short, decreases the cost. At zero this run is given up.
     """
@@ -91,7 +94,7 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
             stuck |= took <= idle if idle else (took < _STUCK) & (took < _SHARE * promised)
             earlier = cost.copy()
         # Where there is next to nothing to take, rounding hides it.
-        settled = (promised < _SETTLED) | (cost[active] <= 0.0) | (stuck & (promised < _NOTHING))
+        settled = (promised < settled_at) | (cost[active] <= 0.0) | (stuck & (promised < _NOTHING))
         converged[active[settled]] = True
         theta[active[settled]] = problem.stabilised(theta[active[settled]] + newton[settled])
         lost = ~settled & stuck

@@ -30,6 +30,7 @@ _WIDEST = 6.0  # plants are drawn from a region whose variances are at most this
 # Smaller factors are luck of the runs; a record without an estimate as a rule has the largest.
 _LUCK, _MOST = 1.05, 1e4
 _SETTLED = 0.5
+_NEAR = 1e-4  # the square of the last step, in standard deviations: far below the luck of the runs
 _SINGULAR = 1e14  # condition number of the information, without units
 _NO_NUMBERS = (ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)  # of a plant far from any real one
 
@@ -84,7 +85,7 @@ def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> t
     e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
     try:
-        found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free)
+        found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free, settled_at=_NEAR)
     except np.linalg.LinAlgError:  # records as short as this determine no estimate
         return unknown
     sizes = np.sqrt(np.maximum(np.einsum("rkk->rk", found.information), np.finfo(float).tiny))
