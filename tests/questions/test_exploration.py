@@ -50,8 +50,12 @@ def test_the_plant_of_a_log_is_found_and_trusted(run):
 def test_the_spec_that_is_written_solves_at_once(run):
     text = (run / "spec.yaml").read_text()
     assert "#" in text
-    design = solve(parse_spec(text, overrides=["signal=null", "spectrum.order=5"]))
-    assert design.result["status"] == "optimal"
+    spec = parse_spec(text, overrides=["signal=null", "spectrum.order=5"])
+    assert {channel: one.name for channel, one in (spec.channels or {}).items()} == {
+        "u1": "input",
+        "y1": "output",
+    }
+    assert solve(spec).result["status"] == "optimal"
 
 
 def test_the_model_is_judged_on_other_data(run, tmp_path):
@@ -189,6 +193,7 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
             read(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("head", "channels"),
     [
