@@ -161,7 +161,9 @@ def experiment(signal: Path, record: Path, seed: int) -> None:
     every = round(float(time[1] - time[0]))
     y = answer(np.repeat(u, every), np.random.default_rng(seed))[::every]
     read = DIGIT * np.round(y / DIGIT)
-    record.write_text(csv_text(Table({"Time (s)": time, "Valve (%)": u, "Temperature (degC)": read})), encoding="utf-8")
+    record.write_text(
+        csv_text(Table({"Time (s)": time, "Valve (%)": u, "Temperature (degC)": read})), encoding="utf-8"
+    )
 
 
 def tutorial(folder: Path, images: Path) -> str:

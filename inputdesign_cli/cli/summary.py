@@ -53,7 +53,7 @@ def _trouble(outcome: Outcome) -> Iterator[Line]:
     yield from _named("verdict", said("verdict", outcome))
     more = len(outcome.notes or ()) - 1
     if more > 0:
-        yield "note", f"{more} more in report.html and result.json; most follow from this one"
+        yield "note", f"{more} more in result.json; most follow from this one"
 
 
 def _everything(outcome: Outcome, time_unit: str) -> list[Line]:

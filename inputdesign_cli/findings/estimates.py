@@ -130,7 +130,7 @@ def near_zero(kind: FindingKind, model: Model, estimate: Estimate) -> list[Findi
         found += kind.when(listed, listed, where=listed, remedy=remedy)
     for k in vague[delays]:
         most, name = float(estimate.theta[k] + _NORMAL * deviations[k]), estimate.names[k]
-        fact = f"{name} of a dead time is at most {most:.3g} (95 %)"
+        fact = f"{name}, a dead time of at most {most:.3g} (95 %)"
         found.append(kind.found(fact, where=name, remedy="Nothing", at_most=most))
     return found
 

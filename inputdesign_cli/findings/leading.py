@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from inputdesign_cli.finding import Finding, undecided
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.findings.refuted_structure import DRIFT
 from inputdesign_cli.identification import Estimate
+from inputdesign_cli.plant.loop import INTEGRATES
+from inputdesign_cli.plant.model import SampledPlant
 
 # SPEC and options of the command that was typed are filled in where they are known, on the command line.
 _ASSESS = "idesign assess SPEC "
@@ -78,10 +80,13 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         return None
     first = min(against, key=lambda one: _ORDER.index(one.code) if one.code in _ORDER else len(_ORDER))
     alike, command = [one for one in against if one.code == first.code], _NEXT.get(first.code, _EXPLORE)
-    if estimate and not data.lined and _may_drift(first, data) and np.any(slopes_of(data.parts)):
+    lined = data.lined or (estimate is not None and _integrates(estimate))
+    if estimate and not lined and _may_drift(first, data) and np.any(slopes_of(data.parts)):
         found = [one for one in against if one.code == DRIFT.code]
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
+    if command == _NEXT[DRIFT.code] and estimate is not None and _drifts(estimate):
+        command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed
         command = _EXPLORE
@@ -94,6 +99,18 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }
     return Leading(alike, command.format(**figures))
+
+
+def _integrates(estimate: Estimate) -> bool:
+    """Return whether the plant integrates, so that a line in the output may be its answer to the input."""
+    points = estimate.search.records.kind.model.plant_points
+    return bool(np.any(np.abs(points) < INTEGRATES))
+
+
+def _drifts(estimate: Estimate) -> bool:
+    """Return whether the noise of the model drifts already."""
+    model = estimate.search.records.kind.model
+    return not model.continuous and cast(SampledPlant, model).integrates
 
 
 def _may_drift(first: Finding, data: Record) -> bool:

@@ -281,15 +281,21 @@ def _count(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
         message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
     first = [role for x in "uy" for role in _of(x, max(sum(name[0] == x for name in columns), 1))]
     kept = {channel: name for channel, name in columns.items() if channel in ("time", *first)}
-    option = columns_option(sheet, kept, [channel for channel in first if channel not in columns])
+    missing = [channel for channel in first if channel not in columns]
+    option = columns_option(sheet, kept, missing, references=True)
     hint = f"name them, or give their numbers, for example {option}"
     raise sheet.error("data-missing-column", message, hint)
 
 
-def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) -> str:
+def columns_option(
+    sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str], *, references: bool = False
+) -> str:
     """Return `--columns "time=1,u1=2,y1=3"`: what is named, the times, and columns of numbers for `wanted`.
 
     Columns that are called as inputs or outputs are come first.
+
+    Args:
+        references: whether columns that are called as references are go along, one for each input.
     """
     taken = {at for column in named.values() for at in named_columns(sheet, column.strip().lower())}
     timed = time_columns(sheet)
@@ -310,6 +316,9 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
                 best = min(fit, key=lambda i: roles[i] != "")
                 found[channel] = called(sheet, best)
                 del roles[best]
+    asked = [i for i, role in roles.items() if role == "r"]
+    if references and len(asked) == sum(channel[0] == "u" for channel in found):
+        found |= {f"r{n}": called(sheet, i) for n, i in enumerate(asked, start=1)}
     found |= {channel: "NAME" for channel in left if channel not in found}
     in_order = sorted(found, key=lambda channel: (channel != "time", channel))
     return f'--columns "{",".join(f"{channel}={found[channel]}" for channel in in_order)}"'

@@ -16,7 +16,8 @@ from inputdesign_cli.specification.yaml.plain import Plain
 # Correlation times in samples: below the first noise is white, above the second it drifts.
 WHITE, _DRIFTING = 0.2, 1e5
 _SIZE, _TIME = "standard_deviation", "correlation_time"
-_ELSE = ("variance", "relative_std", "C", "D", "drift")
+_ELSE = ("variance", "relative_std", "C", "D")
+DRIFT_STEP = 0.2  # of noise that drifts besides, from one sample to the next, in its standard deviations
 
 
 def in_filters(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
@@ -47,6 +48,14 @@ def discrete(deviation: float, time: float, step: float) -> tuple[float, float]:
     )
 
 
+def drifting(pole: float) -> float:
+    """Return c of (1 - c q^-1) / ((1 - a q^-1)(1 - q^-1)) e for noise of this pole a that drifts besides.
+
+    The fading noise is kept, and the drift moves by `DRIFT_STEP` of its standard deviation in a sample.
+    """
+    return 1.0 - DRIFT_STEP * ((1.0 - pole) / (1.0 + pole)) ** 0.5
+
+
 def _numbers(value: Plain, sizes: tuple[float, float] = QUANTITIES) -> list[float]:
     """Return one number or several as a list; an empty one if they are none of these sizes."""
     listed = value if isinstance(value, list) else [value]
@@ -61,9 +70,12 @@ def _filter(noise: dict[str, Plain], step: Plain) -> dict[str, Plain]:
         return {"variance": 1.0}  # the values have errors of their own
     rows = [discrete(s, T, steps[0]) for s, T in np.broadcast(deviations, times)]
     shapes = [[1.0, -pole] if pole else [1.0] for _, pole in rows]
-    if isinstance(noise[_SIZE], list) or isinstance(noise.get(_TIME), list):
-        return {"variance": np.diag([one for one, _ in rows]).tolist(), "D": shapes}
-    return {"variance": rows[0][0], "D": shapes[0]}
+    curves = [[1.0, -drifting(pole)] for _, pole in rows]
+    several = isinstance(noise[_SIZE], list) or isinstance(noise.get(_TIME), list)
+    moving = {"C": curves if several else curves[0]} if noise.get("drift") else {}
+    if several:
+        return {"variance": np.diag([one for one, _ in rows]).tolist(), "D": shapes, **moving}
+    return {"variance": rows[0][0], "D": shapes[0], **moving}
 
 
 def _faults(
@@ -78,8 +90,11 @@ def _faults(
         return
     for key in (key for key in _ELSE if key in noise):
         message = "{key} stands beside standard_deviation, which states the noise alone"
-        hint = "noise that drifts has none: write variance, C and drift" if key == "drift" else "remove it"
-        yield PathDiagnostic("conflicting-keys", message, hint, (*path, key), at_key=True)
+        yield PathDiagnostic("conflicting-keys", message, "remove it", (*path, key), at_key=True)
+    if isinstance(noise.get("drift"), list):
+        message = "{key} is a list, and beside standard_deviation it holds for all outputs"
+        hint = "write drift: true, or variance, C, D and drift"
+        yield PathDiagnostic("wrong-shape", message, hint, (*path, "drift"))
     states, key, unfit = plant.get("state_space"), _SIZE, ("", "")
     if np.size(plant.get("A", 1)) > 1 and "B" in plant:
         hint = "write the poles as F in place of A (output error or Box-Jenkins), or variance, C and D"

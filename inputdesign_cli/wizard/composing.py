@@ -286,7 +286,7 @@ class Conversation:
             # The plant, which may be a log to be explored, is read once only.
             if self._plant is None and (plant := self.answers.get("plant", "").strip()):
                 self._plant = understand_plant(plant, self._stem, self._folder)
-            said = {**_MEANWHILE, **self.answers}
+            said = {**_MEANWHILE, **asking.known_from(self.answers), **self.answers}
             draft = compose(said, self._stem, self._folder, self._plant, self._remarks)
             if self.question is None:
                 draft.validate()

@@ -48,6 +48,8 @@ _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, 
             "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30}  # fmt: skip
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
+_FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
+_FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
 _SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
@@ -121,7 +123,7 @@ class Phrase:
 
     def __init__(self, text: str, key: str, clock: float = 1.0, unit: str = "") -> None:
         """Begin with the whole answer to a question; refuse numbers too large or too small to be meant."""
-        spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", text)
+        spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", fractions(text))
         self.text, self.key, self._left, self._clock, self._unit = text, key, spoken, clock, unit
         sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
         strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
@@ -232,6 +234,11 @@ class Phrase:
         if kind == "frequency":
             return value * _FREQUENCIES.get(unit, 1.0) * self._clock
         return value / _TIMES.get(unit, 1.0) * self._clock if kind in ("rate", "slope", "speed") else value
+
+
+def fractions(text: str) -> str:
+    """Return a text with "0.1 second" in place of "a tenth of a second"."""
+    return _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", text)
 
 
 def unread(text: str) -> list[str]:

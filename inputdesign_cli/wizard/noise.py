@@ -14,13 +14,12 @@ import numpy as np
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
-from inputdesign_cli.specification.fading_noise import WHITE, discrete
+from inputdesign_cli.specification.fading_noise import DRIFT_STEP, WHITE, discrete, drifting
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.wizard.grammar import NUMBER, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer, unit_of_time
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
-_DRIFTING = 0.2  # the step of a drift from one sample to the next, of the deviation of white noise
 _CHANGES = r"(?:fad|chang|var[yi]|wander)\w*"
 _LASTING = rf"{_CHANGES}(?: slowly)?(?: in| within| over)?|correlation time|lasts|slow(?:ly)?"
 _SLOWLY = rf"\b(?:{_CHANGES} )?slow(?:ly)?\b(?: {_CHANGES})?"
@@ -84,9 +83,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
             f"  correlation_time: {short(fades)}  # {colour}",
         ]
     lines = ["noise:", f"  variance: {short(variance)}  # {why}", *_drift(drifts)]
-    # A drift moves as fast whatever the colour of the rest.
-    root = 1.0 - _DRIFTING * np.sqrt((1.0 - pole) / (1.0 + pole))
-    lines += [f"  C: [1, {short(-root)}]"] * drifts
+    lines += [f"  C: [1, {short(-drifting(pole))}]"] * drifts
     return lines + [f"  D: [1, {short(-pole)}]  # {colour if fades else why}"] * bool(pole)
 
 
@@ -117,7 +114,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
     if moves and not drifts:
         return lines
     C, D = _per_output(noise.C, len(A)), _per_output(noise.D, len(A))
-    drift, new = (True, (1.0, _DRIFTING - 1.0)) if drifts and not moves else (noise.drift, (1.0,))
+    drift, new = (True, (1.0, DRIFT_STEP - 1.0)) if drifts and not moves else (noise.drift, (1.0,))
     C = [np.convolve(row, new).tolist() for row in C]
     named = [(name, rows) for name, rows in (("C", C), ("D", D)) if any(len(row) > 1 for row in rows)]
     shape = [f"  {name}: {json.dumps(rows if len(rows) > 1 else rows[0])}" for name, rows in named]
@@ -146,7 +143,10 @@ def _stated(text: str, folder: Path, plant: PlantAnswer) -> _Level:
     if rests := re.fullmatch(r"(?:rest|as in)\s+(.*)", text, re.I):
         return _at_rest(folder / rests[1].strip(), plant)
     said, step = Phrase(text, "noise", plant.clock, plant.units[0]), plant.sample_time
-    white, drifts = said.take(r"\bwhite\b") is not None, said.take(r"\bdrift\w*") is not None
+    white, drifts = (
+        said.take(r"\bwhite\b") is not None,
+        said.take(r"\b(?:slowly )?drift\w*(?: slowly)?") is not None,
+    )
     fades = 0.0 if white else said.after(_LASTING, "time")
     if (
         fades is not None

@@ -35,7 +35,7 @@ QUANTITIES = {
     "rise": (RISES, "speed"),
     "slope": (r"integrat\w+(?: (?:with|gain|slope|by))*", "slope"),
     "gain": (rf"gain|{RISES}", "gain"),
-    "time_constant": ("time constant|lag", "time"),
+    "time_constant": (r"time constant|lag|(?:reacts?|responds?)(?: with)?in", "time"),
     "dead_time": ("dead time|delay", "time"),
 }
 NO_DELAY = r"\b(?:no|without|hardly any|negligible)\s+(?:dead time|delay)\b"
@@ -135,7 +135,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     gain = found[steady[0]]
     found = {name.replace("rise", "slope"): one for name, one in found.items()}
     own = {name: one.share for name, one in found.items() if one.share is not None}
-    sampled = phrase.after(r"sampl(?:e|ing) time|sampled every", "time", named=True)
+    sampled = phrase.after(r"sampl(?:e|ing) time|sampled? every|sampling(?: every)?", "time", named=True)
     part, whole = phrase.share(), phrase.take(ABOUT)
     phrase.finish("known it tank")
     values = {name: one.value for name, one in found.items() if one.value}
@@ -155,6 +155,9 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         f"{name.replace('_', ' ')} {short(around[name][0])} to {short(around[name][1])}" for name in vague
     ]
     taken = f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}'
+    heard = [f"{taken}; the design holds for all of these"] if vague else []
+    if reacts := re.search(r"\b(?:reacts?|responds?)\b", text, re.I):
+        heard.append(f'"{reacts[0]}" is taken as the time constant, in which it gets 63 % of the way')
     plant = PlantAnswer(
         (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds"),
         values.get("time_constant", 0.0),
@@ -164,7 +167,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         why_sampling="as you said",
         tunable=True,
         undelayed="gain" in values and "dead_time" not in values,
-        heard=(f"{taken}; the design holds for all of these",) if vague else (),
+        heard=tuple(heard),
         units=(gain.size, gain.base),
     )
     return _integrating(plant) if "slope" in values else plant

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from inputdesign_cli.wizard import grammar, plants, wishes
-from inputdesign_cli.wizard.grammar import NONLINEAR, not_linear, orders, unread
+from inputdesign_cli.wizard.grammar import NONLINEAR, fractions, not_linear, orders, unread
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
 _TURNS = ("wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
@@ -22,12 +22,19 @@ _MACRO = re.compile(r"<([A-Z_]+|[a-z]+: [^<>]*)>")
 _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 _NEGATION = re.compile(r"\b(?:not?|never|without|except|unless|neither|nor|but)\b|n't\b", re.I)
+# Words whose number is missing, or is none that is understood: to drop them would say something else.
+_SIZED = re.compile(
+    r"\b(?:dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
+    r"(?:second|minute|hour|day|night|week|month)s?)\b",
+    re.I,
+)
 _JOINS = r"(?:for|of|in|with|a|an|the|my|our|i|we|have|is|and|to)"
 _BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.I)
 _WORD = r"(?!(?:is|are|was|has|have|does|do|will|must|should|may|can)\b)[a-z'-]+"
 _ABOUT_WHAT = re.compile(
     r"[\s|]*(?:(?:(?:i|we) (?:have|want|need)|this is|it is|there is|consider|for)\b[\s|]*)?"
-    rf"{_WORD}(?:[\s|]+{_WORD}){{0,5}}[\s|]*",
+    rf"(?:{_WORD}(?:[\s|]+{_WORD}){{0,5}}|(?:the )?(?:less|shorter|sooner|faster) (?:is )?(?:the )?better)"
+    r"[\s|]*",
     re.I,
 )
 
@@ -72,7 +79,7 @@ def in_sentence(text: str) -> Heard:
         SpecError: `bad-answer` for what answers no question, where it has a number, a negation or a verb.
     """
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
-    left = NONLINEAR.sub(_taken, text)
+    left = NONLINEAR.sub(_taken, fractions(text))
     for key in _TURNS:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):
@@ -105,6 +112,9 @@ def _left_over(clause: str) -> list[str]:
     """
     parts = [part.strip() for part in clause.split("|") if unread(part)]
     understood = "|" in clause or not parts or _ABOUT_WHAT.fullmatch(clause)
+    unsized = next((sized[0] for part in parts if (sized := _SIZED.search(part))), None)
+    if unsized:
+        raise bad_answer("plant", f'"{unsized}" has no number that is understood, as in "dead time 3 min"')
     wrong = next((part for part in parts if re.search(r"\d", part) or _NEGATION.search(part)), None)
     if wrong or not understood:
         raise bad_answer("plant", f'"{wrong or clause.strip()}" is not understood')

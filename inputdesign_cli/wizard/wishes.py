@@ -30,6 +30,9 @@ _WITHIN = {
 }
 
 
+# The share of the amplitude by which an operating point may differ from the middle of the range.
+_MIDDLE = 0.05
+
 ACTUATOR = rf"(?:(?!(?:the|our|my|move|may|can|by|from|around|when|open|if|i)\b)[a-z]+ )?{DRIVE}"
 
 
@@ -51,25 +54,31 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
     """
     ours = plant.units[1] if plant else ""
     said, number = Phrase(text, "range", unit=ours), f"{NUMBER}({UNIT})"
+    at = rf"\b(?:around|about|at)\b\s*{number}"
     named = said.take(rf"\b(?:(?:the|our|my)\s+)?({ACTUATOR})\b")
     ends = said.take(rf"(?<![-+±\w.]){number}\s*(?:to\b|\.\.|[-–](?=\s*\d))\s*{number}") or said.take(
         rf"\bbetween\s+{number}\s*and\s+{number}"
     )
     about = None if ends else said.take(rf"(?<![-+±\w.]){number}\s*{PLUS_MINUS}\s*{number}")
+    rests = said.take(at) if ends else None
     if found := ends or about:
         sizes = [(found[1], found[2]), (found[3], found[4])]
     else:
-        around = said.take(rf"\b(?:around|about|at)\b\s*{number}")
+        around = said.take(at)
         by = said.take(rf"(?:{PLUS_MINUS}|\bby\b)\s*{number}") or (around and said.take(number))
         if by is None:
             raise bad_answer("range", f'"{text}" is no range')
         sizes = [(around[1], around[2]) if around else ("0", ""), (by[1], by[2])]
-    said.finish("move moves moved go goes swing swings from")
+    said.finish("move moves moved go goes swing swings from stands sits rests run runs operate keep")
     unit = next((one.strip() for _, one in sizes if one.strip()), "")
     one, other = (said.sized(float(number), own.strip() or unit) for number, own in sizes)
     middle, side = (one, other) if ends is None else (0.5 * (one + other), 0.5 * (other - one))
     if ends is not None and not one < other:
         raise bad_answer("range", f"{one:g} is not below {other:g}")
+    rest = middle if rests is None else said.sized(float(rests[1]), rests[2].strip() or unit)
+    if abs(rest - middle) > _MIDDLE * side:
+        why = f"the input is at {rest:g}, and the middle of {one:g} to {other:g} is {middle:g}"
+        raise bad_answer("range", f'{why}: write "{rest:g} +- .."')
     name = named[1].strip() if named and named[1].lower() not in ("input", "actuator") else ""
     return Range(needed(side, "range", "the amplitude"), middle, name, ours or unit)
 

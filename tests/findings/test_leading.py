@@ -3,6 +3,7 @@
 import json
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from inputdesign_cli.findings.faults import follows_inputs
 from inputdesign_cli.findings.leading import leading
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.questions import explore
+from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.records import Preparation
 from tests.support.commands import caller
 from tests.support.heater import said
@@ -150,3 +152,28 @@ def test_what_explains_the_others_comes_first(codes, first):
     found = leading([Finding(code, REFUTED, code) for code in codes], None, DATA)
     assert [one.code for one in found.findings] == [first]
     assert leading([], None, DATA) is None
+
+
+def led(plant, noise):
+    """The command after a drift, of a model with this plant and noise."""
+    text = f"sample_time: 10\nplant: {plant}\nnoise: {noise}\n"
+    model = build_model(parse_spec(text, design=False))
+    estimate = SimpleNamespace(
+        search=SimpleNamespace(records=SimpleNamespace(kind=SimpleNamespace(model=model)))
+    )
+    line = np.linspace(0.0, 9.0, 200)[:, None] + np.random.default_rng(0).standard_normal((200, 1))
+    data = Record(np.sin(np.arange(200.0))[:, None], line, None, np.arange(200.0), (200,), (("a.csv", 200),))
+    return leading([Finding("drift", REFUTED, "drift")], estimate, data).command
+
+
+LAG = "{continuous: {gain: 1, time_constant: 60}, sample: zoh}"
+TANK = "{continuous: {numerator: [0.02], denominator: [1, 0], delay: 10}, sample: zoh}"
+
+
+def test_no_command_asks_for_what_the_model_has_already():
+    """A line in the output of a tank is its answer to the input, and noise that drifts cannot drift more."""
+    assert "--detrend linear" in led(LAG, "{variance: 1}")
+    assert "noise.drift=true" in led(TANK, "{standard_deviation: 1, correlation_time: 60}")
+    assert led(TANK, "{standard_deviation: 1, correlation_time: 60, drift: true}").startswith(
+        "idesign explore"
+    )

@@ -152,6 +152,8 @@ def test_the_unit_of_a_column_counts_however_it_is_named(column, log):
         ("%", "percent", True),
         ("s", "sec", True),
         ("degC", "degF", False),
+        ("volt", "V", True),
+        ("V", "mV", False),
         ("%", "mA", False),
         ("deg", "degC", False),
     ],

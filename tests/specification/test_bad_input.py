@@ -91,7 +91,7 @@ ROWS: list[Row] = [
     ("missing-key", "noise.correlation_time", "add standard_deviation", {**STEP, "noise": "{§correlation_time: 60}"}),
     ("conflicting-keys", "noise.variance", "remove it", {"noise": "{standard_deviation: 1, §variance: 1}"}),
     ("conflicting-keys", "noise.D", "remove it", {"noise": "{standard_deviation: 1, §D: [1, -0.5]}"}),
-    ("conflicting-keys", "noise.drift", "variance, C and drift", {"noise": "{standard_deviation: 1, §drift: true}"}),
+    ("wrong-shape", "noise.drift", "drift: true", {"noise": "{standard_deviation: 1, drift: §[true]}"}),
     ("conflicting-keys", "simulation.noise.relative_std", "remove it", {
         "simulation": "{noise: {standard_deviation: 1, §relative_std: 0.1}}"}),
     ("out-of-range", "noise.standard_deviation", "greater than 0", {"noise": "{standard_deviation: §0}"}),

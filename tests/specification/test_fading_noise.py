@@ -59,3 +59,19 @@ def test_the_spec_keeps_the_words_and_can_be_read_again():
     assert parse_spec(spec.to_yaml()).noise == spec.noise
     with pytest.raises(SpecError, match="stands beside standard_deviation"):
         spec.with_(**{"noise.variance": 2.0})
+
+
+@pytest.mark.parametrize("fades", [0.0, 20.0, 300.0])
+def test_noise_may_drift_besides_and_moves_by_a_fifth_in_a_sample(fades):
+    """With a pole a and C = 1 - c q^-1, C/(D (1 - q^-1)) e moves by (1 - c)/(1 - a) e in the long run."""
+    time = f", correlation_time: {fades}" if fades else ""
+    text = "sample_time: 10\nplant: {continuous: {gain: 1, time_constant: 99}, sample: zoh}\n"
+    plain, moving = (
+        parse_spec(f"{text}noise: {{standard_deviation: 0.5{time}{more}}}\n", design=False).noise
+        for more in ("", ", drift: true")
+    )
+    assert (moving.variance, moving.D, moving.drift) == (plain.variance, plain.D, True)
+    step = np.sqrt(moving.variance) * sum(moving.C) / sum(moving.D)
+    assert step == pytest.approx(0.2 * 0.5, rel=1e-9)
+    # What does not drift is the fading noise: C tends to 1 - q^-1 where nothing moves.
+    assert moving.C[1] == pytest.approx(-1.0, abs=0.21)

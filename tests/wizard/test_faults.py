@@ -241,6 +241,20 @@ def test_of_a_log_the_noise_is_not_asked(tmp_path):
     assert Conversation(known, "x", tmp_path).question.key == "noise"
 
 
+def test_no_stand_in_of_an_answer_gets_into_the_draft(tmp_path, monkeypatch):
+    """The noise of a log is that of the log: nobody said another one."""
+    seen = []
+    plant = composing.understand_plant(ANSWERS["plant"], "x", tmp_path)
+    monkeypatch.setattr(composing, "understand_plant", lambda *_: plant)
+    monkeypatch.setattr(
+        composing, "noise_lines", lambda text, *_: (seen.append(text), ["noise: {variance: 1}"])[1]
+    )
+    talk = Conversation({"plant": "log log.csv"}, "x", tmp_path)
+    while talk.question is not None:
+        assert talk.answer(ANSWERS[talk.question.key]) is None
+    assert set(seen) == {"as the log"}
+
+
 def test_an_answer_that_names_its_question_may_come_out_of_turn(tmp_path):
     talk = Conversation({}, "x", tmp_path)
     for key in reversed(KEYS[1:]):

@@ -120,6 +120,29 @@ WRITTEN = {
         "offset": 45,
         "amplitude": 8,
     },
+    "I want a PI speed controller for a DC motor with dry friction. I run it around 6 V and may move it by "
+    "+-2 V. Speed about 80 rad/s per volt, time constant about a tenth of a second, sensor noise about 0.8 "
+    "rad/s. 20 seconds. We can sample every 10 ms.": {
+        "time_constant": 0.1,
+        "sample_time": 0.01,
+        "offset": 6,
+        "amplitude": 2,
+        "duration": 20,
+        "standard_deviation": 0.8,
+    },
+    "I want a level controller for my tank. The inlet valve stands at 50 % and may go from 40 to 60 %. "
+    "When I open the inlet valve by 10 % the level rises by about 12 cm per minute. Delay about 10 s. 0.15 "
+    "cm noise. At most one hour.": {"slope": 0.02, "offset": 50, "amplitude": 10, "duration": 3600},
+    "PI controller for a room. The radiator valve is at 40 %, it may move by +-20 %. One percent of valve "
+    "gives about 0.11 degC, it reacts within about 0.7 h, dead time about 2 min. Noise 0.04 degC. The sensor "
+    "shows 0.01 degC steps. The weather drifts slowly. I have 16 hours at most, less is better.": {
+        "gain": 0.11,
+        "time_constant": 2520,
+        "dead_time": 120,
+        "offset": 40,
+        "duration": 57600,
+        "variance": 0.04**2 + 0.01**2 / 12,
+    },
 }
 
 
@@ -185,6 +208,23 @@ def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
             except SpecError:
                 continue
             assert all(part in f"{text} {draft.notes}" for part in strange.split()), words[:i]
+
+
+@pytest.mark.parametrize(
+    ("part", "instead", "refused"),
+    [
+        ("dead time 31 s", "some minutes of dead time", "minutes"),
+        ("dead time 31 s", "it reacts slowly after a delay", "reacts"),
+        ("one shift", "two nights", "nights"),
+        ("time constant about 262 s", "the time constant is long", "time constant"),
+        ("valve 45 +- 8 %", "the valve stands at 45 %, it may go from 40 to 60 %", "the middle of 40 to 60"),
+    ],
+)
+def test_a_size_that_is_not_understood_is_not_left_out(part, instead, refused, tmp_path):
+    """A plant without its dead time, or an hour in place of two nights, would be another experiment."""
+    with pytest.raises(SpecError, match=refused) as found:
+        written(EXCHANGER.replace(part, instead), tmp_path)
+    assert found.value.diagnostics[0].code == "bad-answer"
 
 
 def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):

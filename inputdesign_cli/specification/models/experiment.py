@@ -48,7 +48,9 @@ class NoiseShape(Section):
         default=(1.0,), description="Monic denominator in q^-1, stable, or at its limit where known."
     )
     drift: fields.PerChannel[fields.Flag] = Field(
-        default=False, description="Whether the noise integrates as well; one for all outputs, or a list."
+        default=False,
+        description="Whether the noise integrates as well; one for all outputs, or a list. Beside "
+        "standard_deviation it moves by a fifth of that in a sample.",
     )
     variance: fields.Variance | None = optional("Variance of e, or its covariance matrix.")
     standard_deviation: fields.PerChannel[fields.Deviation] | None = optional(
