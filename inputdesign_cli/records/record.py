@@ -20,7 +20,7 @@ from inputdesign_cli.records.columns import called, rising, roles_of, without_ti
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
 from inputdesign_cli.records.sheet import Preparation
-from inputdesign_cli.records.signals import Signals, joined_rows, signals_of, typical_step
+from inputdesign_cli.records.signals import Signals, is_even, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
 # The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
@@ -225,7 +225,11 @@ def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signal
     stated = stated or (None if signals.name else sheet.sample_time)
     stated = stated and stated * (scale if preparation.time_unit else 1.0)
     step = _step_of(signals, stated, resample=preparation.resample) or units.sample_time
-    if abs(step - units.sample_time) <= (EVEN if stated else _ALIKE) * units.sample_time:
+    apart, most = abs(step - units.sample_time), (EVEN if stated else _ALIKE) * units.sample_time
+    # Even steps do not jitter: near ones are another sample time once the record is a sample too long.
+    falls_behind = apart > EVEN * units.sample_time and apart * len(signals.time) > units.sample_time
+    other = bool(signals.name) and is_even(signals.time) and falls_behind and not preparation.resample
+    if apart <= most and not other:
         return signals
     default = " (as it is where none is stated)" if units.sample_time == 1.0 else ""
     said = f"the data are sampled every {step:.6g} {units.time_unit}, but sample_time is "

@@ -19,6 +19,7 @@ from inputdesign_cli.records.columns import TIME_UNITS, called, column_named, co
 from inputdesign_cli.records.sheet import Preparation, Run, Sheet
 
 # Steps of time differ from a round number by less than this share of it by rounding alone.
+_EVEN_STEPS = 0.01  # the share by which even steps differ as times are rounded
 _ROUND = 1e-4
 _SINCE_1970 = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 # Counts of these years: a count in one unit is out of range in any other, and as seconds lies millennia away.
@@ -199,6 +200,14 @@ def typical_step(time: Array) -> float:
     mean = float(near.mean())
     rounded = (float(f"{mean:.{digits}e}") for digits in range(6))
     return next((value for value in rounded if abs(value - mean) <= _ROUND * mean), mean)
+
+
+def is_even(time: Array) -> bool:
+    """Return whether the steps of time without gaps are all alike, to rounding of the times."""
+    steps = np.diff(time[~np.isnan(time)])
+    middle = float(np.median(steps)) if steps.size else 0.0
+    near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
+    return bool(near.size) and float(np.abs(near - middle).max()) <= _EVEN_STEPS * middle
 
 
 def check_range(sheet: Sheet, name: str, x: Array) -> None:

@@ -92,11 +92,14 @@ def compressed(values: Array, peak: float) -> Array:
     return best
 
 
-def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Array:
+def restrained(values: Array, constraints: tuple[SignalConstraint, ...], *, returns: bool = False) -> Array:
     """Return the record near `values` (n, r) that keeps to all constraints.
 
     The distance is in least squares, each input in its own root mean square. The excess is penalised ever
     more (a quasi-Newton method). The record is scaled down at the end so that the bounds hold exactly.
+
+    Args:
+        returns: whether its last value is zero, as that of `values` then is.
     """
     record = values
     if peak_ratio(record, constraints) > 1.0:
@@ -107,7 +110,7 @@ def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Arra
             found = scipy.optimize.minimize(
                 _penalised,
                 (record / scale).ravel(),
-                args=(values, scale, constraints, penalty),
+                args=(values, scale, constraints, penalty, returns),
                 jac=True,
                 method="L-BFGS-B",
                 options={"maxiter": _STEPS},
@@ -123,7 +126,12 @@ def peak_ratio(values: Array, constraints: tuple[SignalConstraint, ...]) -> floa
 
 
 def _penalised(
-    relative: Array, wanted: Array, scale: Array, constraints: tuple[SignalConstraint, ...], penalty: float
+    relative: Array,
+    wanted: Array,
+    scale: Array,
+    constraints: tuple[SignalConstraint, ...],
+    penalty: float,
+    returns: bool,
 ) -> tuple[float, Array]:
     """Return half the squared distance, relative to `scale`, with the penalties, and its slope."""
     record = relative.reshape(wanted.shape) * scale
@@ -134,4 +142,6 @@ def _penalised(
         excess = ratio - np.clip(ratio, -INSIDE, INSIDE)
         value += 0.5 * penalty * float(np.sum(excess**2))
         slope = slope + penalty * signal.adjoint(excess / signal.bound) * scale
+    if returns:
+        slope[-1] = 0.0  # the last value stays where it is
     return value, slope.ravel()

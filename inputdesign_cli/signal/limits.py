@@ -140,7 +140,8 @@ class Limiter:
                     column = np.clip(column, -reach, reach)
                 limited[:, channel] = follow(column, rate)
             if self.constraints:
-                limited = restrained(limited, tuple(one.tightened(shrink) for one in self.constraints))
+                tightened = tuple(one.tightened(shrink) for one in self.constraints)
+                limited = restrained(limited, tightened, returns=self.settings.returns)
             record = self._converted(limited)
             # Rounding may lift what the record causes over its bound by a little.
             excess = peak_ratio(record, self.constraints)

@@ -19,17 +19,21 @@ ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 PLUS_MINUS = r"(?:plus(?:/| or | )minus|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
 _UNIT = r"(?:[^\s,;|.:]|[.:](?=[^\s|]))"  # a letter of it
-UNIT = rf"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)(?![\d+±.-]){_UNIT}+)?"
+_NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak"
+UNIT = rf"(?:\s*(?!(?:{_NO_UNIT})\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
 ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly)\b\.?|~|≈)"
 OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
-WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS}){_PER_CENT})?"
+WITHIN = (
+    rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS})"
+    rf"(?:(?P<per_cent>{_PER_CENT})|(?=\s*(?:[,;.:|)]|$|(?:and|with)\b))))?"
+)
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
 VAGUE = 0.2
 """The share within which a value that is "about" right is taken to be known."""
-_TIMES = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "second": 1.0, "min": _MINUTE, "minute": _MINUTE,
-          "h": _HOUR, "hr": _HOUR, "hour": _HOUR, "shift": _SHIFT, "d": _DAY, "day": _DAY,
-          "week": 7 * _DAY}  # fmt: skip
+_TIMES = {"us": 1e-6, "microsecond": 1e-6, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3, "s": 1.0,
+          "sec": 1.0, "second": 1.0, "min": _MINUTE, "minute": _MINUTE, "h": _HOUR, "hr": _HOUR,
+          "hour": _HOUR, "shift": _SHIFT, "d": _DAY, "day": _DAY, "week": 7 * _DAY}  # fmt: skip
 _FREQUENCIES = {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "rad/h": 1.0 / _HOUR, "mhz": 2e-3 * math.pi,
                 "hz": 2.0 * math.pi, "khz": 2e3 * math.pi}  # fmt: skip
 # Units whose differences convert into each other, relative to the first ones. A degree is a kelvin.
@@ -50,6 +54,11 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+_FALLS = re.compile(
+    rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
+    rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
+    re.I,
+)
 _SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
@@ -123,18 +132,9 @@ class Phrase:
 
     def __init__(self, text: str, key: str, clock: float = 1.0, unit: str = "") -> None:
         """Begin with the whole answer to a question; refuse numbers too large or too small to be meant."""
-        spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", fractions(text))
+        spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", in_figures(text))
         self.text, self.key, self._left, self._clock, self._unit = text, key, spoken, clock, unit
-        sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
-        strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
-        if strange is not None:
-            why = f"{strange} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
-            raise bad_answer(key, why)
-        if nan := re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I):
-            raise bad_answer(key, f"{nan[1]} is no number")
-        if comma := re.search(r"\d+,\d+", text):
-            why = f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
-            raise bad_answer(key, why)
+        check_numbers(text, key)
 
     def take(self, pattern: str) -> re.Match[str] | None:
         """Take the first piece that matches a pattern out of the text, and return its match."""
@@ -165,6 +165,8 @@ class Phrase:
         if said.get("many"):
             value /= needed(float(said["many"]), self.key, "what the gain is per")
         share = float(said["share"]) / 100.0 if said["share"] else None
+        if said["share"] and not said.get("per_cent", "%"):  # of the same unit as the number
+            share = float(said["share"]) / max(abs(float(said["number"])), SMALLEST)
         about = re.search(ABOUT, said["words"], re.I) is not None
         return Quantity(value, share, about, said.get("size", "").strip("()"), said.get("base", ""))
 
@@ -236,9 +238,28 @@ class Phrase:
         return value / _TIMES.get(unit, 1.0) * self._clock if kind in ("rate", "slope", "speed") else value
 
 
-def fractions(text: str) -> str:
-    """Return a text with "0.1 second" in place of "a tenth of a second"."""
-    return _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", text)
+def check_numbers(text: str, key: str) -> None:
+    """Refuse numbers that cannot be meant, that can be read in two ways, or that are shares of a signal."""
+    sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
+    strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
+    if strange is not None:
+        why = f"{strange} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
+        raise bad_answer(key, why)
+    if nan := re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I):
+        raise bad_answer(key, f"{nan[1]} is no number")
+    if comma := re.search(r"\d+,\d+", text):
+        why = f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
+        raise bad_answer(key, why)
+    if share := re.search(
+        rf"%\s+of\s+(?:the\s+)?(?:{SIGNAL}|that|it|this|range|span|reading|value)\b", text, re.I
+    ):
+        raise bad_answer(key, f'"{share[0]}": write the size itself, in its unit')
+
+
+def in_figures(text: str) -> str:
+    """Return a text with "0.1 second" for "a tenth of a second", and "rises by -2" for "falls by 2"."""
+    figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", text)
+    return _FALLS.sub(r"rises by \g<about>-", figures)
 
 
 def unread(text: str) -> list[str]:

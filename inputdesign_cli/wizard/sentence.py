@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from inputdesign_cli.wizard import grammar, plants, wishes
-from inputdesign_cli.wizard.grammar import NONLINEAR, fractions, not_linear, orders, unread
+from inputdesign_cli.wizard.grammar import NONLINEAR, check_numbers, in_figures, not_linear, orders, unread
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
 _TURNS = ("wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
@@ -25,9 +25,10 @@ _NEGATION = re.compile(r"\b(?:not?|never|without|except|unless|neither|nor|but)\
 # Words whose number is missing, or is none that is understood: to drop them would say something else.
 _SIZED = re.compile(
     r"\b(?:dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
-    r"(?:second|minute|hour|day|night|week|month)s?)\b",
+    r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month)s?|half|twice|doubled?|peak\S*)\b",
     re.I,
 )
+_OTHER_LAWS = re.compile(r"\b(?:PD|P|I|LQG?|MPC)[- ](?:loop|controller|control|regulator)\b")
 _JOINS = r"(?:for|of|in|with|a|an|the|my|our|i|we|have|is|and|to)"
 _BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.I)
 _WORD = r"(?!(?:is|are|was|has|have|does|do|will|must|should|may|can)\b)[a-z'-]+"
@@ -78,8 +79,11 @@ def in_sentence(text: str) -> Heard:
     Raises:
         SpecError: `bad-answer` for what answers no question, where it has a number, a negation or a verb.
     """
+    check_numbers(text, "plant")
+    if other := _OTHER_LAWS.search(text):
+        raise bad_answer("wish", f'"{other[0]}": settings are found for PI and PID')
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
-    left = NONLINEAR.sub(_taken, fractions(text))
+    left = NONLINEAR.sub(_taken, in_figures(text))
     for key in _TURNS:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):

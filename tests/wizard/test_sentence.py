@@ -218,6 +218,15 @@ def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
         ("one shift", "two nights", "nights"),
         ("time constant about 262 s", "the time constant is long", "time constant"),
         ("valve 45 +- 8 %", "the valve stands at 45 %, it may go from 40 to 60 %", "the middle of 40 to 60"),
+        ("262 s", "2,400 s", "comma"),
+        ("noise of 0.1 degC that fades in a minute", "noise 0.25 not white", "not"),
+        ("noise of 0.1 degC that fades in a minute", "noise 0.3 peak-to-peak, white", "peak-to-peak"),
+        ("noise of 0.1 degC that fades in a minute", "noise 5 % of the temperature", "% of the temperature"),
+        ("45 +- 8 %", "45 % +- 8 % of that", "% of that"),
+        ("one shift", "we have at least 6 min", "at least 6 min"),
+        ("one shift", "forty-five minutes", "minutes"),
+        ("one shift", "an hour and a half", "half"),
+        ("PI loop", "P loop", "PI and PID"),
     ],
 )
 def test_a_size_that_is_not_understood_is_not_left_out(part, instead, refused, tmp_path):
@@ -225,6 +234,24 @@ def test_a_size_that_is_not_understood_is_not_left_out(part, instead, refused, t
     with pytest.raises(SpecError, match=refused) as found:
         written(EXCHANGER.replace(part, instead), tmp_path)
     assert found.value.diagnostics[0].code == "bad-answer"
+
+
+@pytest.mark.parametrize(
+    ("part", "instead", "facts"),
+    [
+        ("gain about 1.72 degC/%", "temperature falls by 20 degC per 10 %", {"gain": -2}),
+        ("gain about 1.72 degC/%", "the temperature drops about 3 degC per %", {"gain": -3}),
+        ("gain about 1.72 degC/%", "gain 1.5 degC/% +- 0.2", {"gain": 1.5, "amplitude": 8}),
+        ("262 s", "180 milliseconds", {"time_constant": 0.18}),
+    ],
+)
+def test_signs_shares_and_units_are_kept(part, instead, facts, tmp_path):
+    sentence = EXCHANGER.replace(part, instead).replace("dead time 31 s, ", "")
+    draft, text = written(sentence.replace("that fades in a minute", "white"), tmp_path)
+    for name, value in facts.items():
+        assert float(re.search(rf"\b{name}: ([-+.\de]+)", text)[1]) == pytest.approx(value), name
+    if "+-" in instead:
+        assert draft.spec().uncertainty.intervals["gain"] == pytest.approx((1.3, 1.7))
 
 
 def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
