@@ -13,8 +13,6 @@ from inputdesign_cli.signal.selection import Record
 
 _FALLS_SHORT = 5e-3
 _FAR = 0.1  # from the bound over all records, as a share
-# Times its own deviation: an input whose mean is farther from zero has a level.
-_AWAY = 0.5
 _DEAR = 1.0  # beyond the cost of the design, relative to it
 
 RECORD_UNDETERMINED = doubt(
@@ -172,7 +170,7 @@ def other_spectrum(asked: str, kind: str, limits: Sequence[str], power: float | 
 
 
 def level_notes(
-    levels: Mapping[str, float], point: Sequence[float] | None, means: Array | None, deviations: Array
+    levels: Mapping[str, float], point: Sequence[float] | None, means: Array | None, swings: Array
 ) -> list[Finding]:
     """Return what the user should know before the record is applied.
 
@@ -180,15 +178,16 @@ def level_notes(
         levels: by channel, what was taken away from the data.
         point: what the record varies about by input; None for zero.
         means: (r,), of the inputs as they were recorded; None: not known.
-        deviations: (r,), of the inputs.
+        swings: (r,), the largest deviations of the inputs from their means: zero within them is no level far
+            away, and means of short records say little.
     """
     found = _about_levels(point) if point is not None and levels else []
     if means is None or (point is not None and not levels):  # the spec states it
         return found
     unknown = {
         j: float(f"{mean:.4g}")
-        for j, (mean, spread) in enumerate(zip(means, deviations, strict=True))
-        if f"u{j + 1}" not in levels and abs(mean) > _AWAY * spread
+        for j, (mean, swing) in enumerate(zip(means, swings, strict=True))
+        if f"u{j + 1}" not in levels and abs(mean) > swing
     }
     offsets = [unknown.get(j, 0.0 if point is None else point[j]) for j in range(len(means))]
     return [*found, *_about_zero(unknown, offsets)]

@@ -96,7 +96,7 @@ def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
             },
         ),
         ({}, [7.0, 1.0], [7.0, -30.0], {}),
-        ({}, None, [0.3, -0.3], {}),
+        ({}, None, [0.3, -0.9], {}),
         ({}, None, None, {}),
     ],
 )

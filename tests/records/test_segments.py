@@ -199,6 +199,22 @@ def test_the_operating_point_is_taken_away(tmp_path):
     np.testing.assert_allclose(record.means, 40.0 + u.mean())
 
 
+@pytest.mark.parametrize("step", [0.98, 1.02, 1.06])
+def test_even_times_near_the_sample_time_of_the_spec_are_another_sample_time(step, tmp_path):
+    """Evened out, every move would come up to half a sample late, and the dead time be wrong by as much."""
+    u, y = signals()
+    path = log(tmp_path / "log.csv", step * np.arange(N), u, y)
+    found = refused(lambda: read_data([path], UNITS, Preparation()))
+    assert (found.code, found.details["data_sample_time"]) == ("data-not-uniform", pytest.approx(step))
+    jittered = step * np.arange(N) + np.random.default_rng(0).uniform(-0.08, 0.08, N)
+    record = read_data([log(tmp_path / "jitter.csv", jittered, u, y)], UNITS, Preparation())
+    assert "jitter-evened-out" in codes(record)
+    # A clock that is off by less than a sample in the whole record is as good as right.
+    assert read_data(
+        [log(tmp_path / "clock.csv", (1.0 + 0.5 / N) * np.arange(N), u, y)], UNITS, Preparation()
+    )
+
+
 def test_a_sample_time_that_contradicts_times_or_spec_is_refused(tmp_path):
     u, y = signals()
     path = log(tmp_path / "log.csv", 2.0 * np.arange(N), u, y)

@@ -2,10 +2,17 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import levels
-from inputdesign_cli.signal.constraints import compressed, largest_move, slow_moves
+from inputdesign_cli.signal.constraints import (
+    SignalConstraint,
+    compressed,
+    largest_move,
+    restrained,
+    slow_moves,
+)
 from inputdesign_cli.signal.evaluation import Target, first_level, last_level, least_level, level_of_power
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.kinds import kind_of
@@ -239,3 +246,22 @@ def test_powers_of_each_channel_are_kept_below_their_limits(experiment):
     _, record = made(experiment, {"method": "multisine"}, bounds)
     assert not record.met
     assert np.mean(record.samples[:, last] ** 2) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("returns", [False, True])
+def test_a_record_within_its_limits_is_the_nearest_and_returns_if_asked(returns):
+    """Against the quadratic program, of a lag whose output must stay below the half of what it would be."""
+    import cvxpy as cp
+
+    wanted = np.random.default_rng(0).standard_normal((60, 1))
+    wanted[-1] = 0.0 if returns else wanted[-1]
+    matrix = scipy.linalg.toeplitz(0.5 * 0.8 ** np.arange(60), np.zeros(60))
+    bound = 0.5 * np.abs(matrix @ wanted).max()
+    limit = SignalConstraint(lambda u: matrix @ u, lambda w: matrix.T @ w, np.array([bound]))
+    found = restrained(wanted, (limit,), returns=returns)
+    assert np.abs(matrix @ found).max() <= bound
+    assert not returns or found[-1, 0] == 0.0
+    u = cp.Variable(60)
+    within = [cp.abs(matrix @ u) <= bound, *([u[-1] == 0.0] if returns else [])]
+    least = cp.Problem(cp.Minimize(cp.sum_squares(u - wanted[:, 0])), within).solve(solver=cp.CLARABEL)
+    assert np.sum((found - wanted) ** 2) <= 1.05 * least

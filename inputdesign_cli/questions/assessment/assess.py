@@ -184,7 +184,8 @@ def _topped_up(
     was, signal, remarks = judged.outcome, topped.outcome.signal, list[Finding]()
     if "signal" in topped.tables and signal is not None and not task.header.units.closed_loop:
         levels, data = found.preparation.levels, found.data
-        remarks += level_notes(levels, signal.operating_point, data.means, data.u.std(axis=0))
+        swings = np.abs(data.u - data.u.mean(axis=0)).max(axis=0)
+        remarks += level_notes(levels, signal.operating_point, data.means, swings)
     if task.has_prior and found.estimate.prior is None:
         remarks.append(prior_left_out())
     design = topped.outcome.saying(remarks)
