@@ -44,6 +44,7 @@ _SHORT = re.compile(
 )
 # Words that make it likely that a column holds the input, the output or the reference: first those of control
 # systems, which decide. They are proposed, and never taken unasked.
+_WHOLE = 5  # letters of a word that may begin another one
 _WORDS: tuple[dict[str, str], ...] = (
     {
         "u": "op mv co out cmd command u input",
@@ -328,10 +329,15 @@ def _role(name: str) -> str:
     """Return `u`, `y` or `r` (a reference) where the words of a name agree, as in `FIC101.OP`."""
     words = set(re.split(r"[\W_\d]+", name_and_unit(name)[0].lower()))
     for roles in _WORDS:
-        found = [role for role, own in roles.items() if words & set(own.split())]
+        found = [role for role, own in roles.items() if any(_begins(word, own) for word in words)]
         if found:
             return found[0] if len(found) == 1 else ""
     return ""
+
+
+def _begins(word: str, known: str) -> bool:
+    """Return whether a word is one of those known, or begins with a long one, as "outputdata" does."""
+    return any(word == one or (len(one) >= _WHOLE and word.startswith(one)) for one in known.split())
 
 
 def called(sheet: Sheet, at: int) -> str:

@@ -225,9 +225,10 @@ def _check_length(spec: Spec, settings: SignalSettings) -> None:
         message = f"the values of a period are {period}, and must be {least} or more"
         hint = "ask for more samples, fewer periods or a shorter hold"
         if samples % block:
-            nearest = " or ".join(str(n) for n in (samples - samples % block, block * (period + 1)) if n)
+            usable = (samples - samples % block, max(block * (period + 1), least * block))
+            nearest = " or ".join(str(n) for n in usable if n >= least * block)
             message = f"{samples} samples are no multiple of {block}: periods times samples of a hold"
-            hint = f"write signal.samples: {nearest}, or another number of periods"
+            hint = f"write signal.samples: {nearest}, or another number of periods or a shorter hold"
         key = "signal.periods" if settings.periods > 1 else "signal.hold"
         raise spec.complain("conflicting-keys", message, hint=hint, key=key)
     if 2 * ramp > samples:
