@@ -181,7 +181,7 @@ def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command():
     told = summary(typed(result), "s", [])
     assert "next: idesign explore a.csv" in told
     assert told.count("Past inputs explain residuals.") == 1
-    assert "1 more in report.html" in told
+    assert "1 more in result.json" in told
     assert "The residuals drift." not in told
 
 
