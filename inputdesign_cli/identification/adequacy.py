@@ -182,6 +182,19 @@ def robust_white(
     return White.of(records, point, Whitening.of(white.without(columns).errors, records.lengths))
 
 
+def with_linear_faults(
+    records: Records, theta: Array, white: White, tests: Sequence[ScoreTest], *, feedback: bool
+) -> White:
+    """Return the estimate once past inputs or a trend are free to explain residuals, where tests name them.
+
+    A lag or a drift that a model lacks looks like a plant that is not linear, or that changes.
+    """
+    named = {test.name for test in failed(tests)}
+    tried = [*past_inputs(records, theta, feedback=feedback), _trend(records, theta)]
+    columns = [one.white(white) for one in tried if one.name in named]
+    return white.without(np.column_stack(columns)) if columns else white
+
+
 def future_tests(records: Records, theta: Array, white: White) -> tuple[ScoreTest, ...]:
     """Return for every input the test whether its future explains prediction errors.
 

@@ -11,7 +11,14 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.adequacy import ScoreTest, failed, future_tests, robust_white, score_tests
+from inputdesign_cli.identification.adequacy import (
+    ScoreTest,
+    failed,
+    future_tests,
+    robust_white,
+    score_tests,
+    with_linear_faults,
+)
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
 from inputdesign_cli.identification.level_shifts import LevelShift, chance_of_shifts, level_shifts
 from inputdesign_cli.identification.records import Point, Records, shifted
@@ -182,24 +189,32 @@ def tests_of(
     errors, u = point.errors[left], records.u[left]
     white = White.of(records, point)
     shift, shifts, less = level_shifts(records, point, white)
-    varying = [one.column for one in alternatives if one.fault not in ("plant", "noise")]
-    robust = robust_white(records, point, white, less=less, feedback=feedback, more=varying)
+    varying = [one for one in alternatives if one.fault not in ("plant", "noise")]
+    columns = [one.column for one in varying]
+    robust = robust_white(records, point, white, less=less, feedback=feedback, more=columns)
     if robust is not None:
         shift, shifts, less = level_shifts(records, point, robust)
 
     def scores(stated: White, judged: White | None) -> tuple[ScoreTest, ...]:
         return score_tests(records, point.theta, stated, feedback=feedback, robust=judged)
 
+    found, judged = scores(white, robust), robust or white
+    linear = with_linear_faults(records, point.theta, judged, found, feedback=feedback)
+    parameters, groups = len(records.kind.model.names), [(judged, alternatives)]
+    if linear is not judged:
+        structural = [one for one in alternatives if one.fault in ("plant", "noise")]
+        groups = [(judged, structural), (linear, varying)]
+    directed = [one for own, group in groups for one in directed_tests(own, group, parameters)]
     return Tests(
         whiteness(errors, fitted=int(np.sum(kind.whitening)), lengths=kept),
         cross_correlations(errors, u, fitted=int(np.sum(kind.explaining)), feedback=feedback, lengths=kept),
-        scores(white, robust),
-        directed_tests(robust or white, alternatives, len(records.kind.model.names)),
+        found,
+        tuple(directed),
         shift,
         shifts,
         scores(less if robust is None else white, less) if shifts else (),
         robust is not None,
-        () if feedback else future_tests(records, point.theta, robust or white),
+        () if feedback else future_tests(records, point.theta, judged),
         of_one_system(point, noise, experiments),
     )
 

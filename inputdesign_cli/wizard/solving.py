@@ -62,7 +62,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "sure": 100.0 * ((None if kept is None else kept.confidence) or DEFAULT_CONFIDENCE),
         "loop_kept": loop,
         "rivals": result.get("foreseen", {}).get("rivals"),
-        "few": [one["message"] for one in result.get("findings", ()) if one["code"] == "few-samples"],
+        "few": _few(result),
     }
     return _said("verdict", facts, SECONDS[spec.time_unit])
 
@@ -78,8 +78,15 @@ def _scatter(result: Result) -> float:
     return max(1.0, float(foreseen.get("largest", 1.0)))
 
 
+def _few(result: Result) -> list[str]:
+    """Return the warning that errors of so short a record are larger than stated, if there is one."""
+    return [one["message"] for one in result.get("findings", ()) if one["code"] == "few-samples"]
+
+
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
     """Return the length in samples of a designed record that meets the requirements, or None.
+
+    Records with few samples a parameter do not count: their estimates scatter more than is stated.
 
     Args:
         ratio: of errors, at estimates too; one is enough.
@@ -94,10 +101,10 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
             result = solve(spec.with_(**changes))
         except IdesignError:
             result = {}
-        found = result.get("signal", {}).get("worst_ratio")
-        if found is not None and (found := float(found) * _scatter(result)) <= 1.0:
+        found, few = result.get("signal", {}).get("worst_ratio"), _few(result)
+        if found is not None and (found := float(found) * _scatter(result)) <= 1.0 and not few:
             return int(result["signal"]["samples"])
-        longer = _LONGER if found is None else float(np.clip(_ROOM * found**2, _ROOM, _LONGER))
+        longer = _LONGER if found is None or few else float(np.clip(_ROOM * found**2, _ROOM, _LONGER))
         samples = int(np.ceil(samples * longer))
     return None
 

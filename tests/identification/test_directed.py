@@ -14,7 +14,7 @@ from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.levels import level
 from inputdesign_cli.plant import SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.plants import arx, lag_of
+from tests.support.plants import arx, known, lag_of
 from tests.support.records import arx_regressors, shifted, simulated
 
 W = np.linspace(0.01, 3.0, 50)
@@ -272,6 +272,29 @@ def test_actuators_that_are_not_linear_are_found(names, distort):
     found = estimated(u, through(distort(u)))
     failing = {one.test.name for one in varying(found).values() if one.test in found.tests.failed}
     assert names <= failing
+
+
+@pytest.mark.parametrize(
+    ("true", "model", "drift"),
+    [
+        (([0, 0, 0.1], [1, -0.99925]), known(one_channel([0, 0, 0.1], F=[1, -1.0]), "f1"), 0.0),
+        (([0, 0.1], np.polymul([1, -0.95], [1, -0.7])), one_channel([0, 0.3], F=[1, -0.95]), 0.0),
+        (([0, 0.2], [1, -0.8]), one_channel([0, 0.2], F=[1, -0.8]), 2.0),
+    ],
+    ids=["leaks", "a lag more", "drifts"],
+)
+def test_a_linear_plant_of_another_structure_is_not_called_nonlinear(true, model, drift):
+    """A tank that fills and leaks, modelled as an integrator, had a gain that depended on its level."""
+    named, refuted = [], 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        u = 10.0 * np.repeat(rng.uniform(-1.0, 1.0, 36), 20)
+        y = scipy.signal.lfilter(*true, u) + drift * np.sin(np.arange(720) / 120)
+        found = identify(model, u[:, None], (y + 0.15 * rng.standard_normal(720))[:, None])
+        refuted += bool(found.tests.failed)
+        named += [one for one in found.tests.failed if one.fault in ("change", "nonlinear")]
+    assert refuted >= 6
+    assert not named
 
 
 def test_an_input_of_two_values_has_no_powers():

@@ -138,6 +138,20 @@ def test_a_length_that_does_is_found_where_the_error_does_not_fall_with_its_root
     assert f"{lasting(500.0)} would do" in second
 
 
+def test_no_record_of_few_samples_would_do():
+    """Its errors are larger than stated: 83 min were promised, and their verdict was undecided."""
+    spec, tried = draft_of().spec(), []
+
+    def solve(changed):
+        tried.append(samples := changed.experiment.samples)
+        few = [{"code": "few-samples", "message": "few"}] if samples < 80 else []
+        return {"signal": {"worst_ratio": 0.8, "samples": samples}, "findings": few}
+
+    _, second = verdict(spec, {"samples": 720, "signal": {"worst_ratio": 0.02}}, solve)
+    assert tried == [50, 100]
+    assert f"{lasting(500.0)} would do" in second
+
+
 def test_answers_are_keys_of_the_spec():
     limited = draft_of(limits="rate 0.5, output 3", converter="12 bits up to 100", drift="yes").spec()
     assert (limited.limits.rate, limited.limits.amplitude.output) == (2.5, 3.0)
