@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from inputdesign_cli.cli.applying import instructions
 from inputdesign_cli.cli.options import Changes, Into, Shown, Workers
 from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
 from inputdesign_cli.cli.sweep import show_trade
@@ -46,6 +47,9 @@ def solve(
             came = stack.enter_context(ending_early(stack.enter_context(stoppable())))
         results, place = _results("solve", spec, changes, into, shown)
     keep(results, place, shown)
+    if not (shown.quiet or shown.json_output or into.no_output):
+        for line in instructions(results, str(place.directory / "spec.yaml")):  # with what `--set` changed
+            typer.echo(line)
     if trade:
         show_trade(spec, read_spec(spec, changes), trade.split(","), place.directory, changes, shown)
     if came:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from inputdesign_cli.cli.applying import instructions
 from inputdesign_cli.cli.options import TRADED, Changes, Into, Shown, refuse_existing
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain, computing, status
@@ -79,7 +80,7 @@ def wizard(
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     with computing(file, quiet=quiet):
         from inputdesign_cli import load_spec, questions
-        from inputdesign_cli.wizard.solving import to_log, verdict
+        from inputdesign_cli.wizard.solving import verdict
 
         spec = load_spec(file)
         results = questions.solve(spec)
@@ -89,7 +90,7 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
         with computing(file, quiet=quiet, doing="what else would do"):
             found = verdict(spec, results.result, _result, there)
         if not quiet:
-            lines = ["", *found, *to_log(spec, results, str(file)), f"files: {place.directory}"]
+            lines = ["", *found, *instructions(results, str(file)), f"files: {place.directory}"]
             typer.echo("\n".join(lines))
     if trade:
         from inputdesign_cli.cli.sweep import show_trade

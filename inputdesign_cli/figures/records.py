@@ -31,7 +31,7 @@ _GAP = 1.5  # sample times between two records that follow each other
 def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     """Draw each channel over time (of a long record the first samples), beside a histogram of all samples.
 
-    Below them are the outputs that are expected from rest, with two standard deviations of noise.
+    Below them are the expected inputs of a loop and outputs, with two standard deviations of noise.
     """
     predicted = curves.predicted[: _ROWS // 2]
     channels = list(curves.channels.items())[: _ROWS - len(predicted)]
@@ -82,8 +82,18 @@ def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: b
     label = f"± 2 standard deviations of noise{' since the start' if noise[0] < noise[-1] else ''}"
     style.band(axes, time, y - noise, y + noise, GREY, 0.3, label=label)
     # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
-    said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
-    axes.plot(time, y, "-" if time.size > 1 else "o", color=GREEN, linewidth=1.0, markersize=4, label=said)
+    what = f"predicted {'input' if panel.applied else 'output'}"
+    levels = levels and not panel.applied
+    said = what if panel.applied else f"{what}, {'deviation Δ ' if levels else ''}from rest"
+    axes.plot(
+        time,
+        y,
+        "-" if time.size > 1 else "o",
+        color=BLACK if panel.applied else GREEN,
+        linewidth=1.0,
+        markersize=4,
+        label=said,
+    )
     for bound in panel.limits or ():
         axes.axhline(bound, **_LIMIT)
     _name(axes, panel.name, panel.label, "Δ " if levels else "")

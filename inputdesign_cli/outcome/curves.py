@@ -286,13 +286,14 @@ class OrderCurves(Curves):
 
 @dataclass(frozen=True)
 class PredictedPanel:
-    """Holds the output that the record causes from rest, and the deviation of its noise; arrays (n,)."""
+    """Holds what the record causes from rest at an output, or in a loop at an input; arrays (n,)."""
 
     name: str  # "y1"
     values: Array
-    deviation: Array
+    deviation: Array  # of the noise there
     limits: tuple[float, float] | None = None
     label: str = ""  # its name and unit, where there are any
+    applied: bool = False  # an input, at its operating point; outputs are counted from rest
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,16 @@
-"""What a design comes to in the user's words: is it enough, what would do, what to apply and to log.
+"""What a design comes to in the user's words: is it enough, and what would do.
 
 Every number is that of a design that was computed. `templates/verdict.txt` has the sentences.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.outcome.results import Result, Results
+from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.outcome.sentences import sentences
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
@@ -119,29 +118,3 @@ def lasting(seconds: float) -> str:
     if seconds >= 2 * _HOUR:
         return f"{seconds / _HOUR:.3g} h"
     return f"{seconds / _MINUTE:.3g} min" if seconds >= 2 * _MINUTE else f"{seconds:.3g} s"
-
-
-def to_log(spec: Spec, results: Results, file: str) -> list[str]:
-    """Return instructions: what to apply and record, and the command that judges the record."""
-    # "u1 valve (%)": behind the channel stands its name.
-    applied, caused = (
-        [name.split()[0] for name in results.tables[table].columns if re.match(r"[ruy]\d+(?= |$)", name)]
-        for table in ("signal", "predicted_output")
-    )
-    inputs, outputs = [f"u{name[1:]}" for name in applied], [name for name in caused if name.startswith("y")]
-    # A coarse converter holds none but levels of its own, and the record swings about one of these.
-    point_of = results.result.get("signal", {}).get("operating_point", spec.signal.offset or 0.0)
-    levels = np.broadcast_to(np.asarray(point_of, dtype=float), len(inputs)).tolist()
-    facts = {
-        "inputs": inputs,
-        "outputs": outputs,
-        "levels": levels,
-        "references": any(name.startswith("r") for name in applied),
-        "step": spec.sample_time,
-        "time_unit": spec.time_unit,
-    }
-    known = [f"{name}={level:g}" for name, level in zip(inputs, levels, strict=True)]
-    point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-    rest = f"(REST: the level of {' and '.join(outputs)} before it began)"
-    judge = f"Then: idesign assess {file} log.csv --operating-point {point}   {rest}"
-    return [*_said("to_log", facts), judge]

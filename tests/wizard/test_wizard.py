@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from inputdesign_cli.wizard.composing import compose, with_spectrum
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import TEMPLATES, PlantAnswer
 from inputdesign_cli.wizard.questions import read_answers
-from inputdesign_cli.wizard.solving import lasting, to_log, verdict
+from inputdesign_cli.wizard.solving import lasting, verdict
 from tests.support.wishes import ENGINEER
 
 WISHES = {
@@ -357,35 +356,6 @@ def test_noise_that_is_said_to_drift_drifts_beside_a_log_that_does_not():
     told = of_log(plant, "noise: {variance: 1}", "standard deviation 0.2", "yes")[0].noise
     assert (told.drift, told.C) == (True, (1.0, -0.8))
     assert told.variance == pytest.approx(0.04 * (1 - 0.49), rel=1e-5)
-
-
-def words(applied, caused, offset=None, **of_signal):
-    spec = SimpleNamespace(signal=SimpleNamespace(offset=offset), sample_time=2.0, time_unit="s")
-    noise = [f"{y}_noise_deviation" for y in caused]
-    columns = {"signal": applied, "predicted_output": [*caused, *noise]}
-    tables = {
-        name: SimpleNamespace(columns=dict.fromkeys(["time_s", *names])) for name, names in columns.items()
-    }
-    return " ".join(to_log(spec, SimpleNamespace(tables=tables, result={"signal": of_signal}), "spec.yaml"))
-
-
-@pytest.mark.parametrize(
-    ("said", "parts"),
-    [
-        (words(["u1", "u2"], ["y1", "y2"], [40.0, 5.0]),
-         ("apply signal.csv, and log time, u1, u2, y1 and y2 every 2 s",
-          "--operating-point u1=40,u2=5,y1=REST,y2=REST")),
-        # A converter of 31 steps of 24/31 V has no level of 10 V: the record swings about another.
-        (words(["u1"], ["y1"], 10.0, operating_point=[10.5]), ("--operating-point u1=10.5,y1=REST",)),
-        # A reference is no position of the actuator.
-        (words(["r1"], ["y1"], 40.0),
-         ("has the level 40 of the input in it: while y rests, u = r", "need not be logged",
-          "u = r - C y", "no position of the actuator", "log time, u1 and y1",
-          "--operating-point u1=40,y1=REST")),
-    ],
-)  # fmt: skip
-def test_what_is_applied_and_logged_is_said(said, parts):
-    assert [one for one in parts if one not in said] == []
 
 
 def told(ratio=0.5, there=None, solve=None, limits="none", **robust):

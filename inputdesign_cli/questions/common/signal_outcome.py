@@ -106,14 +106,11 @@ def with_record(
         units.time_header: time,
         **dict(zip(map(units.header, units.excitations), signals, strict=True)),
     }
-    around, most, n = request.operating_points, request.bounds.output, len(time)
-    y = FiniteRecord(experiment, n, units.step).signals("output", record.samples)
-    noise = noise_deviation(experiment, n, units.step)
-    panels, predicted = [], {units.time_header: time}
-    for i in range(units.outputs):
-        name, limits = f"y{i + 1}", None if most is None else (-float(most[i]), float(most[i]))
-        panels.append(PredictedPanel(name, y[:, i], noise[:, i], limits, units.label(name)))
-        predicted |= {units.header(name): y[:, i], f"{name}_noise_deviation": noise[:, i]}
+    around, panels = request.operating_points, _predicted(request, experiment, record)
+    predicted = {units.time_header: time}
+    for panel in panels:
+        name = panel.name
+        predicted |= {units.header(name): panel.values, f"{name}_noise_deviation": panel.deviation}
     moves, rate = {}, request.bounds.rate
     if rate is not None and not units.closed_loop:  # the largest move from rest, and its limit
         pairs = zip(_largest_moves(record.samples).tolist(), rate.tolist(), strict=True)
@@ -121,7 +118,7 @@ def with_record(
     curves = SignalCurves(
         time,
         dict(zip(units.excitations, signals, strict=True)),
-        _limits(request, record),
+        {} if units.closed_loop else _limits(request, record),
         {name: units.label(name) for name in units.excitations},
         tuple(panels),
         held=units.sampled,
@@ -146,8 +143,26 @@ def with_record(
     return adding(results, replace(results.outcome, signal=signal), (), tables, {"signal": curves})
 
 
-def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
-    """Return standard deviations (n, p) of the noise at the outputs, in the loop where there is one.
+def _predicted(request: RecordRequest, experiment: Experiment, record: Record) -> list[PredictedPanel]:
+    """Return what the record causes at the outputs, and before them at the inputs where there is a loop."""
+    units, n, most, panels = request.units, len(record.samples), request.bounds.output, []
+    y, u = (FiniteRecord(experiment, n, units.step).signals(at, record.samples) for at in ("output", "input"))
+    of_y, of_u = noise_deviation(experiment, n, units.step)
+    if units.closed_loop:
+        around, limits = request.operating_points, _limits(request, record)
+        u = u if around is None or record.method == "given" else u + around
+        for i, values in enumerate(u.T):
+            name = f"u{i + 1}"
+            kept, label = limits.get(name), units.label(name)
+            panels.append(PredictedPanel(name, values, of_u[:, i], kept, label, applied=True))
+    for i, values in enumerate(y.T):
+        name, kept = f"y{i + 1}", None if most is None else (-float(most[i]), float(most[i]))
+        panels.append(PredictedPanel(name, values, of_y[:, i], kept, units.label(name)))
+    return panels
+
+
+def noise_deviation(experiment: Experiment, samples: int, step: float) -> tuple[Array, Array]:
+    """Return standard deviations of the noise at outputs (n, p) and inputs (n, r); these have some in a loop.
 
     From the response to an impulse of e, whose squares add up. Noise that settles within the record has been
     there before; one that drifts grows from the start on.
@@ -156,22 +171,26 @@ def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
     e = np.zeros((p, samples, p))
     e[:, 0] = np.linalg.cholesky(model.covariance).T
     rest = np.zeros((p, samples, model.inputs))
-    caused = (
-        model.simulate(rest, e, step)[1] if experiment.loop is None else experiment.loop.signals(rest, e)[0]
-    )
+    loop = experiment.loop
+    y, u = (model.simulate(rest, e, step)[1], rest) if loop is None else loop.signals(rest, e)
+    return _grown(y), _grown(u)
+
+
+def _grown(caused: Array) -> Array:
+    """Return standard deviations (n, channels) from responses (sources, n, channels) to impulses."""
     grown = np.sqrt(np.cumsum(np.sum(caused**2, axis=0), axis=0))
-    still = grown[samples // 2] >= (1.0 - _SETTLED) * grown[-1]
+    still = grown[len(grown) // 2] >= (1.0 - _SETTLED) * grown[-1]
     return np.where(still, grown[-1], grown)
 
 
 def _limits(request: RecordRequest, record: Record) -> dict[str, tuple[float, float]]:
-    """Return the least and largest value of each channel of the record, where that signal is limited."""
-    most, around, units = request.bounds.amplitude, request.operating_points, request.units
-    if most is None or units.closed_loop or record.method == "given":
+    """Return the least and largest value of each input, where it is limited."""
+    most, around = request.bounds.amplitude, request.operating_points
+    if most is None or record.method == "given":
         return {}
     middle = np.zeros(most.size) if around is None else around
     pairs = zip((middle - most).tolist(), (middle + most).tolist(), strict=True)
-    return dict(zip(units.excitations, pairs, strict=True))
+    return {f"u{i}": pair for i, pair in enumerate(pairs, start=1)}
 
 
 def _largest_moves(u: Array) -> Array:

@@ -1,0 +1,50 @@
+"""Instructions for the experiment: what to apply and to log, and the command that judges the record."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inputdesign_cli.outcome.results import Results
+
+# "u1 valve (%)": behind the channel stands its name.
+_CHANNEL = re.compile(r"[ruy]\d+(?= |$)")
+
+
+def instructions(results: Results, spec: str) -> list[str]:
+    """Return sentences on what to apply and to log, and the command that judges the record; none without one.
+
+    Args:
+        spec: the file that `assess` gets.
+    """
+    signal, tables = results.outcome.signal, results.tables
+    if signal is None or "predicted_output" not in tables:
+        return []
+    applied, caused = (
+        [name.split()[0] for name in tables[table].columns if _CHANNEL.match(name)]
+        for table in ("signal", "predicted_output")
+    )
+    inputs, outputs = [f"u{name[1:]}" for name in applied], [name for name in caused if name[0] == "y"]
+    in_loop, around = applied[0].startswith("r"), signal.operating_point
+    logged, step = ["time", *inputs, *outputs], f"{signal.sample_time:g} {results.time_unit}"
+    where = "" if around is None else " at the operating point"
+    how = " as r in u = r - C y (C y counted from rest; r is no position of the actuator)" if in_loop else ""
+    said = [
+        f"Bring the plant to rest{where}, apply signal.csv{how}, "
+        f"and log {', '.join(logged[:-1])} and {logged[-1]} every {step}."
+    ]
+    levels = " and ".join(f"{level:.6g}" for level in around or () if level)
+    if in_loop:
+        has = f"has the level {levels} of the input in it" if levels else "has no level"
+        said.append(
+            f"r in signal.csv {has}: while y rests, u = r. Log u as it is, level included; r need not be "
+            "logged, and where it is, it is logged as applied: its level does not matter to assess."
+        )
+    judge = f"Then: idesign assess {shlex.quote(spec)} log.csv"
+    if around is not None:
+        known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
+        point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
+        judge += f" --operating-point {point}   (REST: the level of {' and '.join(outputs)} before it began)"
+    return [*said, judge]

@@ -1,0 +1,68 @@
+"""What a design says is to be applied and logged, and how the record is judged."""
+
+import shlex
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.cli.applying import instructions
+
+
+def words(applied, caused, point=None):
+    noise = [f"{y}_noise_deviation" for y in caused]
+    columns = {"signal": applied, "predicted_output": [*caused, *noise]}
+    tables = {
+        name: SimpleNamespace(columns=dict.fromkeys(["time_s", *names])) for name, names in columns.items()
+    }
+    signal = SimpleNamespace(sample_time=2.0, operating_point=point)
+    results = SimpleNamespace(tables=tables, time_unit="s", outcome=SimpleNamespace(signal=signal))
+    return " ".join(instructions(results, "spec.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("said", "parts"),
+    [
+        (words(["u1 valve (%)", "u2"], ["y1", "y2"], [40.0, 5.0]),
+         ("log time, u1, u2, y1 and y2 every 2 s", "--operating-point u1=40,u2=5,y1=REST,y2=REST")),
+        # A converter of 31 steps of 24/31 V has no level of 10 V: the record swings about another.
+        (words(["u1"], ["y1"], [10.5]), ("--operating-point u1=10.5,y1=REST",)),
+        (words(["u1"], ["y1"]), ("idesign assess spec.yaml log.csv",)),
+        # A reference is no position of the actuator.
+        (words(["r1"], ["u1", "y1"], [40.0]),
+         ("has the level 40 of the input in it: while y rests, u = r", "need not be logged",
+          "u = r - C y", "no position of the actuator", "log time, u1 and y1 ",
+          "--operating-point u1=40,y1=REST")),
+    ],
+)  # fmt: skip
+def test_what_is_applied_and_logged_is_said(said, parts):
+    assert [one for one in parts if one not in said] == []
+
+
+SPEC = """\
+sample_time: 2
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 0.01}
+experiment: {samples: 100}
+accuracy: {model_error: {relative: 0.5}}
+limits: {amplitude: 1}
+objective: best_accuracy
+signal: {type: binary, seed: 1, offset: 4}
+"""
+
+
+def test_the_command_that_solve_names_judges_its_record(run, tmp_path):
+    """It has the level, and the spec of the run what --set changed."""
+    (tmp_path / "spec.yaml").write_text(SPEC)
+    code, out, _ = run("solve", "spec.yaml", "--set", "limits.amplitude=2", "--no-figures")
+    *_, last = out.splitlines()
+    command = shlex.split(last.removeprefix("Then: idesign ").partition("   (")[0].replace("REST", "7"))
+    u = np.loadtxt("runs/spec/signal.csv", delimiter=",", skiprows=1)[:, 1]
+    assert sorted(set(u)) == [2.0, 6.0]
+    y = 7.0 + scipy.signal.lfilter([0, 1], [1, -0.5], u - 4.0)
+    y += 0.1 * np.random.default_rng(1).standard_normal(u.size)
+    rows = np.column_stack([2.0 * np.arange(u.size), u, y])
+    np.savetxt("log.csv", rows, delimiter=",", header="time,u1,y1", comments="")
+    code, out, err = run(*command, "--no-figures")
+    assert code == 0, out + err
