@@ -10,9 +10,11 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.signal.selection import Record
+from inputdesign_cli.signal.settings import Quantiser
 
 _FALLS_SHORT = 5e-3
 _FAR = 0.1  # from the bound over all records, as a share
+_SEEN = 0.01  # of the largest move
 _DEAR = 1.0  # beyond the cost of the design, relative to it
 
 RECORD_UNDETERMINED = doubt(
@@ -147,6 +149,26 @@ def start_matters(kind: FindingKind, growth: float) -> Finding:
         fact = "otherwise the record does not determine all parameters"
         return kind.found(fact, where="signal", growth=None)
     return kind.found(f"otherwise errors are {growth:.3g} times as large", where="signal", growth=growth)
+
+
+@finding(NOTE, "level-rounded", "State `signal.offset` at a value of the converter, or give it more bits.")
+def level_rounded(kind: FindingKind, quantisers: Sequence[Quantiser], peak: float) -> list[Finding]:
+    """The record moves about another level than signal.offset. A converter has only values of its own.
+
+    Args:
+        quantisers: one an input, in a converter's own units.
+        peak: the largest move from the level; a shift of a small share of it is not worth a note.
+    """
+    return [
+        kind.found(
+            f"input {j} stands at {one.operating_point:.6g} in place of {one.offset:.6g}",
+            where="signal.offset",
+            level=one.operating_point,
+            offset=one.offset,
+        )
+        for j, one in enumerate(quantisers, start=1)
+        if abs(one.operating_point - one.offset) > _SEEN * peak
+    ]
 
 
 def other_signal(kind: str) -> Finding:

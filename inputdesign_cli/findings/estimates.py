@@ -82,10 +82,17 @@ def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, n
     "start-estimated",
     "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
 )
-def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
-    """The initial state of a record was estimated too. It and output levels cost some accuracy."""
+def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Finding]:
+    """The initial state of a record was estimated too. It and output levels cost some accuracy.
+
+    Args:
+        levels: whether the user gave the level of an output.
+    """
     if not estimate.start.free:
         return []
+    remedy = kind.remedy
+    if levels:
+        remedy = "If the plant was at rest before, it was at other levels than --operating-point gives."
     if not estimate.start.rest_refuted:
         return [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
@@ -94,7 +101,8 @@ def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
     fact = "the first residuals together are larger than the noise explains"
     if np.max(ratio) > _SEEN_AT_ONCE:
         fact = f"a first residual is {first:.3g}, and the noise {noise:.3g}"
-    return [kind.found(fact, where=f"y{output + 1}", first_residual=first, noise=noise)]
+    where = f"y{output + 1}"
+    return [kind.found(fact, where=where, remedy=remedy, first_residual=first, noise=noise)]
 
 
 @finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")

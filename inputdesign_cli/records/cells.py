@@ -127,6 +127,7 @@ def column_of(cells: Sequence[str], decimal: str = ".", *, stated: bool = False)
     numbers[~np.isfinite(numbers)] = np.nan
     row = next((int(i) for i in np.flatnonzero(np.isnan(numbers)) if not is_missing(plain[i])), None)
     pointed = [i for i, text in enumerate(texts) if "." in text and _is_number(text)]
+    say = _SAY
     if decimal == "," and stated and pointed:
         wrong, row = "has a point, and --decimal says that commas are the decimal marks", pointed[0]
     elif row is None and not stated and (decimal == "," or pointed) and _like_thousands(plain):
@@ -134,12 +135,15 @@ def column_of(cells: Sequence[str], decimal: str = ".", *, stated: bool = False)
         row = next(i for i, text in enumerate(plain) if "." in text)
     elif row is None:
         return Column(numbers)
+    elif _is_comma(texts[row]) and stated:
+        wrong = "has a comma, and --decimal says that points are the decimal marks"
+        say = "write nothing between thousands; or are the commas decimal marks (--decimal ,)?"
     elif _is_comma(texts[row]):
         wrong = "has a comma, which may be a decimal mark or stand between thousands"
     else:
         dates = moments_column(["" if is_missing(text) else text for text in texts])
         return dates or Column(numbers, (row, texts[row]))
-    return Column(numbers, (row, texts[row]), wrong, _SAY)
+    return Column(numbers, (row, texts[row]), wrong, say)
 
 
 def _like_thousands(texts: Sequence[str]) -> bool:

@@ -22,6 +22,7 @@ from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, Searched,
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.signal.selection import Record
+from inputdesign_cli.signal.settings import Quantiser
 from tests.support.wording import long_sentences
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
@@ -89,6 +90,7 @@ FOUND = {
     "record-undetermined": records.accuracy_missed(replace(MADE, worst_ratio=np.inf), held=False),
     "record-misses-accuracy": [f for h in (True, False) for f in records.accuracy_missed(MADE, held=h)],
     "record-dear": records.length_of_record(MADE, 40, 1, {}),
+    "level-rounded": records.level_rounded([Quantiser(5, 24.0, 10.0)], 5.0),
     "record-longer": records.length_of_record(MADE, 20, 1, {"rate": 0.99}),
     "record-too-few-values": records.too_short(6, 16),
     "bound-of-power-only": records.short_windows(12, 1000.0, 0.6),

@@ -14,7 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.designed_records import start_matters
+from inputdesign_cli.findings.designed_records import level_rounded, start_matters
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.outcome import Signal
@@ -81,7 +81,8 @@ class SpectrumTask(ABC):
 
         A design is of spectra, which have no start; the record may live on its start from rest.
         """
-        samples, found = record.samples, list(findings)
+        samples, quantisers = record.samples, self.record.bounds.quantisers
+        found = [*findings, *level_rounded(quantisers, float(np.abs(samples).max()))]
         if np.isfinite(record.worst_ratio):
             growth = growth_by_start(experiment, samples, self.record.step, requirements)
             if growth > 1.0 + _MATTERS:
