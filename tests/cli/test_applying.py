@@ -44,7 +44,7 @@ SPEC = """\
 sample_time: 2
 plant: {B: [0, 1], F: [1, -0.5]}
 noise: {variance: 0.01}
-experiment: {samples: 100}
+experiment: {samples: 60}
 accuracy: {model_error: {relative: 0.5}}
 limits: {amplitude: 1}
 objective: best_accuracy
@@ -52,17 +52,22 @@ signal: {type: binary, seed: 1, offset: 4}
 """
 
 
-def test_the_command_that_solve_names_judges_its_record(run, tmp_path):
-    """It has the level, and the spec of the run what --set changed."""
+@pytest.mark.parametrize(
+    ("plant", "asked", "expected"),
+    [([1, -0.5], 0.5, 0), ([1, -0.5], 0.001, 1), ([1, -1.3, 0.4], 0.5, 5)],
+    ids=["met", "missed", "undecided"],
+)
+def test_the_command_that_solve_names_judges_its_record(run, tmp_path, plant, asked, expected):
+    """It has the level, and the spec of the run what --set changed. A lag too many refutes the model."""
     (tmp_path / "spec.yaml").write_text(SPEC)
-    code, out, _ = run("solve", "spec.yaml", "--set", "limits.amplitude=2", "--no-figures")
+    _, out, _ = run("solve", "spec.yaml", "--set", "limits.amplitude=2", "--no-figures")
     *_, last = out.splitlines()
     command = shlex.split(last.removeprefix("Then: idesign ").partition("   (")[0].replace("REST", "7"))
     u = np.loadtxt("runs/spec/signal.csv", delimiter=",", skiprows=1)[:, 1]
     assert sorted(set(u)) == [2.0, 6.0]
-    y = 7.0 + scipy.signal.lfilter([0, 1], [1, -0.5], u - 4.0)
+    y = 7.0 + scipy.signal.lfilter([0, 1], plant, u - 4.0)
     y += 0.1 * np.random.default_rng(1).standard_normal(u.size)
     rows = np.column_stack([2.0 * np.arange(u.size), u, y])
     np.savetxt("log.csv", rows, delimiter=",", header="time,u1,y1", comments="")
-    code, out, err = run(*command, "--no-figures")
-    assert code == 0, out + err
+    code, out, err = run(*command, "--no-figures", "--set", f"accuracy.model_error.relative={asked}")
+    assert code == expected, out + err

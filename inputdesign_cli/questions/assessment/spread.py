@@ -45,7 +45,8 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
         u: the inputs (N, r) of the data, applied in open loop.
         step: time between samples.
     """
-    if estimate.errors.size >= _PLENTY * estimate.theta.size or not estimate.search.converged:
+    plenty = estimate.errors.size >= _PLENTY * estimate.theta.size
+    if plenty or not estimate.search.converged or estimate.tests.failed:  # a refuted model promises nothing
         return estimate, []
     factors, fast = _scatter(model, u, step, _RUNS, free=estimate.start.free)
     if np.all(factors <= _LUCK):
