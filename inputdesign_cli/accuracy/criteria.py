@@ -66,7 +66,7 @@ class Criterion(OneCondition):
 
     @property
     def definite(self) -> bool:
-        """Return whether the criterion is worthless where M is singular: all but T."""
+        """Return whether the criterion has no value where M is singular: all but T."""
         return self.letter != "T"
 
     @cached_property

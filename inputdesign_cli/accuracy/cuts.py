@@ -287,7 +287,7 @@ class TraceCut:
         return [CutBlock("nonnegative", 1, -np.ones(1), row, sp.csc_matrix((1, 0)))]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
-        """Return a multiple of the inequality."""
+        """Return the inequality tr(W M) >= 1, times its multiplier."""
         y = max(float(multipliers[0][0]), 0.0)
         return y * self.weight, y
 

@@ -56,7 +56,9 @@ class Form:
         stated = [name for name, value in kinds.items() if value not in (None, "")]
         if len(stated) != 1:
             said = " and ".join(f"--{name}" for name in stated) or "none of them"
-            raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
+            raise typer.BadParameter(
+                f"give one of --prbs, --multisine, --chirp, --steps and --kind, not {said}"
+            )
         known = {*own("idesign.signals"), *names("idesign.signals")} - {"slewed"}  # which needs a rate
         if self.kind and self.kind not in known:
             refuse(f"no kind is {self.kind!r}: there are {', '.join(sorted(known))}", "--kind")
@@ -98,9 +100,9 @@ def signal(
 ) -> None:
     """Make a signal without a spec, and show what it excites.
 
-    Give one of --prbs, --multisine, --chirp and --steps. Prints the peak, the crest factor, the order of
-    persistent excitation and the band of each channel; -o writes the samples, a C header for hardware among
-    the kinds. With several inputs a prbs is shifted, a multisine has a period for each input.
+    Give one of --prbs, --multisine, --chirp, --steps and --kind. Prints the peak, the crest factor, the order
+    of persistent excitation and the band of each channel; -o writes the samples, a C header for hardware
+    among the kinds. With several inputs a prbs is shifted, a multisine has a period for each input.
     """
     files = [path_option(name) for name in output or ()]
     for file in files:

@@ -64,8 +64,14 @@ def _everything(outcome: Outcome, time_unit: str) -> list[Line]:
         *_lines(facts(outcome, time_unit)),
         *_named("proved", said("proofs", outcome)),
         *_simulated(outcome),
-        *(("note", text) for text in outcome.notes or ()),
+        *_notes(outcome),
     ]
+
+
+def _notes(outcome: Outcome) -> Iterator[Line]:
+    """Yield the findings, each by its severity: a doubt is more than a note."""
+    severities = {one.message: str(one.severity) for one in outcome.findings or ()}
+    return ((severities.get(text, "note"), text) for text in outcome.notes or ())
 
 
 def _lines(found: Iterable[Fact]) -> Iterator[Line]:

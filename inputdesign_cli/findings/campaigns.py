@@ -58,8 +58,8 @@ PART_NOT_ROBUST = note(
 )
 PART_ALONE = note(
     "part-alone",
-    "The next part is planned as if there were no data. By their accuracy the data would suffice, but tests "
-    "leave the model undecided.",
+    "The next part is planned as if there were no data. The data are accurate enough, but tests leave the "
+    "model undecided.",
     "Apply the part.",
 )
 PART_BETWEEN_MINIMA = note(

@@ -30,8 +30,8 @@ RECORD_MISSES = doubt(
 )
 RECORD_DEAR = doubt(
     "record-dear",
-    "The record costs far more than the spectrum. A short record loses the response after its last sample, "
-    "because of dead times and time constants.",
+    "The record costs far more than the spectrum. A short record loses the response after its last sample. "
+    "A signal such as a PRBS has not the designed spectrum.",
     "Take more samples.",
 )
 RECORD_LONGER = note(
@@ -71,13 +71,16 @@ def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
     return RECORD_MISSES.when(not record.met, fact, where="signal", remedy=remedy, worst_ratio=ratio)
 
 
-def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str, float]) -> list[Finding]:
+def length_of_record(
+    record: Record, asked: int, block: int, shares: Mapping[str, float], *, shaped: bool = True
+) -> list[Finding]:
     """Return a finding if a record is longer than was asked for, or dear for want of samples.
 
     Args:
         asked: its samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
         shares: of each limit on single samples that it takes.
+        shaped: whether the record has the spectrum of the design; a PRBS has its own.
     """
     size, times = len(record.samples), 1.0 + record.extra_power
     if record.method == "given":
@@ -87,8 +90,13 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
         share = f". It uses {100 * shares[nearest]:.3g} % of limits.{nearest}" if nearest else ""
         fact = f"{size} samples, to one per cent, where the spectrum alone needs {asked}{share}"
         return [RECORD_LONGER.found(fact, where="signal", samples=size, of_spectrum=asked)]
-    fact = f"{times:.3g} times as much, since much of the response comes after its {size} samples"
-    return RECORD_DEAR.when(record.extra_power > _DEAR, fact, where="signal.samples", times=times)
+    fact = f"{times:.3g} times as much, since "
+    fact += (
+        f"much of the response comes after its {size} samples" if shaped else "its type has another spectrum"
+    )
+    remedy = "" if shaped else "Leave signal.type out, or take multisine or filtered_noise."
+    dear = record.extra_power > _DEAR
+    return RECORD_DEAR.when(dear, fact, where="signal.samples", remedy=remedy, times=times)
 
 
 @finding(NOTE, "record-less-accurate", "Take more samples, or more candidates (`signal.candidates`).")
@@ -111,7 +119,7 @@ def less_accurate(
 
 @finding(NOTE, "bound-of-power-only", "Take `signal.hold: auto` if the actuator may keep its values as long.")
 def short_windows(kind: FindingKind, seen: int, remembered: float, distance: float | None) -> list[Finding]:
-    """The bound over all records equals that of the power. Its windows are shorter than the memory.
+    """The bound over all records equals that of the power. It sees fewer samples than the plant remembers.
 
     Args:
         seen: samples in a window of the bound.

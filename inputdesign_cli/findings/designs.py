@@ -54,7 +54,7 @@ def inputs_without_power(kind: FindingKind, excited: Sequence[float]) -> list[Fi
     "Raise `experiment.samples` to twice this time constant, or check with `idesign simulate`.",
 )
 def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]:
-    """The experiment ends before the plant settles. It lasts less than two of its slowest time constants.
+    """The experiment ends before the plant settles. The plant needs two of its slowest time constants.
 
     The accuracy of a spectrum holds for long records. A short one loses the response after its end.
     """

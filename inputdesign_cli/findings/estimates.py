@@ -44,7 +44,7 @@ def _not_settled(kind: FindingKind, estimate: Estimate) -> list[Finding]:
     "unsettled",
 )
 def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
-    """A parameter stopped where its expression has no value any more, as the root of a negative number.
+    """A parameter stopped where its expression has no value any more, such as the root of a negative number.
 
     The data may ask for a value beyond it, so that the estimate is not the best one.
     """
@@ -61,14 +61,13 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
 
 
 @finding(
-    NOTE,
-    "short-record",
-    "Take a longer record for smaller ones. Accuracy is judged by the scatter of the simulated estimates.",
+    NOTE, "short-record", "Take a longer record for smaller ones. Accuracy is judged by simulated estimates."
 )
 def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, none: bool) -> list[Finding]:
     """The errors of the estimate are larger than first-order theory states, as the record is short.
 
-    Records of the estimated model were simulated and estimated again; their scatter is taken instead.
+    Records of the estimated model were simulated and estimated again; their estimates
+    scatter as stated here.
     """
     times = f"{factor:.3g} times for the plant, {of_noise:.3g} times for the noise"
     fact = f"{times}, by {runs} simulated records"
@@ -83,7 +82,7 @@ def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, n
     "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
 )
 def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Finding]:
-    """The initial state of a record was estimated too. It and output levels cost some accuracy.
+    """The initial state of a record was estimated too. To estimate it, and the levels, costs accuracy.
 
     Args:
         levels: whether the user gave the level of an output.
@@ -149,7 +148,12 @@ def band_limited(kind: FindingKind, model: Model, estimate: Estimate) -> list[Fi
     return kind.when(model.continuous and estimate.tests.failed, where="plant.sample")
 
 
-@finding(UNDECIDED, "no-accuracy-here", "Correct the spec, or take data with another estimate.", "unasked")
+@finding(
+    UNDECIDED,
+    "no-accuracy-here",
+    "Correct the spec, or take new data: nothing can be asked of this estimate.",
+    "unasked",
+)
 def unasked(kind: FindingKind, why: str) -> list[Finding]:
     """The requirement cannot be evaluated at the estimate. There is no error bound r_u, and no verdict."""
     return kind.when(why, f"there is no r_u: {why}")

@@ -18,7 +18,7 @@ from inputdesign_cli.explore import (
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.rivals import most_apart
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.response_chance import like_nothing
+from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
@@ -165,7 +165,7 @@ def _unrelated(kind: FindingKind, found: Found) -> list[Finding]:
 
     If both drift or wander, they may look alike by chance.
     """
-    idle = set(like_nothing(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
+    idle = set(perhaps_zero(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
     worse = {i for i, fit in enumerate(found.estimate.simulation.fit) if fit is not None and fit <= 0.0}
     idle |= {i for i in worse if not found.wanders[i]}
     names = [signal_name("y", i, found.model.outputs) for i in sorted(idle)]

@@ -133,7 +133,11 @@ def _still(estimate: Estimate, data: Record) -> dict[int, list[Frozen]]:
     return dict(sorted(found.items()))
 
 
-@finding(REFUTED, "level-shift", "Leave it out with `--without`, or record what changed as a further input.")
+@finding(
+    REFUTED,
+    "level-shift",
+    "Leave those rows out with `--without`, or record what changed as a further input.",
+)
 def shifted_levels(kind: FindingKind, estimate: Estimate, data: Record, time_unit: str) -> list[Finding]:
     """An output shifts without an input. A load or the gain may have changed."""
     if not estimate.tests.shifted or data.recorded is None:

@@ -14,7 +14,7 @@ _GAP = 0.03
 
 CONFIDENCE_MISSED = doubt(
     "confidence-missed",
-    "Too few experiments keep the admissible error. The share of simulated experiments within r_adm is "
+    "Too few experiments stay within the admissible error. The share of simulated runs within r_adm is "
     "below the exact confidence by more than chance.",
     "Ask for more `runs` in `confidence`, or for more samples.",
 )
@@ -76,7 +76,7 @@ def initial_estimate_off(kind: FindingKind, units: Units, inputs: Mapping[str, T
 
 @finding(NOTE, "runs-see-one-minimum", "Excite more frequencies, or fix known parameters (`plant.known`).")
 def one_minimum(kind: FindingKind, searched: Searched | None) -> list[Finding]:
-    """The runs examine one minimum only. The search of `identify` may end at another one."""
+    """The runs examine one minimum only. The search of `identify` may end at another minimum."""
     if searched is None:
         return []
     runs, elsewhere, rivals = searched.runs, searched.elsewhere, searched.rivals

@@ -9,7 +9,7 @@ from inputdesign_cli.explore import early_answers
 from inputdesign_cli.finding import REFUTED, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.response_chance import like_nothing, like_nothing_elsewhere
+from inputdesign_cli.identification.response_chance import perhaps_other_inputs, perhaps_zero
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
@@ -77,7 +77,7 @@ def idle(
         nominal, estimated: of one structure.
     """
     found = []
-    for j, zero, expected in like_nothing_elsewhere(nominal, estimated, estimate, units.step):
+    for j, zero, expected in perhaps_other_inputs(nominal, estimated, estimate, units.step):
         name = signal_name("u", j, units.inputs)
         fact = (
             f"{name} (probability {chance(zero)} for no effect), though the plant of the spec would respond"
@@ -89,7 +89,7 @@ def idle(
 def hardly_explained(units: Units, model: Model, estimate: Estimate) -> list[Finding]:
     """Return a finding for outputs that are farther from the simulation than from their mean."""
     far = {i for i, fit in enumerate(estimate.simulation.fit) if fit is not None and fit < 0.0}
-    unrelated = set(like_nothing(model, estimate, units.step)) if far else set()
+    unrelated = set(perhaps_zero(model, estimate, units.step)) if far else set()
     found = []
     for kind, idle_ in ((UNEXPLAINED, far & unrelated), (NOISE_PREVAILS, far - unrelated)):
         outputs = " and ".join(signal_name("y", i, len(estimate.noise)) for i in sorted(idle_))

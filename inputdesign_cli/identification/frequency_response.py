@@ -130,9 +130,11 @@ def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.in
 
 
 def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
-    """Return the output power at odd and even harmonics that one repeating input (N, 1) does not excite.
+    """Return the output power at the harmonics, odd and even, that a periodic input does not excite.
 
-    Empty where it does not repeat, or excites all of a kind.
+    Args:
+        u: one input (N, 1).
+        y: the outputs (N, p).
     """
     period = found_period(u[:, 0]) if u.shape[1] == 1 else 0
     if not period:

@@ -17,7 +17,7 @@ _ZERO = 1e-3
 _DEPENDENT, _LEFT = 1e-8, 1e-4
 
 
-def like_nothing_elsewhere(
+def perhaps_other_inputs(
     nominal: Model, estimated: Model, estimate: Estimate, step: float
 ) -> list[tuple[int, float, float]]:
     """Return the inputs whose column of G may be zero, with the probabilities of zero and of the nominal G.
@@ -27,20 +27,20 @@ def like_nothing_elsewhere(
     gradient, now, before = *_response(estimated, step), _response(nominal, step)[1]
     found = []
     for j in range(estimated.inputs):
-        zero = _chance(estimate, gradient[..., j], now[..., j], wholly=True)
-        expected = _chance(estimate, gradient[..., j], (now - before)[..., j], wholly=False)
+        zero = _chance(estimate, gradient[..., j], now[..., j], exactly=True)
+        expected = _chance(estimate, gradient[..., j], (now - before)[..., j], exactly=False)
         if zero is not None and zero >= _ZERO and expected is not None:
             found.append((j, zero, expected))
     return found
 
 
-def like_nothing(model: Model, estimate: Estimate, step: float = 1.0, *, inputs: bool = False) -> list[int]:
+def perhaps_zero(model: Model, estimate: Estimate, step: float = 1.0, *, inputs: bool = False) -> list[int]:
     """Return the outputs (from zero), or `inputs`, whose part of G may be zero, and is not known to be."""
     gradient, G = _response(model, step)
     found, axis = [], 3 if inputs else 2
     for number in range(gradient.shape[axis]):
         change = np.take(gradient, number, axis)
-        chance = _chance(estimate, change, np.take(G, number, axis - 1), wholly=True)
+        chance = _chance(estimate, change, np.take(G, number, axis - 1), exactly=True)
         if np.any(change) and chance is not None and chance > _ZERO:
             found.append(number)
     return found
@@ -54,12 +54,15 @@ def _response(model: Model, step: float) -> tuple[ComplexArray, ComplexArray]:
 
 
 def _chance(
-    estimate: Estimate, gradient: ComplexArray, difference: ComplexArray, *, wholly: bool
+    estimate: Estimate, gradient: ComplexArray, difference: ComplexArray, *, exactly: bool
 ) -> float | None:
     """Return the probability that a part of G differs by (n, p) from the estimate through chance alone.
 
-    The Wald statistic is the smallest step of the parameters that moves G there, as far as any step can, or
-    `wholly`. None if no step does, or something is infinite; the gradient (n, k, p) is of that part.
+    The Wald statistic is the smallest step of the parameters that moves G there, `exactly` or as
+    far as any step can. None if no step does, or something is infinite.
+
+    Args:
+        gradient: (n, k, p) of that part of G.
     """
     if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(difference))):
         return None
@@ -69,6 +72,6 @@ def _chance(
     _, sizes, right = np.linalg.svd(J, full_matrices=False)
     kept = sizes > _DEPENDENT * np.max(sizes, initial=0.0)
     along = right[kept] @ away
-    if wholly and np.linalg.norm(away - along @ right[kept]) > _LEFT * np.linalg.norm(away):
+    if exactly and np.linalg.norm(away - along @ right[kept]) > _LEFT * np.linalg.norm(away):
         return None
     return float(scipy.special.chdtrc(np.count_nonzero(kept), np.sum((along / sizes[kept]) ** 2)))

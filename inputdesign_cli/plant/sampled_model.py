@@ -114,7 +114,7 @@ class SampledModel(WhiteNoise):
             early, late = (states[:, own] @ entry.entries[: entry.order]).T
             drives.append(Drive(j, entry.lag, early, 0.0 * direct))
             drives.append(Drive(j, entry.direct_lag, late, direct))
-        return StateSpace.behind_past(
+        return StateSpace.of_delayed_inputs(
             scipy.linalg.block_diag(np.zeros((0, 0)), *blocks), C, drives, self.inputs
         )
 

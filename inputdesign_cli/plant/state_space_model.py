@@ -306,7 +306,7 @@ class StateSpaceModel(Parametrised):
         for j in range(self.inputs):
             drives.append(Drive(j, self.lag, early[:, j], np.zeros(self.outputs)))
             drives.append(Drive(j, self.direct_lag, late[:, j], m.D[:, j]))
-        return StateSpace.behind_past(A, m.C, drives, self.inputs)
+        return StateSpace.of_delayed_inputs(A, m.C, drives, self.inputs)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """Return the outputs (.., n, p) that u (.., n, r) and e (.., n, p) cause, each from rest."""

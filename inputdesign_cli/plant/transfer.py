@@ -142,8 +142,13 @@ class StateSpace(NamedTuple):
         return np.asarray(found)
 
     @classmethod
-    def behind_past(cls, A: Array, C: Array, drives: Sequence[Drive], inputs: int) -> StateSpace:
-        """Return a system whose states are the past of each input, then the states of A (n, n), C (q, n)."""
+    def of_delayed_inputs(cls, A: Array, C: Array, drives: Sequence[Drive], inputs: int) -> StateSpace:
+        """Return a system whose inputs act after lags: its states are their past, then those of A (n, n).
+
+        Args:
+            C: (q, n), the outputs by the states of A.
+            drives: which input acts after which lag, on which states.
+        """
         past = [max((one.lag for one in drives if one.input == j), default=0) for j in range(inputs)]
         first = np.concatenate([[0], np.cumsum(past)]).astype(int)
         own, size = slice(first[-1], None), first[-1] + len(A)

@@ -23,7 +23,7 @@ class HeldLines(LinesBasis):
 
     @classmethod
     def of(cls, hold: int, inputs: int) -> HeldLines:
-        """Return lines at free frequencies of values."""
+        """Return lines at free frequencies of held values."""
         free = LinesBasis.anywhere(0.0, np.pi, inputs)
         return cls(free.frequencies, free.directions, free.allowed, free.units, True, hold)
 
@@ -35,7 +35,7 @@ class HeldLines(LinesBasis):
         return w, np.abs(pulse) ** 2
 
     def folded(self, density: Density) -> Density:
-        """Return a density over the frequencies of samples as one over the frequencies of values."""
+        """Return a density over the frequencies of samples as one over the frequencies of held values."""
 
         def over_values(v: Array) -> NDArray:
             parts = []
@@ -54,7 +54,7 @@ class HeldLines(LinesBasis):
         return super().integrals(self.folded(density), singularities)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """Return `LinesBasis.price`, with densities folded to the frequencies of values."""
+        """Return `LinesBasis.price`, with densities folded to the frequencies of held values."""
         folded = [replace(one, density=self.folded(one.density)) for one in (price, value)]
         turned = np.mod(grid * self.hold, 2.0 * np.pi)
         over = np.unique(
@@ -63,5 +63,5 @@ class HeldLines(LinesBasis):
         return super().price(folded[0], folded[1], over)
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
-        """Return `LinesBasis.enlarge` with the price folded to the frequencies of values."""
+        """Return `LinesBasis.enlarge` with the price folded to the frequencies of held values."""
         return super().enlarge(face, y, directions, replace(price, density=self.folded(price.density)))

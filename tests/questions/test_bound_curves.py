@@ -9,7 +9,7 @@ import scipy.signal
 from inputdesign_cli import analyse, load_spec, parse_spec, solve
 from inputdesign_cli.figures.estimates import boundary
 from inputdesign_cli.outcome.text_formats import csv_text
-from inputdesign_cli.questions.common.bound import axis, distinct
+from inputdesign_cli.questions.common.bound_curves import axis, distinct
 from tests.support.pages import LOOP, SPEC
 
 SPECS = Path(__file__).parents[2] / "specs"

@@ -10,7 +10,7 @@ from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.other_systems import shared
 from inputdesign_cli.identification import identify as estimate
-from inputdesign_cli.identification.response_chance import like_nothing
+from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions import explore
 from inputdesign_cli.questions.building.system import build_model
@@ -211,7 +211,7 @@ def test_an_output_that_no_input_moves_is_told_from_one_that_some_moves(gain, sh
         u, e = rng.standard_normal((300, 2)), rng.standard_normal((300, 1))
         y = e + gain * scipy.signal.lfilter([0.0, 1.0], [1.0, -0.5], u[:, :1], axis=0)
         one = estimate(model, u, y)
-        found.append(like_nothing(model.at(one.theta, one.noise), one))
+        found.append(perhaps_zero(model.at(one.theta, one.noise), one))
     assert np.mean([len(each) for each in found]) == share
 
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.design.convex.candidate import least_scale
 from inputdesign_cli.design.convex.demands import Question, RequirementFactory
 from inputdesign_cli.design.convex.limits import implied_power
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.repair import least_scale
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.information import Experiment, jointly_whitened
 from inputdesign_cli.spectrum import LinesBasis, flat_basis

@@ -12,7 +12,6 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
-from inputdesign_cli.design.convex.candidate import excess, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.coordinates import balanced_powers, suited, white_power, whitened_problem
 from inputdesign_cli.design.convex.demands import Question
@@ -20,6 +19,7 @@ from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedErr
 from inputdesign_cli.design.convex.feasible import KEEPS, solve_limited
 from inputdesign_cli.design.convex.problem import Candidate, Problem
 from inputdesign_cli.design.convex.record_bound import RecordBound
+from inputdesign_cli.design.convex.repair import excess, scaled_up
 from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 

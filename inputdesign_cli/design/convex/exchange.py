@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, Round, report_progress
-from inputdesign_cli.design.convex.candidate import Place
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.repair import Place
 from inputdesign_cli.design.convex.state import State, first_state
 from inputdesign_cli.spectrum import Basis
 
@@ -128,7 +128,7 @@ def exchange(
             try:
                 solved = state.improve(asked)
             except OutOfTimeError as ended:
-                raise UnfinishedError.of(ended, _result(state.on(problem).tight(), rounds)) from None
+                raise UnfinishedError.of(ended, _result(state.on(problem).least_multiple(), rounds)) from None
             gaps.append(state.gap)
             report_progress(Round(rounds, state.best.objective, state.certificate.bound, len(state.cuts)))
             grows = state.problem.basis.size > stage.basis.size

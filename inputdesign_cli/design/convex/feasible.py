@@ -10,11 +10,11 @@ import numpy as np
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
-from inputdesign_cli.design.convex.candidate import Place, excess, least_scale, missing_floor, scaled_up
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError, exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.repair import Place, excess, least_scale, missing_floor, scaled_up
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.spectrum import Basis
 

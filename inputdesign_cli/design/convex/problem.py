@@ -44,7 +44,7 @@ from inputdesign_cli.information import (
 from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
 from inputdesign_cli.spectrum import Basis, Density, Functional, constant, kept_on_grid
 
-_RIPPLE = 16  # points of the grid a lag
+_RIPPLE = 16  # points of the grid per lag
 
 
 def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
@@ -83,9 +83,9 @@ class Gradients:
         known: list[NDArray] = []
 
         def density(w: Array) -> NDArray:
-            if w is grid and known:  # asked for again with every share that limits keep of a price
+            if w is grid and known:  # each price of the limits asks for it again
                 return known[0]
-            total = self.worthless(w)
+            total = self.zero_density(w)
             for number in weighty:
                 total = total + self._worth(number, weights[number], w, on_grid=w is grid)
             if w is grid:
@@ -94,7 +94,7 @@ class Gradients:
 
         return density
 
-    def worthless(self, w: Array) -> NDArray:
+    def zero_density(self, w: Array) -> NDArray:
         """Return zero at every frequency of `w` (n,): (n,), or (n, r, r) for several inputs."""
         r = self.experiments[0].inputs
         return np.zeros((np.size(w), *(() if r == 1 else (r, r))))
@@ -146,8 +146,8 @@ class Problem:
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
     they can be met. `finer` is a problem of the same experiment on the same or a larger basis; the
-    integrals of this basis are the first ones of its integrals. `seen` are the demands of a like problem,
-    reused if both have the same requirements and plants.
+    integrals of this basis are the first ones of its integrals. `seen` are the demands of an earlier
+    problem, reused if both have the same requirements and plants.
     """
 
     experiment: Experiment
@@ -164,14 +164,15 @@ class Problem:
     polytope: LagPolytope | None = field(default=None, repr=False)
     finer: Problem | None = field(default=None, repr=False)
     seen: Demands | None = field(default=None, repr=False)
-    _before: list[Problem] = field(default_factory=list, init=False, repr=False)
-    _elsewhere: list[Problem] = field(default_factory=list, init=False, repr=False)
+    # The problem on a part of this basis, and the one on another basis, if there is one.
+    _smaller: list[Problem] = field(default_factory=list, init=False, repr=False)
+    _on_other_basis: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
     def demands(self) -> Demands:
         """Return the requirements at all S plants, the nominal one first."""
-        if self._before:  # with what has been seen of them
-            return self._before[0].demands
+        if self._smaller:  # with what has been seen of them
+            return self._smaller[0].demands
         asked = Scenario(self.experiment, self.requirements, self.side)
         if self.seen is not None and self.seen.are_of(asked, self.others):
             return self.seen
@@ -185,8 +186,8 @@ class Problem:
     @cached_property
     def gradients(self) -> Gradients:
         """Return the gradients of all plants at frequencies."""
-        if self._before:
-            return self._before[0].gradients
+        if self._smaller:
+            return self._smaller[0].gradients
         return Gradients(tuple(scenario.experiment for scenario in self.scenarios))
 
     def with_requirements(self, of: Callable[[Scenario], tuple[Requirement, ...]]) -> Problem:
@@ -198,28 +199,28 @@ class Problem:
         """Return the problem on another basis, for example one that has grown out of this one."""
         if basis is self.basis:
             return self
-        if not self._elsewhere or self._elsewhere[0].basis is not basis:
-            self._elsewhere[:] = [replace(self, basis=basis, finer=None)]
-        return self._elsewhere[0]
+        if not self._on_other_basis or self._on_other_basis[0].basis is not basis:
+            self._on_other_basis[:] = [replace(self, basis=basis, finer=None)]
+        return self._on_other_basis[0]
 
     def grown(self, basis: Basis) -> Problem:
         """Return the problem on a basis that begins with this one, and keep the integrals computed so far."""
         grown = replace(self, basis=basis, finer=None)
-        grown._before.append(self)
+        grown._smaller.append(self)
         _ = grown.demands, grown.gradients, grown.information_maps
         for key in self._powers:
             grown.power(*key)
         for plants in self._costs:
             grown._cost_of(plants)
-        grown._before.clear()
+        grown._smaller.clear()
         return grown
 
     def _along(self, known: Callable[[Problem], Array], integrals: Callable[[Basis], Array]) -> NDArray:
         """Return integrals of all basis functions, from a finer problem or by adding to known ones."""
         if self.finer is not None:
             return known(self.finer)[: self.basis.size]
-        if self._before:
-            before = known(self._before[0])
+        if self._smaller:
+            before = known(self._smaller[0])
             return np.concatenate([before, integrals(self.basis.beyond(len(before)))])
         return integrals(self.basis)
 
@@ -339,7 +340,7 @@ class Problem:
         if known is not None:
             return known
         plants, weights = [self.scenarios[n].experiment for n in scenarios], weights_of(self.cost)
-        before = self._before[0]._costs.get(scenarios) if self._before else None
+        before = self._smaller[0]._costs.get(scenarios) if self._smaller else None
         # Grown problems ask on the grid of the one before.
         density = kept_on_grid(lambda w: mean_cost(plants, weights, w)) if before is None else before.density
         near = np.concatenate([plant.singularities for plant in plants])
@@ -402,7 +403,7 @@ class Problem:
     def density_at(self, place: DensityPlace) -> Functional:
         """Return v^* Phi v at one frequency as a functional; it has no density over frequency."""
         vector = self.basis.directed(place.frequency, place.direction)
-        return Functional(vector, self.gradients.worthless, concentrated=True)
+        return Functional(vector, self.gradients.zero_density, concentrated=True)
 
     def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
         """Return local maxima of Phi over its limits times s (once for fixed ones), if above `above`."""
@@ -438,7 +439,7 @@ class Problem:
         return found.reshape(len(found), -1, inputs, inputs)
 
     def with_form_grid(self, grid: Array) -> Array:
-        """Return the grid with frequencies that see every ripple of forms of the lags."""
+        """Return the grid with frequencies dense enough for polynomials of this many lags."""
         assert self.polytope is not None
         if self._form_grids.get(grid.size) is None:
             ripples = np.linspace(grid[0], grid[-1], _RIPPLE * self.polytope.windows.length)
@@ -462,7 +463,7 @@ class Problem:
 
     @cached_property
     def _fine_grid(self) -> Array:
-        """Return an even grid, denser at the ends of the band: sixteen points a degree."""
+        """Return an even grid, denser at the ends of the band: sixteen points per degree."""
         lo, hi = self.experiment.band
         even = np.linspace(0.0, 1.0, 16 * (self.basis.degree + 1))
         return lo + (hi - lo) * np.union1d(even, 0.5 - 0.5 * np.cos(np.pi * even))

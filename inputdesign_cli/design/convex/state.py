@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, Violation
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.candidate import Place, least_scale, mixed, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.limits import DensityBreach, DensityPlace
 from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
 from inputdesign_cli.design.convex.problem import Candidate, Problem
+from inputdesign_cli.design.convex.repair import Place, least_scale, mixed, scaled_up
 from inputdesign_cli.spectrum import Face, first_directions
 
 # A far-off iterate is not worth repairing: its upper bound would say nothing.
@@ -33,7 +33,10 @@ _MOST_ROWS = 12
 
 @dataclass
 class State:
-    """Holds the state of the method: face, cuts and rows of the finite program, the best design and proof."""
+    """Holds the state of the method: the finite program, and the best design and proof so far.
+
+    The finite program has a face of the cone of spectra, cuts of the requirements, and rows of the limits.
+    """
 
     problem: Problem
     face: Face
@@ -83,9 +86,9 @@ class State:
         if proved.bound > self.certificate.bound:
             self.certificate = proved
             self.active = _active(self.keys, answer.proof)
-        if moves:  # else cuts that hold without weight (a degenerate optimum) would come and go for ever
+        if moves:  # else cuts with multiplier zero (a degenerate optimum) would come and go for ever
             self._prune(answer.proof)
-        tried = self._definite(answer.z, answer.s)
+        tried = self._informative(answer.z, answer.s)
         z, s = tried.z, tried.s
         found, breaches = self._misses(tried)
         worst = max([v.ratio for _, v in found] + [b.ratio for b in breaches], default=1.0)
@@ -133,7 +136,7 @@ class State:
         self.cuts = [self.cuts[i] for i in kept]
         self.proof = replace(proof, cuts=tuple(proof.cuts[i] for i in kept))
 
-    def _definite(self, z: Array, s: float) -> Candidate:
+    def _informative(self, z: Array, s: float) -> Candidate:
         """Return (z, s), or halfway to the best design when z leaves some parameter without information."""
         tried = self.problem.candidate(z, s)
         if not self.problem.demands.definite:
@@ -163,7 +166,7 @@ class State:
         z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
         return replace(self, problem=problem, best=problem.candidate(z, self.best.s))
 
-    def tight(self) -> State:
+    def least_multiple(self) -> State:
         """Return the state with the least s for its best design, which has room to spare if interior."""
         if self.problem.goal != "factor":
             return self

@@ -39,7 +39,7 @@ from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.common.bound import Informed
+from inputdesign_cli.questions.common.bound_curves import Informed
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.records import Preparation, Record
 from inputdesign_cli.specification import is_prior

@@ -137,7 +137,7 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
 
 
 def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
-    """Return the largest ratio of error to promised accuracy at each scenario; the nominal one first."""
+    """Return the largest ratio of the error to the admissible one at each scenario, the nominal first."""
     return _worst(problem, design, delivered(problem, design, samples))
 
 

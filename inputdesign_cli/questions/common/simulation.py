@@ -30,7 +30,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Loop, close_loop
-from inputdesign_cli.questions.common.bound import Informed
+from inputdesign_cli.questions.common.bound_curves import Informed
 from inputdesign_cli.questions.common.delivery import Delivered, with_study
 from inputdesign_cli.signal.kinds import kind_of
 

@@ -20,7 +20,7 @@ from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.outcome import Signal
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Header
-from inputdesign_cli.questions.common.bound import Informed, Pairs
+from inputdesign_cli.questions.common.bound_curves import Informed, Pairs
 from inputdesign_cli.questions.common.delivery import Delivered, adding
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.record import RecordRequest

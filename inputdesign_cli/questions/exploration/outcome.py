@@ -11,7 +11,7 @@ from inputdesign_cli.explore import Candidate, Fits, Found
 from inputdesign_cli.findings.explored_logs import open_parameters
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.nonlinearity import SilentLines
-from inputdesign_cli.identification.response_chance import like_nothing
+from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import Curves, OrderCurves
 from inputdesign_cli.outcome.estimate import (
@@ -121,7 +121,7 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
             "model must then be right, and without a reference that moves the plant may not be "
             "identifiable: add a reference or dither, and write experiment.controller"
         )
-    for j in like_nothing(found.model, found.estimate, inputs=True) if inputs > 1 else ():
+    for j in perhaps_zero(found.model, found.estimate, inputs=True) if inputs > 1 else ():
         yield (
             f"u{j + 1} has no effect on the outputs that differs from none: its delays and parameters say "
             "nothing"

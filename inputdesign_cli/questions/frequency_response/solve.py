@@ -39,7 +39,7 @@ from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common import delivery
-from inputdesign_cli.questions.common.bound import hermitian_columns
+from inputdesign_cli.questions.common.bound_curves import hermitian_columns
 from inputdesign_cli.questions.common.infeasible import contradictory, named
 from inputdesign_cli.questions.common.record import RecordRequest, no_record
 from inputdesign_cli.questions.common.signal_outcome import signal_of, with_record

@@ -24,7 +24,7 @@ from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectr
 from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.bound import Informed, spectrum_curves
+from inputdesign_cli.questions.common.bound_curves import Informed, spectrum_curves
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
 from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, redrawn

@@ -20,7 +20,7 @@ from inputdesign_cli.findings import designs
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
-from inputdesign_cli.questions.common.bound import described_spectrum, distinct
+from inputdesign_cli.questions.common.bound_curves import described_spectrum, distinct
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.delivery import KINDS
 from inputdesign_cli.questions.common.robust import Plants, delivered

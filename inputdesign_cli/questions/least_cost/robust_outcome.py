@@ -29,7 +29,7 @@ from inputdesign_cli.outcome import robust as parts
 from inputdesign_cli.outcome.curves import Curves, FanCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.bound import axis
+from inputdesign_cli.questions.common.bound_curves import axis
 from inputdesign_cli.questions.common.robust import (
     CONFIDENCE,
     MET,

@@ -21,7 +21,7 @@ from inputdesign_cli.outcome import Outcome, White
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.design import white_labels
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.questions.common.bound import (
+from inputdesign_cli.questions.common.bound_curves import (
     Informed,
     equal_white,
     optimality_curves,
@@ -46,6 +46,7 @@ from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcom
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.questions.least_cost.sought import Sought
+from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.selection import Record
 
 _GAINED = 1.001  # a bound over records this much above that of the power has gained nothing
@@ -215,11 +216,12 @@ class ConvexTask(SpectrumTask):
         limited = any(limit.upper for limit in problem.limits) or bool(shares)
         held = limited or request.bounds.hard or request.settings.level is not None
         asked = request.samples or done.experiment.samples
+        shaped = record.method == "given" or not kind_of(record.method).flat
         findings = [
             *([] if coverage is None else confidence_missed(coverage, signal.confidence)),
             *made.findings,
             *of_records.accuracy_missed(record, held=held),
-            *of_records.length_of_record(record, asked, block, shares),
+            *of_records.length_of_record(record, asked, block, shares, shaped=shaped),
         ]
         if known is not None:
             cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)

@@ -32,7 +32,7 @@ from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInpu
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
 from inputdesign_cli.questions.common import delivery
-from inputdesign_cli.questions.common.bound import hermitian_columns
+from inputdesign_cli.questions.common.bound_curves import hermitian_columns
 from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
 from inputdesign_cli.signal.limits import Bounds
 from inputdesign_cli.signal.lines import Lines, grid_lines
