@@ -168,6 +168,9 @@ def test_the_output_is_that_of_the_plant_from_rest_with_noise_about_it(more, noi
     assert csv_text(table).startswith("time_s,y1,y1_noise_deviation")
     np.testing.assert_allclose(table.columns["y1"], scipy.signal.lfilter([0, 1], [1, -pole], u), atol=1e-12)
     deviation = table.columns["y1_noise_deviation"]
+    if more:  # u = r - C y, of the noise too
+        np.testing.assert_allclose(table.columns["u1"], u - 0.1 * table.columns["y1"], atol=1e-12)
+        np.testing.assert_allclose(table.columns["u1_noise_deviation"], 0.1 * deviation, rtol=1e-12)
     last = deviation[-1:] if rtol > 0.01 else deviation
     np.testing.assert_allclose(last, np.broadcast_to(expected, last.shape), rtol=rtol)
 

@@ -108,7 +108,7 @@ def with_record(
     }
     around, panels = request.operating_points, _predicted(request, experiment, record)
     predicted = {units.time_header: time}
-    for panel in panels:
+    for panel in sorted(panels, key=lambda panel: panel.applied):  # outputs stand first in the table
         name = panel.name
         predicted |= {units.header(name): panel.values, f"{name}_noise_deviation": panel.deviation}
     moves, rate = {}, request.bounds.rate
