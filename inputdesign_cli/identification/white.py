@@ -202,9 +202,11 @@ class White:
     @cached_property
     def spread(self) -> Array:
         """Return the matrix (k, (N + M) p) that maps residuals to parameters if starts are unknown."""
-        scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
-        inverse = np.linalg.pinv(self.explained / scale, rcond=1e-12) / scale[:, None]
-        return np.asarray(inverse[len(inverse) - len(self.echoes) :])
+        scale = np.linalg.norm(self.explained, axis=0)
+        inverse = np.linalg.pinv(self.explained / np.where(scale > 0.0, scale, 1.0), rcond=1e-12)
+        # A parameter at its limit follows nothing, by rounding neither.
+        inverse = np.divide(inverse, scale[:, None], out=np.zeros_like(inverse), where=scale[:, None] > 0.0)
+        return inverse[len(inverse) - len(self.echoes) :]
 
     def _correlations(self, directions: Array) -> Array:
         """Return sum over t and directions of D(t) D(t - lag)^T within the records, (lags, p, p)."""

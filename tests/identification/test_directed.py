@@ -11,6 +11,7 @@ import scipy.stats
 
 from inputdesign_cli.identification import Moves, identify, that_matter
 from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
 from inputdesign_cli.plant import SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
@@ -272,6 +273,22 @@ def test_actuators_that_are_not_linear_are_found(names, distort):
     found = estimated(u, through(distort(u)))
     failing = {one.test.name for one in varying(found).values() if one.test in found.tests.failed}
     assert names <= failing
+
+
+def test_nothing_follows_through_a_parameter_at_its_limit():
+    """Its column is zero: divided by its norm, rounding errors became steps of 1e283."""
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((60, 12))
+    columns[:, 7] = 0.0
+    basis = np.linalg.qr(columns)[0]
+    parts = np.eye(1), (60,), rng.standard_normal(60), 1.0, np.zeros((60, 0)), columns, basis
+    found = White(*parts, np.zeros((12, 1, 1, 1))).spread
+    others = np.arange(12) != 7
+    y = rng.standard_normal(60)
+    np.testing.assert_allclose(
+        (found @ y)[others], np.linalg.lstsq(columns[:, others], y, rcond=None)[0], atol=1e-10
+    )
+    assert not np.any(found[7])
 
 
 @pytest.mark.parametrize(
