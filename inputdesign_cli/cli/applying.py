@@ -28,7 +28,8 @@ def instructions(results: Results, spec: str) -> list[str]:
     )
     inputs, outputs = [f"u{name[1:]}" for name in applied], [name for name in caused if name[0] == "y"]
     in_loop, around = applied[0].startswith("r"), signal.operating_point
-    logged, step = ["time", *inputs, *outputs], f"{signal.sample_time:g} {results.time_unit}"
+    logged = ["time", *(applied if in_loop else []), *inputs, *outputs]
+    step = f"{signal.sample_time:g} {results.time_unit}"
     where = "" if around is None else " at the operating point"
     how = " as r in u = r - C y (C y counted from rest; r is no position of the actuator)" if in_loop else ""
     said = [
@@ -39,8 +40,8 @@ def instructions(results: Results, spec: str) -> list[str]:
     if in_loop:
         has = f"has the level {levels} of the input in it" if levels else "has no level"
         said.append(
-            f"r in signal.csv {has}: while y rests, u = r. Log u as it is, level included; r need not be "
-            "logged, and where it is, it is logged as applied: its level does not matter to assess."
+            f"r in signal.csv {has}: while y rests, u = r. Log u as it is, level included, and r as applied: "
+            "its level does not matter to assess."
         )
     judge = f"Then: idesign assess {shlex.quote(spec)} log.csv"
     if around is not None:

@@ -48,8 +48,8 @@ def wizard(
         hint = "choose another name for the spec with -o"
         raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
     refuse_existing(output, overwrite)
-    said = read_answers(answers, [*([f"plant={sentence}"] if sentence else []), *(given or [])])
-    brief = spread(said)
+    said = read_answers(answers, given or [])
+    brief = spread(said, sentence or None)
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     draft = None
     if (brief or needed_of(said.texts)) and (terminal or answers is None):

@@ -91,7 +91,7 @@ def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Find
         return []
     remedy = kind.remedy
     if levels:
-        remedy = "If the plant was at rest before, it was at other levels than --operating-point gives."
+        remedy = "The record does not begin at rest at the levels of --operating-point."
     if not estimate.start.rest_refuted:
         return [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))

@@ -85,7 +85,9 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         found = [one for one in against if one.code == DRIFT.code]
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
-    if command == _NEXT[DRIFT.code] and estimate is not None and _drifts(estimate):
+    drifts = command == _NEXT[DRIFT.code] and estimate is not None
+    # What integrates may leak, which looks like a drift.
+    if drifts and estimate is not None and (_drifts(estimate) or _integrates(estimate)):
         command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed

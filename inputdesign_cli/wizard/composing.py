@@ -131,7 +131,10 @@ def compose(
     rate, output = limited(said["limits"], plant)
     made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
-    heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values())), *_own_controller(plant, control)]
+    heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values()))]
+    heard += _own_controller(plant, control) if said["loop"].lower() == "as the plant" else []
+    if hold > 1 and control is not None:
+        heard.append("under a controller r keeps its values, and the actuator still moves at every sample")
     facts = {
         "said": said,
         "plant": plant,

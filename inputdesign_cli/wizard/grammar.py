@@ -19,7 +19,7 @@ ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 PLUS_MINUS = r"(?:plus(?:/| or | )minus|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
 _UNIT = r"(?:[^\s,;|.:]|[.:](?=[^\s|]))"  # a letter of it
-_NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak"
+_NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak|may|can|must"
 UNIT = rf"(?:\s*(?!(?:{_NO_UNIT})\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
 ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly)\b\.?|~|≈)"
@@ -62,6 +62,9 @@ _FALLS = re.compile(
 _SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
+_SETTING = rf"{OF}{NUMBER}(?:\s*(?:ms|s|sec|min|h)\b)?"
+SETTINGS = rf"(?:PID?\s+)?Kp{_SETTING}(?:(?:\s*,\s*|\s+and\s+|\s+)T[id]{_SETTING})*"
+"""Settings of a controller, as in "Kp 1, Ti 60 s"."""
 SIGNAL = "(?:level|temperature|speed|pressure|flow|position|concentration|output|sensor|measurement)"
 DRIVE = (
     "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"

@@ -24,6 +24,7 @@ from inputdesign_cli.wizard.grammar import ABOUT, SIGNAL, VAGUE, Phrase, needed,
 from inputdesign_cli.wizard.questions import bad_answer, file_of, in_their_words, package_data
 
 if TYPE_CHECKING:
+    from inputdesign_cli.questions.building.controllers import Process
     from inputdesign_cli.questions.exploration.explore import Exploration
     from inputdesign_cli.records.sheet import Sheet
 
@@ -41,6 +42,7 @@ QUANTITIES = {
 NO_DELAY = r"\b(?:no|without|hardly any|negligible)\s+(?:dead time|delay)\b"
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
 _SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
+_HARDLY = 0.05  # of the time constant: as good as no dead time
 _NEARLY = 2.0  # points of fit that a model may lose which rules of tuning know
 _LEAST_ROWS = 10  # of a step response
 _LONGER = 2.0  # a time constant of more records than this is none
@@ -66,7 +68,7 @@ class PlantAnswer:
     sampling: float | None = None  # time_unit between samples, where that is known already
     why_sampling: str = "as the plant is sampled"  # the reason for these
     tunable: bool = False  # whether rules of tuning know it
-    undelayed: bool = False  # one lag without a dead time, whose loop these would make as fast as it can be
+    undelayed: bool = False  # one lag with hardly a dead time, whose loop these would make as fast as can be
     channels: int = 1  # the larger number of its inputs and outputs
     explored: Spec | None = None  # the model of a log, which has its noise
     called: Mapping[str, str] = field(default_factory=dict)  # names of channels in a log
@@ -166,7 +168,8 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         sampling=None if sampled is None else needed(sampled, "plant", "the sample time"),
         why_sampling="as you said",
         tunable=True,
-        undelayed="gain" in values and "dead_time" not in values,
+        undelayed="gain" in values
+        and values.get("dead_time", 0.0) <= _HARDLY * values.get("time_constant", 0.0),
         heard=tuple(heard),
         units=(gain.size, gain.base),
     )
@@ -358,25 +361,28 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         why = "; ".join(found.reasons) or "no model deserves trust"
         raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
 
-    spec, tunable = _read(found, name)
+    spec, process = _read(found, name)
     assert spec.plant.kind != "regression"
     channels, heard = max(spec.plant.inputs, spec.plant.outputs), ""
-    if channels == 1 and not tunable:
+    if channels == 1 and process is None:
         simple = questions.explore([path], named, structure="fopdt")
         fits = [
             one.results.result.get("validation", {}).get("simulation_fit_percent") for one in (simple, found)
         ]
         if "model.yaml" in simple.results.files and not simple.reasons and fits[0] >= fits[1] - _NEARLY:
-            found, (spec, tunable) = simple, _read(simple, name)
+            found, (spec, process) = simple, _read(simple, name)
             heard = f"another structure fits {path.name} a little better than gain, lag and dead time do"
     text = found.results.files["model.yaml"].decode()
+    lag = None if process is None else process.time_constant
+    late = 0.0 if process is None else process.dead_time - 0.5 * spec.sample_time  # that is the converter's
     return PlantAnswer(
         (f"include: [{name}]  # the plant, explored in {path.name}",),
-        20.0 * spec.sample_time,
+        lag or 20.0 * spec.sample_time,
         files={name: _NOISE_BLOCK.sub("", text).encode()},  # that stands in the spec
         covariance=name if channels == 1 else None,
         sampling=spec.sample_time,
-        tunable=tunable,
+        tunable=process is not None,
+        undelayed=lag is not None and late <= _HARDLY * lag,
         channels=channels,
         explored=spec,
         called={channel: header for channel, header in columns.items() if channel != "time"},
@@ -387,13 +393,12 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     )
 
 
-def _read(found: Exploration, name: str) -> tuple[Spec, bool]:
-    """Return the model of an exploration as a spec, and whether rules of tuning know its plant."""
+def _read(found: Exploration, name: str) -> tuple[Spec, Process | None]:
+    """Return the model of an exploration as a spec, and its plant if rules of tuning know it."""
     from inputdesign_cli.questions.building.controllers import process_of
 
     spec = parse_spec(found.results.files["model.yaml"].decode(), name, design=False)
     try:
-        process_of(spec)
+        return spec, process_of(spec)
     except SpecError:
-        return spec, False
-    return spec, True
+        return spec, None

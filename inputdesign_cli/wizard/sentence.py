@@ -13,7 +13,7 @@ from inputdesign_cli.wizard import grammar, plants, wishes
 from inputdesign_cli.wizard.grammar import NONLINEAR, check_numbers, in_figures, not_linear, orders, unread
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
-_TURNS = ("wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
+_TURNS = ("loop", "wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
 """The questions that a sentence may answer, in the order in which their pieces are taken out of it."""
 _PLANT = "|".join(f"<{kind}: {words}>" for words, kind in plants.QUANTITIES.values())
 # <NUMBER> and the like in a pattern of a piece.
@@ -26,6 +26,12 @@ _NEGATION = re.compile(r"\b(?:not?|never|without|except|unless|neither|nor|but)\
 _SIZED = re.compile(
     r"\b(?:dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
     r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month)s?|half|twice|doubled?|peak\S*)\b",
+    re.I,
+)
+# The size of a device says nothing of its dynamics.
+_RATED = re.compile(
+    r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
+    r"(?:motor|drive|heater|pump|fan|supply|tank|boiler|radiator)\b",
     re.I,
 )
 _OTHER_LAWS = re.compile(r"\b(?:PD|P|I|LQG?|MPC)[- ](?:loop|controller|control|regulator)\b")
@@ -73,8 +79,8 @@ def _expanded(pattern: str) -> str:
     return pattern
 
 
-def in_sentence(text: str) -> Heard:
-    """Return the answers by question, or none if the text answers a single question at most.
+def in_sentence(text: str, least: int = 2) -> Heard:
+    """Return the answers by question, or none if the text answers fewer questions than `least`.
 
     Raises:
         SpecError: `bad-answer` for what answers no question, where it has a number, a negation or a verb.
@@ -90,7 +96,7 @@ def in_sentence(text: str) -> Heard:
                 said = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
                 found.setdefault(key, []).append((piece.start(), said.strip(" ,.")))
                 left = left[: piece.start()] + _taken(piece) + left[piece.end() :]
-    if len(found) < 2:
+    if len(found) < least:
         return Heard({})
     beside = [part for clause in _ENDS.split(left) for part in _left_over(clause)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
@@ -119,22 +125,31 @@ def _left_over(clause: str) -> list[str]:
     unsized = next((sized[0] for part in parts if (sized := _SIZED.search(part))), None)
     if unsized:
         raise bad_answer("plant", f'"{unsized}" has no number that is understood, as in "dead time 3 min"')
-    wrong = next((part for part in parts if re.search(r"\d", part) or _NEGATION.search(part)), None)
+    rest = [_RATED.sub("", part) for part in parts]
+    wrong = next((part for part in rest if re.search(r"\d", part) or _NEGATION.search(part)), None)
     if wrong or not understood:
         raise bad_answer("plant", f'"{wrong or clause.strip()}" is not understood')
     return [_BARE.sub("", part) for part in parts]
 
 
-def spread(answers: Answers) -> bool:
-    """Put the answers of a sentence in the place of the plant; return whether there is one.
+def spread(answers: Answers, sentence: str | None = None) -> bool:
+    """Add what a sentence says to answers, of which none is replaced; return whether it says anything.
+
+    Without a sentence the answer on the plant may be one.
 
     Raises:
-        SpecError: `bad-answer` as `in_sentence`.
+        SpecError: `bad-answer` as `in_sentence`, or for a sentence that says nothing beside a plant.
     """
+    known = sentence is not None and "plant" in answers.texts
     with answers.located():
-        heard = in_sentence(answers.texts.get("plant", ""))
+        heard = in_sentence(sentence or answers.texts.get("plant", ""), least=1 if known else 2)
+    if sentence is not None and not heard.answers:
+        if known:
+            raise bad_answer("wish", f'"{sentence}" is not understood')
+        answers.texts["plant"] = sentence
     if heard.answers:
-        del answers.texts["plant"]
+        if sentence is None:
+            del answers.texts["plant"]
         answers.remarks.extend(heard.remarks)
     for key, text in heard.answers.items():
         if answers.texts.setdefault(key, text) is text and "plant" in answers.places:

@@ -221,7 +221,7 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
     tuned = settings is None and plant.tunable
     if tuned and derivative and plant.undelayed:
         raise bad_answer(
-            "wish", "the rule for a PID needs a dead time, and this plant has none: a PI will do"
+            "wish", "the rule for a PID needs a dead time, and this plant has hardly one: a PI will do"
         )
     fast = tuned and not derivative
     speed = said.after(r"(?:closed[- ]loop )?time constant|tau_c", "time") if fast else None
@@ -233,7 +233,7 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
         if derivative:
             rule, named = "{amigo: {type: pid}}", "Astrom and Hagglund"
         elif speed is not None or plant.undelayed:
-            how = f"{_FASTER:g} times as fast as the plant, for it has no dead time"
+            how = f"{_FASTER:g} times as fast as the plant, for it has hardly a dead time"
             named = f"Skogestad, {how if speed is None else 'as fast as you said'}"
             speed = plant.slow / _FASTER if speed is None else needed(speed, "wish", "tau_c")
             rule = f"{{simc: {{tau_c: {short(speed)}}}}}"

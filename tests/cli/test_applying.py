@@ -31,8 +31,8 @@ def words(applied, caused, point=None):
         (words(["u1"], ["y1"]), ("idesign assess spec.yaml log.csv",)),
         # A reference is no position of the actuator.
         (words(["r1"], ["u1", "y1"], [40.0]),
-         ("has the level 40 of the input in it: while y rests, u = r", "need not be logged",
-          "u = r - C y", "no position of the actuator", "log time, u1 and y1 ",
+         ("has the level 40 of the input in it: while y rests, u = r",
+          "u = r - C y", "no position of the actuator", "log time, r1, u1 and y1 ",
           "--operating-point u1=40,y1=REST")),
     ],
 )  # fmt: skip

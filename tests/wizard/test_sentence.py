@@ -254,6 +254,57 @@ def test_signs_shares_and_units_are_kept(part, instead, facts, tmp_path):
         assert draft.spec().uncertainty.intervals["gain"] == pytest.approx((1.3, 1.7))
 
 
+@pytest.mark.parametrize(
+    "running",
+    [
+        "A level controller already runs with Kp 0.8, Ti 200 s",
+        "a PI controller (Kp 0.8, Ti 200 s) is running",
+        "it runs under a PI controller with Kp 0.8 and Ti 200 s",
+        "the existing PI has Kp 0.8, Ti 200 s",
+    ],
+)
+def test_a_controller_that_runs_is_that_of_the_experiment(running, tmp_path):
+    """It was taken for the one that is asked for, and the experiment got a default."""
+    text = f"level integrates 0.02 cm/s per %, dead time 10 s. {running}. PI loop with a safe margin, "
+    text += "valve 50 +- 10 %, noise 0.15 cm white, 1 h"
+    spec = written(text, tmp_path)[0].spec()
+    assert (spec.experiment.controller.pid.Kp, spec.experiment.controller.pid.Ti) == (0.8, 200.0)
+    assert spec.accuracy.loop.tuning is not None
+
+
+@pytest.mark.parametrize(
+    ("part", "where", "value"),
+    [
+        ("we get one hour", "limits.duration", 3600.0),
+        ("the valve must not move more often than every 30 s", "signal.hold", 30.0),
+        ("the output may deviate 3 degC at most", "limits.amplitude.output", 3.0),
+        ("the level must not move by more than 3 degC", "limits.amplitude.output", 3.0),
+        ("operating point 45 %, may go 35 to 55 %", "signal.offset", 45.0),
+    ],
+)
+def test_limits_are_understood_as_they_are_said(part, where, value, tmp_path):
+    """The rating of a device is said back; it asks for nothing."""
+    spoken = "PI loop with a safe margin, gain 2 degC/%, time constant 180 s, dead time 25 s, noise 0.1 degC"
+    parts = [spoken.replace("PI loop", "PI loop for a 2 kW heater"), part]
+    spec = written(", ".join([*parts, *["valve 50 +- 10 %"] * ("go" not in part)]), tmp_path)[0].spec()
+    there = spec
+    for name in where.split("."):
+        there = getattr(there, name)
+    if where == "signal.hold":
+        there *= spec.sample_time
+    assert float(np.max(there)) == pytest.approx(value)
+
+
+def test_a_sentence_stands_beside_answers(tmp_path):
+    """The plant of an answer stays; the sentence says the rest, which was dropped before."""
+    answers = read_answers(None, ["plant=gain 2, time constant 180 s, dead time 25 s"])
+    assert spread(answers, "PI loop with a safe margin")
+    assert answers.texts["plant"].startswith("gain 2")
+    assert "wish" in answers.texts
+    with pytest.raises(SpecError):
+        spread(read_answers(None, ["plant=heater"]), "something else")
+
+
 def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     talk = Conversation({}, "x", tmp_path)
     assert talk.answer(EXCHANGER.replace("valve 45 +- 8 %, ", "")) is None

@@ -435,10 +435,10 @@ ESTIMATES = {"scenarios": 32, "estimates": {"draws": 100, "confidence": 0.95, "l
          ["at 30 others", "at the worst one that a search found (gain 1.4, dead_time 17.5)"], []),
         # Limits are promised for the plants that were tried.
         ({"scenarios": 30, "fresh": FRESH | {"beyond_limits": {"draws": 51, "largest": 1.05}}},
-         ["within your limits at the plant as you stated it and at 30 others",
+         ["within your limits at the plant of the spec and at 30 others",
           "at 51 of 200 more they go beyond, up to 105 % of a limit"], []),
         ({"scenarios": 30, "fresh": FRESH | {"beyond_limits": {"draws": 0, "largest": 0.98}}},
-         ["within your limits at the plant as you stated it and at 30 others",
+         ["within your limits at the plant of the spec and at 30 others",
           "and at 200 more; noise comes on top of that"], []),
     ],
 )  # fmt: skip
