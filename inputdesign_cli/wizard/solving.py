@@ -19,7 +19,7 @@ from inputdesign_cli.wizard.composing import LEAST, Solve
 
 _MOST_OF = 0.99  # of a limit, which then binds
 _LIMITS = {"rate": "the rate", "amplitude.output": "the output"}
-_ROOM, _TRIES = 1.1, 6
+_ROOM, _TRIES = 1.1, 3
 _LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
 
