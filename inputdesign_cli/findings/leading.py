@@ -9,11 +9,13 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
 from inputdesign_cli.finding import Finding, undecided
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.findings.refuted_structure import DRIFT
 from inputdesign_cli.identification import Estimate
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.plant.model import SampledPlant
 
@@ -58,6 +60,7 @@ _NEXT = {
 """The command after each finding that leaves a verdict open; an earlier one silences the later ones."""
 _DETREND = _AGAIN + "--detrend linear"
 _ORDER = list(_NEXT)
+_LEAK = 1e-3  # a sample, to begin with
 # A shift of level that takes more than this share of a record is a drift.
 _WIDE = 0.1
 
@@ -85,10 +88,8 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         found = [one for one in against if one.code == DRIFT.code]
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
-    drifts = command == _NEXT[DRIFT.code] and estimate is not None
-    # What integrates may leak, which looks like a drift.
-    if drifts and estimate is not None and (_drifts(estimate) or _integrates(estimate)):
-        command = _EXPLORE
+    if command == _NEXT[DRIFT.code] and estimate is not None:
+        command = _leaking(estimate, data.time) or (_EXPLORE if _drifts(estimate) else command)
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed
         command = _EXPLORE
@@ -107,6 +108,27 @@ def _integrates(estimate: Estimate) -> bool:
     """Return whether the plant integrates, so that a line in the output may be its answer to the input."""
     points = estimate.search.records.kind.model.plant_points
     return bool(np.any(np.abs(points) < INTEGRATES))
+
+
+def _leaking(estimate: Estimate, time: Array) -> str:
+    """Return the command that lets a plant leak which is known to integrate; empty for another plant.
+
+    A tank whose outflow grows with its level looks as if its noise drifted.
+    """
+    model = estimate.search.records.kind.model
+    plant = blocks_of(model)["plant"]
+    stated = plant.get("continuous", {})
+    match plant, stated:
+        case {"parameters": _}, {"denominator": [*others, 0 | "0"]} if not any(
+            isinstance(one, list) for one in others
+        ):
+            listed = ", ".join(f"{one}" for one in others)
+            rate = _LEAK / float(np.median(np.diff(time)))
+            return (
+                f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
+                f'--set "plant.continuous.denominator=[{listed}, leak]"'
+            )
+    return ""
 
 
 def _drifts(estimate: Estimate) -> bool:

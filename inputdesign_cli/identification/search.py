@@ -139,7 +139,11 @@ def _beyond_instants(records: Records, found: Minimum) -> Minimum:
 
 
 def _beyond(records: Records, point: Point) -> Array:
-    """Return starts (n, k) beyond sampling instants within reach; other parameters follow the dead time."""
+    """Return starts (n, k) beyond the sampling instants next to dead times.
+
+    Other parameters follow a dead time across an instant that is within reach. Across one that is not they
+    stay, as dead times of a loop may have minima in neighbouring samples, many deviations apart.
+    """
     crossings = records.kind.crossings(point.theta, records.longest)
     if not len(crossings):
         return np.zeros((0, point.theta.size))
@@ -154,6 +158,8 @@ def _beyond(records: Records, point: Point) -> Array:
             beyond = np.clip((to_midst - to_instant)[index], -deviation, deviation)
             step = covariance[index] / covariance[index, index] * (to_instant[index] + beyond)
             found.append(records.stabilised(point.theta + step))
+        elif abs(to_instant[index]) < 2.0 * abs((to_midst - to_instant)[index]):  # within a sample
+            found.append(records.stabilised(point.theta + to_midst))
     return np.array(found).reshape(-1, point.theta.size)
 
 

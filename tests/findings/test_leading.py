@@ -173,6 +173,8 @@ TANK = "{continuous: {numerator: [0.02], denominator: [1, 0], delay: 10}, sample
 def test_no_command_asks_for_what_the_model_has_already():
     """A line in the output of a tank is its answer to the input, or its leak; noise drifts once only."""
     assert "--detrend linear" in led(LAG, "{variance: 1}")
-    drifts = "{standard_deviation: 1, correlation_time: 60, drift: true}"
-    for noise in ("{standard_deviation: 1, correlation_time: 60}", drifts):
-        assert led(TANK, noise).startswith("idesign explore")
+    noise = "{standard_deviation: 1, correlation_time: 60}"
+    assert "noise.drift=true" in led(TANK, noise)
+    assert led(TANK, noise.replace("}", ", drift: true}")).startswith("idesign explore")
+    named = TANK.replace("{cont", "{parameters: {slope: 0.02}, cont").replace("[0.02]", "[slope]")
+    assert '"plant.continuous.denominator=[1, leak]"' in led(named, noise)

@@ -15,7 +15,7 @@ from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import SampledModel
-from tests.support.plants import lag_of
+from tests.support.plants import lag_of, stated
 
 SAMPLES, VARIANCE = 400, 0.05
 
@@ -123,6 +123,40 @@ def test_the_best_minimum_is_found_from_any_sample_beside():
     for start in (0.4, 2.5, 4.4):
         estimate = estimated(np.array([2.0, 4.0, start]), u, y, rest=True)
         assert estimate.theta[2] == pytest.approx(best, abs=0.05), start
+
+
+TANK = """sample_time: 5
+plant:
+  parameters: {{slope: 0.02, dead_time: {}}}
+  continuous: {{numerator: [slope], denominator: [1, 0], delay: dead_time}}
+  sample: zoh
+noise: {{variance: 0.0144, D: [1, -0.6]}}
+"""
+
+
+def controlled(seed, samples=240):
+    """A tank with a dead time of 9 s under a PI, as r alternates at nearly every sample; by plain sums."""
+    rng, late, level, integral, noise = np.random.default_rng(seed), [0.0] * 9, 0.0, 0.0, 0.0
+    t, u, y = np.arange(samples), np.zeros(samples), np.zeros(samples)
+    r = 8.0 * np.sign(np.sin(np.pi * (0.93 + 0.02 * seed) * t)) + 35.0 * np.sin(2.0 * np.pi * t / 480)
+    for k in range(samples):
+        noise = 0.6 * noise + 0.12 * rng.standard_normal()
+        y[k] = level + noise
+        integral += 5.0 * y[k] / 160.0
+        u[k] = r[k] - 1.25 * (y[k] + integral)
+        for _ in range(5):
+            late.append(u[k])
+            level += 0.02 * late.pop(0)
+    return u[:, None], y[:, None]
+
+
+@pytest.mark.parametrize("start", [10.0, 12.0])
+@pytest.mark.parametrize("seed", [0, 2])
+def test_the_best_minimum_is_found_twenty_deviations_beside(seed, start):
+    """Each sample of dead time has a minimum: 9 was estimated as 10.9 +- 0.1, and the plant refuted."""
+    found = identify(stated(TANK.format(start)), *controlled(seed), 5.0, feedback=True, rest=True)
+    deviation = np.sqrt(found.covariance[1, 1])
+    assert abs(found.theta[1] - 9.0) < 4.0 * deviation < 1.0
 
 
 @pytest.mark.slow
