@@ -119,7 +119,7 @@ def columns_against_spec(
         for one in map(str.strip, header):
             name, unit = name_and_unit(one)
             ours = name.lower().split(" ")[0] in starts or one.lower() in starts
-            if ours and unit and stated and _plain(unit) != _plain(stated):
+            if ours and unit and stated and plain_unit(unit) != plain_unit(stated):
                 fact = f"{one} is in {unit}, and the spec counts {channel} in {stated}"
                 found.append(UNIT_NOT_CONVERTED.found(fact, where=channel, found=unit, stated=stated))
     return found
@@ -131,7 +131,7 @@ def name_and_unit(header: str) -> tuple[str, str]:
     return (match[1], match[2].strip()) if match else (header.strip(), "")
 
 
-def _plain(unit: str) -> str:
+def plain_unit(unit: str) -> str:
     """Return one spelling for all spellings of a unit."""
     plain = re.sub(r"degrees?|\u00b0", "deg", re.sub(r"[\s._]+", "", unit.lower()))
     return _SPELLINGS.get(plain, plain)

@@ -9,7 +9,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.prepared_records import name_and_unit
+from inputdesign_cli.findings.prepared_records import name_and_unit, plain_unit
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.sheet import Column, Sheet
 from inputdesign_cli.specification.models.units import SECONDS
@@ -200,12 +200,7 @@ def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None)
     Raises:
         DataError: `data-missing-column`, it is not clear which column has a role.
     """
-    channels = {} if units is None else units.channels
-    for channel, (name, _) in channels.items():
-        same = [header for header in sheet.names if name_and_unit(header)[0].lower() == name.lower()]
-        taken = any(re.match(rf"{channel[0]}\d*(?![a-z0-9])", header) for header in sheet.header)
-        if name and len(same) == 1 and not taken:
-            named = {channel: same[0], **named}
+    named = {**({} if units is None else _by_channels(sheet, units)), **named}
     columns = _whole(sheet, with_channels(sheet, named))
     counts = (
         [_count(letter, sheet, columns) for letter in "uy"]
@@ -214,11 +209,36 @@ def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None)
     )
     wanted = [role for letter, n in zip("uy", counts, strict=True) for role in _of(letter, n)]
     found = {role: columns.get(role, role) for role in wanted}
-    references = _references(sheet, columns, counts[0]) if units is None or units.closed_loop else {}
+    loop = units is not None and units.closed_loop
+    references = _references(sheet, columns, counts[0], loop=loop) if units is None or loop else {}
     unasked = units is None and not references.keys() & columns.keys()
     own = [column_named(sheet, name) for name in references.values()] if unasked else []
     usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
     return found | (references if usable else {}) | _time(sheet, columns)
+
+
+def _by_channels(sheet: Sheet, units: Units) -> dict[str, str]:
+    """Return the columns that have the names of the spec's channels, or else alone their units."""
+    parts = {header: name_and_unit(header) for header in sheet.names}
+    headers = {header: (name.lower(), plain_unit(unit)) for header, (name, unit) in parts.items()}
+    called = {letter: re.compile(rf"{letter}\d*(?![a-z0-9])") for letter in "uy"}
+    asked = {
+        channel: (name.lower(), plain_unit(unit))
+        for channel, (name, unit) in units.channels.items()
+        if not any(called[channel[0]].match(header) for header in sheet.header)
+    }
+    found: dict[str, str] = {}
+    for channel, (name, _) in asked.items():
+        same = [header for header, own in headers.items() if name and own[0] == name]
+        found |= {channel: same[0]} if len(same) == 1 else {}
+    for channel, (name, unit) in asked.items():
+        left = [header for header in headers if header not in found.values() and _role(header) != "r"]
+        alike = [header for header in left if unit and headers[header][1] == unit]
+        words = set(name.split())
+        alike = [header for header in alike if words & set(headers[header][0].split())] or alike
+        if channel not in found and len(alike) == 1:
+            found[channel] = alike[0]
+    return found
 
 
 def _of(letter: str, count: int) -> list[str]:
@@ -244,12 +264,19 @@ def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
     return columns.get("time", "").strip().lower() == NO_TIMES and NO_TIMES not in sheet.header
 
 
-def _references(sheet: Sheet, columns: Mapping[str, str], inputs: int) -> dict[str, str]:
-    """Return `r1` -> the column of the reference that is added to an input, if every input has one."""
+def _references(sheet: Sheet, columns: Mapping[str, str], inputs: int, *, loop: bool) -> dict[str, str]:
+    """Return `r1` -> the column of the reference that is added to an input, if every input has one.
+
+    Args:
+        loop: whether the spec has a controller, so that the only column called as references are is one.
+    """
     channels = _of("r", inputs)
     found = {name: columns.get(name, name) for name in channels if name in columns or name in sheet.header}
     if inputs == 1 and not found and "r" in sheet.header:
         found = {"r1": "r"}
+    asked = [name for name in sheet.names if _role(name) == "r"]
+    if inputs == 1 and not found and loop and len(asked) == 1:
+        found = {"r1": asked[0]}
     named = [name for name in channels if name in columns]
     if named and len(found) < inputs:
         missing = next(name for name in channels if name not in found)

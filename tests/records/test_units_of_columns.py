@@ -105,6 +105,34 @@ def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
     assert read_data([path], UNITS, Preparation(columns=columns)).lengths == (200,)
 
 
+@pytest.mark.parametrize(
+    ("header", "channels"),
+    [
+        ("voltage [V],speed [rad/s]", {"u1": ("", "V"), "y1": ("", "rad/s")}),
+        ("radiator valve [%],room (°C)", {"u1": ("valve", "%"), "y1": ("", "degC")}),
+        ("valve [%],level [cm]", {"u1": ("inlet valve", "%"), "y1": ("tank level", "cm")}),
+    ],
+)
+def test_a_column_goes_by_its_unit_where_no_other_has_it(header, channels, log):
+    assert read(log(f"time,{header}", EVEN), replace(UNITS, channels=channels)).lengths == (200,)
+
+
+@pytest.mark.parametrize("header", ["outside (°C),room (°C)", "a [V],b [V]", "valve [%],room [K]"])
+def test_two_columns_of_a_unit_are_asked_for(header, log):
+    units = replace(UNITS, channels={"u1": ("valve", "%"), "y1": ("", "degC")})
+    with pytest.raises(DataError) as raised:
+        read(log(f"time,{header}", EVEN), units)
+    assert raised.value.diagnostics[0].code == "data-missing-column"
+
+
+def test_the_reference_of_a_loop_is_the_column_that_is_called_so(tmp_path):
+    rows = "\n".join(f"{2 * k},{u},{y},{u + y}" for k, (u, y) in enumerate(zip(U, Y, strict=True)))
+    (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],reference r [%]\n{rows}\n")
+    channels = {"u1": ("inlet valve", "%"), "y1": ("", "cm")}
+    record = read(tmp_path / "d.csv", replace(UNITS, closed_loop=True, channels=channels))
+    np.testing.assert_allclose(record.r[:, 0], U + Y)
+
+
 def test_a_column_that_only_begins_like_a_time_is_none(log):
     assert read(log("temperature,u,y", [7 * k for k in range(200)])).lengths == (200,)
 
