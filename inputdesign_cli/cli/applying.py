@@ -47,5 +47,5 @@ def instructions(results: Results, spec: str) -> list[str]:
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-        judge += f" --operating-point {point}   (REST: the level of {' and '.join(outputs)} before it began)"
+        judge += f" --operating-point {point}   (REST: the mean of {' and '.join(outputs)} before it began)"
     return [*said, judge]

@@ -124,6 +124,8 @@ def assess(
     again = typed(changes, levels, rows)
     begins = {
         "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
+        # The longer beginning comes first: columns that the command has are not named twice.
+        "idesign explore --columns": ["idesign", "explore", *typed(replace(rows, columns="")), "--columns"],
         "idesign explore": ["idesign", "explore", *typed(rows)],
         "idesign solve SPEC": ["idesign", "solve", str(spec), *typed(changes)],
     }
@@ -140,9 +142,9 @@ def _with_typed(results: Results, begins: Mapping[str, Sequence[str]]) -> Result
     judged = results.outcome.assessment
     assert judged is not None
     command = judged.next or ""
-    for begin, words in begins.items():
-        if command.startswith(begin):
-            command = shlex.join(words) + command.removeprefix(begin)
+    begin = next((one for one in begins if command.startswith(one)), None)
+    if begin is not None:
+        command = shlex.join(begins[begin]) + command.removeprefix(begin)
     return replace(
         results, outcome=replace(results.outcome, assessment=replace(judged, next=command or None))
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +24,7 @@ from inputdesign_cli.plant.model import SampledPlant
 _ASSESS = "idesign assess SPEC "
 _AGAIN = _ASSESS + "{logs} "
 _ALONE = _ASSESS + "{first} --output {alone}"  # where the run of all records does not stand
-_EXPLORE = "idesign explore {logs}"
+_EXPLORE = "idesign explore {columns}{logs}"
 _NEXT = {
     # Samples that are wrong or of another system upset every test.
     "samples-repeated": _ALONE,
@@ -95,6 +96,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         command = _EXPLORE
     middle, files = float(data.time[len(data.time) // 2]), data.paths or ("DATA",)
     figures = {
+        "columns": _columns(data),
         "logs": shlex.join(files),
         "first": shlex.quote(files[0]),
         "alone": shlex.quote(f"runs/{Path(files[0]).stem}_alone"),
@@ -102,6 +104,15 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }
     return Leading(alike, command.format(**figures))
+
+
+def _columns(data: Record) -> str:
+    """Return the option that names the columns, where these were found by names and units of the spec."""
+    names = {role: name for role, name in (data.names or {}).items() if role != "time"}
+    if all(re.match(rf"{role[0]}\d*(?![a-z0-9])", name.lower()) for role, name in names.items()):
+        return ""
+    listed = ",".join(f"{role}={name}" for role, name in names.items())
+    return f"--columns {shlex.quote(listed)} "
 
 
 def _integrates(estimate: Estimate) -> bool:

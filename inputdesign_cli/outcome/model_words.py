@@ -101,13 +101,13 @@ def _(model: plant.Reparametrised) -> Blocks:
 
 @singledispatch
 def predictor_of(model: plant.Model) -> dict[str, list[Array]]:
-    """Return the polynomials of a model that must be stable, by letter: C, D, F; none of a plant in s."""
+    """Return the polynomials of the noise that must be stable, by letter: C and D; none of a plant in s."""
     return {}
 
 
 @predictor_of.register
 def _(model: plant.PolynomialModel) -> dict[str, list[Array]]:
-    return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
+    return {"C": list(model.C), "D": list(model.D)}
 
 
 @predictor_of.register

@@ -93,7 +93,8 @@ def _read(path: Path, units: Units, preparation: Preparation) -> Record:
     signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
     found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
     in_step = _in_step(signals, units, preparation)
-    return _record(in_step, units.sample_time, units.time_unit, preparation, roles, found)
+    record = _record(in_step, units.sample_time, units.time_unit, preparation, roles, found)
+    return replace(record, names=roles)
 
 
 def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:

@@ -54,6 +54,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "moved": max(signal.get("input_peak", [allowed])),
         "binding": [words for name, words in _LIMITS.items() if shares.get(name, 0.0) >= _MOST_OF],
         "robust": robust,
+        "limits_output": amplitude.output is not None,
         "fresh": fresh,
         "lost": without_margin or ["a plant within what you said"] * ("lost" in robust.get("searched", {})),
         "worst": max((one for one in known if "peak" in one), key=lambda one: one["peak"], default=None),
