@@ -42,7 +42,7 @@ QUANTITIES = {
 NO_DELAY = r"\b(?:no|without|hardly any|negligible)\s+(?:dead time|delay)\b"
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
 _SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
-_HARDLY = 0.05  # of the time constant: as good as no dead time
+_HARDLY = 0.5  # of a sample: as good as no dead time in a log
 _NEARLY = 2.0  # points of fit that a model may lose which rules of tuning know
 _LEAST_ROWS = 10  # of a step response
 _LONGER = 2.0  # a time constant of more records than this is none
@@ -168,8 +168,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         sampling=None if sampled is None else needed(sampled, "plant", "the sample time"),
         why_sampling="as you said",
         tunable=True,
-        undelayed="gain" in values
-        and values.get("dead_time", 0.0) <= _HARDLY * values.get("time_constant", 0.0),
+        undelayed="gain" in values and "dead_time" not in values,
         heard=tuple(heard),
         units=(gain.size, gain.base),
     )
@@ -382,7 +381,7 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         covariance=name if channels == 1 else None,
         sampling=spec.sample_time,
         tunable=process is not None,
-        undelayed=lag is not None and late <= _HARDLY * lag,
+        undelayed=lag is not None and late <= _HARDLY * spec.sample_time,
         channels=channels,
         explored=spec,
         called={channel: header for channel, header in columns.items() if channel != "time"},
