@@ -106,7 +106,9 @@ def assess(
     that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where tests of
     the residuals refute the model structure; the note says what to change.
     """
-    place = Place(into, f"{data[0].stem}_assessed", [spec, *data], judges=True)
+    # Records that are judged together are another run than the first of them alone.
+    together = f"_and_{len(data) - 1}_more" if len(data) > 1 else ""
+    place = Place(into, f"{data[0].stem}{together}_assessed", [spec, *data], judges=True)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.run_directory import check_counted_once

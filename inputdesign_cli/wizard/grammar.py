@@ -59,6 +59,11 @@ _FALLS = re.compile(
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
     re.I,
 )
+_BETWEEN = re.compile(
+    r"\b(?P<what>dead time|delay|time constant|lag)\s+(?:(?:of|is|between|from)\s+)*"
+    rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
+    re.I,
+)
 _SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
@@ -260,9 +265,22 @@ def check_numbers(text: str, key: str) -> None:
 
 
 def in_figures(text: str) -> str:
-    """Return a text with "0.1 second" for "a tenth of a second", and "rises by -2" for "falls by 2"."""
+    """Return a text with "0.1 second" for "a tenth of a second", and "rises by -2" for "falls by 2".
+
+    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 %".
+    """
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", text)
+    figures = _BETWEEN.sub(_middle, figures)
     return _FALLS.sub(r"rises by \g<about>-", figures)
+
+
+def _middle(found: re.Match[str]) -> str:
+    """Return the middle of two ends, and the share to either side that reaches them."""
+    one, other = float(found["low"]), float(found["high"])
+    if not 0.0 < one < other:
+        return found[0]
+    share = 100.0 * (other - one) / (other + one)
+    return f"{found['what']} {0.5 * (one + other):g} {found['unit']} within {share:.3g} %"
 
 
 def unread(text: str) -> list[str]:

@@ -280,6 +280,7 @@ def test_a_controller_that_runs_is_that_of_the_experiment(running, tmp_path):
         ("the output may deviate 3 degC at most", "limits.amplitude.output", 3.0),
         ("the level must not move by more than 3 degC", "limits.amplitude.output", 3.0),
         ("operating point 45 %, may go 35 to 55 %", "signal.offset", 45.0),
+        ("an experiment of 30 min", "limits.duration", 1800.0),
     ],
 )
 def test_limits_are_understood_as_they_are_said(part, where, value, tmp_path):
@@ -293,6 +294,13 @@ def test_limits_are_understood_as_they_are_said(part, where, value, tmp_path):
     if where == "signal.hold":
         there *= spec.sample_time
     assert float(np.max(there)) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("said", ["3 to 6 min", "between 3 and 6 min", "3-6 min", "of 3 to 6 min"])
+def test_a_time_between_two_ends_is_an_interval(said):
+    found = plant_of_words(f"gain 2, time constant 40 min, dead time {said}")
+    assert found.values["dead_time"] == pytest.approx(270.0)
+    assert found.intervals["dead_time"] == pytest.approx((180.0, 360.0), rel=1e-3)
 
 
 def test_a_sentence_stands_beside_answers(tmp_path):
