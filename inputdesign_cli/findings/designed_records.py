@@ -31,7 +31,7 @@ RECORD_MISSES = doubt(
 RECORD_DEAR = doubt(
     "record-dear",
     "The record costs far more than the spectrum. A short record loses the response after its last sample. "
-    "A signal such as a PRBS has not the designed spectrum.",
+    "A PRBS has not the designed spectrum.",
     "Take more samples.",
 )
 RECORD_LONGER = note(

@@ -44,7 +44,7 @@ def _not_settled(kind: FindingKind, estimate: Estimate) -> list[Finding]:
     "unsettled",
 )
 def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
-    """A parameter stopped where its expression has no value any more, such as the root of a negative number.
+    """A parameter stopped where its expression has no value any more, like the root of a negative number.
 
     The data may ask for a value beyond it, so that the estimate is not the best one.
     """

@@ -143,7 +143,7 @@ class StateSpace(NamedTuple):
 
     @classmethod
     def of_delayed_inputs(cls, A: Array, C: Array, drives: Sequence[Drive], inputs: int) -> StateSpace:
-        """Return a system whose inputs act after lags: its states are their past, then those of A (n, n).
+        """Return a system whose inputs act after lags: its states are their past, then the n states of A.
 
         Args:
             C: (q, n), the outputs by the states of A.

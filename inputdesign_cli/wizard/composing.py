@@ -47,6 +47,7 @@ _MEANWHILE = {
 # Orders of filtered noise, and numbers of sinusoids up to half the samples, from the simplest on.
 _ORDERS, _LINES = (20, 40), (60, 120, 240)
 _ENOUGH = 1.02  # of the bound over every spectrum
+_FIRST = "{type: fir, order: 20}"
 _LEAST_GAP = 1e-3  # smaller gaps are written as this
 _POSITIONS = 10  # the fewest of an input that keeps them
 _PERIODS = 5  # of a record for a Bode plot
@@ -132,9 +133,7 @@ def compose(
     made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
     heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values()))]
-    heard += _own_controller(plant, control) if said["loop"].lower() == "as the plant" else []
-    if hold > 1 and control is not None:
-        heard.append("under a controller r keeps its values, and the actuator still moves at every sample")
+    heard += _of_controller(plant, control, said["loop"], hold)
     facts = {
         "said": said,
         "plant": plant,
@@ -160,9 +159,8 @@ def compose(
         "channels": channels_of(said, plant, span),
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
-    spectrum = None if nonparametric else "{type: fir, order: 20}"
     notes = (*heard, *against, *[_UNUSED] * unused)
-    return Draft(facts, plant.files, spectrum, folder, said, there, notes)
+    return Draft(facts, plant.files, None if nonparametric else _FIRST, folder, said, there, notes)
 
 
 def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
@@ -176,11 +174,14 @@ def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
     return why
 
 
-def _own_controller(plant: PlantAnswer, control: str | None) -> list[str]:
-    """Return the remark on the controller that is taken for a plant that integrates, if it is."""
-    if "slope" not in plant.values or control is None or control != plant.controller:
+def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int) -> list[str]:
+    """Return remarks on the controller that is taken unasked, and on what keeps its values under it."""
+    if control is None:
         return []
-    return [f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"]
+    unasked = "slope" in plant.values and said.lower() == "as the plant"
+    taken = f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"
+    held = "under a controller r keeps its values, and the actuator still moves at every sample"
+    return [taken] * unasked + [held] * (hold > 1)
 
 
 def _points(span: Range) -> str:

@@ -289,7 +289,7 @@ def unread(text: str) -> list[str]:
 
 
 def not_linear(text: str) -> list[str]:
-    """Return the remark on words such as friction, which no linear model has; none without such words."""
+    """Return the remark on friction and the like, which no linear model has; none where no word says so."""
     found = dict.fromkeys(one["what"].lower() for one in NONLINEAR.finditer(text))
     why = "no linear model has it, and the design leaves it out"
     return (
