@@ -52,7 +52,7 @@ def explore(
         raise typer.Exit(EXIT_MISSED)
     if validate is None and not (shown.quiet or shown.json_output or into.no_output):
         spec = shlex.quote(str(place.directory / "spec.yaml"))
-        typer.echo(f"Then: idesign solve {spec}   (say in it how accurate the model must be, and the limits)")
+        typer.echo(f"Then: idesign solve {spec}   (say in it how accurate the model must be)")
 
 
 def identify(

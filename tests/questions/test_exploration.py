@@ -57,7 +57,14 @@ def test_the_spec_that_is_written_solves_at_once(run):
         "u1": "input",
         "y1": "output",
     }
-    assert solve(spec).result["status"] == "optimal"
+    results = solve(parse_spec(text, overrides=["experiment.samples=60", "spectrum.order=5"]))
+    assert results.result["status"] == "optimal"
+    # The actuator has been where the signal goes: it lies within the range of the log.
+    low, high = (
+        end(np.loadtxt(run.parent / "log.csv", delimiter=",", skiprows=1)[:, 1]) for end in (np.min, np.max)
+    )
+    played = results.tables["signal"].columns["u1 input"]
+    assert low - 1e-9 <= np.min(played) < np.max(played) <= high + 1e-9
 
 
 def test_the_model_is_judged_on_other_data(run, tmp_path):

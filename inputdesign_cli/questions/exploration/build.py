@@ -85,7 +85,7 @@ def spec_text(
         **blocks,
         "experiment": {"samples": min(len(log.y), _MOST_SAMPLES)},
         "accuracy": {"criterion": "D"},
-        "limits": {"input_power": power, "# amplitude": width},  # the second is for the user to take in
+        "limits": {"input_power": power, "amplitude": width},
         "spectrum": {"type": "fir", "order": 20},
         "signal": {"type": "filtered_noise", "seed": 1, "offset": level},
     }
