@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import scipy
@@ -22,6 +23,7 @@ _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
 # The probability that a normal variable is farther than five standard deviations from its mean.
 _FIVE_DEVIATIONS = 5.733e-7
 _AWAY, _LISTED = 4.0, 4
+_SOME = np.array([0.013, 0.37, 1.9])  # frequencies at which two plants are compared
 
 ANOTHER = doubt(
     "another-plant",
@@ -73,7 +75,8 @@ def from_nominal(
         nominal_covariance: (k, k), how uncertain the plant of the spec is; None if it counts as known.
     """
     of_plant = np.flatnonzero(estimated.in_plant)
-    away = (nominal.theta - estimate.theta)[of_plant]
+    values = _nearest_order(nominal, estimate.theta, of_plant.tolist())
+    away = (values - estimate.theta)[of_plant]
     covariance = estimate.covariance + (0.0 if nominal_covariance is None else nominal_covariance)
     scale = np.sqrt(np.diag(covariance))[of_plant]
     correlation = covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
@@ -83,7 +86,7 @@ def from_nominal(
     deviations = np.abs(away) / scale
     listed = tuple(
         f"{estimate.names[of_plant[k]]} is {estimate.theta[of_plant[k]]:.4g}, not "
-        f"{nominal.theta[of_plant[k]]:.4g} ({deviations[k]:.3g} standard deviations)"
+        f"{values[of_plant[k]]:.4g} ({deviations[k]:.3g} standard deviations)"
         for k in np.argsort(-deviations)[:_LISTED]
         if deviations[k] > _AWAY
     )
@@ -96,6 +99,23 @@ def from_nominal(
         opposite_sign=any(opposite for *_, opposite in apart) if apart else None,
     )
     return Distance(found, listed, share, place)
+
+
+def _nearest_order(nominal: Model, theta: Array, of_plant: Sequence[int]) -> Array:
+    """Return the parameters (k,) of the spec's plant in the order that is nearest to an estimate.
+
+    Two lags may change their names: G stays the same.
+    """
+    values = np.array(nominal.theta)
+    with np.errstate(all="ignore"):  # an exchange may make a plant that no spec states
+        G = nominal.plant_at(_SOME)
+        for a, b in combinations(of_plant, 2):
+            other = values.copy()
+            other[[a, b]] = values[[b, a]]
+            nearer = np.sum(np.abs(other - theta)) < np.sum(np.abs(values - theta))
+            if nearer and np.allclose(nominal.at(other).plant_at(_SOME), G, rtol=1e-9, atol=0.0):
+                values = other
+    return values
 
 
 def far_from_nominal(distance: Distance) -> list[Finding]:

@@ -1,0 +1,29 @@
+"""How far an estimate lies from the plant of the spec, whatever its parameters are called."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.findings.far_from_nominal import from_nominal
+from inputdesign_cli.outcome.units import Units
+from tests.support.plants import stated
+
+UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+TWO_LAGS = """sample_time: 1
+plant:
+  parameters: {{K: 2, T1: {}, T2: {}}}
+  continuous: {{numerator: [K], denominator: [[T1, 1], [T2, 1]]}}
+  sample: zoh
+noise: {{variance: 1}}
+"""
+
+
+@pytest.mark.parametrize(("lags", "deviations"), [((30.0, 4.0), 0.0), ((4.0, 30.0), 0.0), ((30.0, 9.0), 5.0)])
+def test_lags_that_changed_their_names_are_no_other_plant(lags, deviations):
+    estimated = stated(TWO_LAGS.format(4.0, 30.0))
+    covariance = np.eye(estimated.theta.size)
+    estimate = SimpleNamespace(theta=estimated.theta, covariance=covariance, names=estimated.names)
+    found = from_nominal(UNITS, stated(TWO_LAGS.format(*lags)), estimated, estimate, [], covariance)
+    assert found.nominal.deviations == pytest.approx(deviations)
+    assert bool(found.listed) == (deviations > 4.0)
