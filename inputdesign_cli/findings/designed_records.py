@@ -31,7 +31,7 @@ RECORD_MISSES = doubt(
 RECORD_DEAR = doubt(
     "record-dear",
     "The record costs far more than the spectrum. A short record loses the response after its last sample. "
-    "A PRBS has not the designed spectrum.",
+    "A PRBS has a spectrum of its own.",
     "Take more samples.",
 )
 RECORD_LONGER = note(

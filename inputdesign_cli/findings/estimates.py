@@ -66,8 +66,8 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
 def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, none: bool) -> list[Finding]:
     """The errors of the estimate are larger than first-order theory states, as the record is short.
 
-    Records of the estimated model were simulated and estimated again; their estimates
-    scatter as stated here.
+    Records of the estimated model were simulated and estimated again. The factor is how much farther those
+    estimates scatter.
     """
     times = f"{factor:.3g} times for the plant, {of_noise:.3g} times for the noise"
     fact = f"{times}, by {runs} simulated records"

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
@@ -75,9 +76,12 @@ def from_nominal(
         nominal_covariance: (k, k), how uncertain the plant of the spec is; None if it counts as known.
     """
     of_plant = np.flatnonzero(estimated.in_plant)
-    values = _nearest_order(nominal, estimate.theta, of_plant.tolist())
+    order = _nearest_order(nominal, estimate.theta, of_plant.tolist())
+    values = nominal.theta[order]
     away = (values - estimate.theta)[of_plant]
-    covariance = estimate.covariance + (0.0 if nominal_covariance is None else nominal_covariance)
+    covariance = estimate.covariance
+    if nominal_covariance is not None:
+        covariance = covariance + nominal_covariance[np.ix_(order, order)]
     scale = np.sqrt(np.diag(covariance))[of_plant]
     correlation = covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
     statistic = float((away / scale) @ np.linalg.lstsq(correlation, away / scale, rcond=None)[0])
@@ -101,21 +105,21 @@ def from_nominal(
     return Distance(found, listed, share, place)
 
 
-def _nearest_order(nominal: Model, theta: Array, of_plant: Sequence[int]) -> Array:
-    """Return the parameters (k,) of the spec's plant in the order that is nearest to an estimate.
+def _nearest_order(nominal: Model, theta: Array, of_plant: Sequence[int]) -> NDArray[np.int_]:
+    """Return the order (k,) of the parameters of the spec's plant that is nearest to an estimate.
 
     Two lags may change their names: G stays the same.
     """
-    values = np.array(nominal.theta)
+    order, values = np.arange(theta.size), np.asarray(nominal.theta)
     with np.errstate(all="ignore"):  # an exchange may make a plant that no spec states
         G = nominal.plant_at(_SOME)
         for a, b in combinations(of_plant, 2):
-            other = values.copy()
-            other[[a, b]] = values[[b, a]]
-            nearer = np.sum(np.abs(other - theta)) < np.sum(np.abs(values - theta))
-            if nearer and np.allclose(nominal.at(other).plant_at(_SOME), G, rtol=1e-9, atol=0.0):
-                values = other
-    return values
+            other = order.copy()
+            other[[a, b]] = order[[b, a]]
+            nearer = np.sum(np.abs(values[other] - theta)) < np.sum(np.abs(values[order] - theta))
+            if nearer and np.allclose(nominal.at(values[other]).plant_at(_SOME), G, rtol=1e-9, atol=0.0):
+                order = other
+    return order
 
 
 def far_from_nominal(distance: Distance) -> list[Finding]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -96,7 +95,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         command = _EXPLORE
     middle, files = float(data.time[len(data.time) // 2]), data.paths or ("DATA",)
     figures = {
-        "columns": _columns(data),
+        "columns": data.columns_option,
         "logs": shlex.join(files),
         "first": shlex.quote(files[0]),
         "alone": shlex.quote(f"runs/{Path(files[0]).stem}_alone"),
@@ -104,15 +103,6 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }
     return Leading(alike, command.format(**figures))
-
-
-def _columns(data: Record) -> str:
-    """Return the option that names the columns, where these were found by names and units of the spec."""
-    names = {role: name for role, name in (data.names or {}).items() if role != "time"}
-    if all(re.match(rf"{role[0]}\d*(?![a-z0-9])", name.lower()) for role, name in names.items()):
-        return ""
-    listed = ",".join(f"{role}={name}" for role, name in names.items())
-    return f"--columns {shlex.quote(listed)} "
 
 
 def _integrates(estimate: Estimate) -> bool:
@@ -130,14 +120,14 @@ def _leaking(estimate: Estimate, time: Array) -> str:
     plant = blocks_of(model)["plant"]
     stated = plant.get("continuous", {})
     match plant, stated:
-        case {"parameters": _}, {"denominator": [*others, 0 | "0"]} if not any(
+        case {"parameters": known}, {"denominator": [*others, 0 | "0"]} if "leak" not in known and not any(
             isinstance(one, list) for one in others
         ):
             listed = ", ".join(f"{one}" for one in others)
             rate = _LEAK / float(np.median(np.diff(time)))
             return (
                 f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
-                f'--set "plant.continuous.denominator=[{listed}, leak]"'
+                f'--set "plant.continuous.denominator=[{listed}, leak]"  # it may leak'
             )
     return ""
 

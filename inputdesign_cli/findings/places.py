@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -18,6 +19,11 @@ SHORTEST = 10
 """Samples of the shortest segment."""
 # Rows that an option lists.
 _LISTED = 12
+
+
+def is_called(role: str, name: str) -> bool:
+    """Return whether the name of a column, in small letters, begins with the letter of a role: u, u1, y2."""
+    return re.match(rf"{role[0]}\d*(?![a-z0-9])", name) is not None
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,20 @@ class Record:
     def notes(self) -> tuple[str, ...]:
         """Return the messages of the findings, and the remarks."""
         return (*(one.message for one in self.findings), *self.remarks)
+
+    @property
+    def columns_option(self) -> str:
+        """Return the option of `explore` that names the columns; empty where these are called u1, y1, .."""
+        names = {role: name for role, name in self.names.items() if role != "time"}
+        if all(is_called(role, name.lower()) for role, name in names.items()):
+            return ""
+        listed = [f"{role}={self._option(name)}" for role, name in names.items()]
+        return f"--columns {shlex.quote(','.join(listed))} "
+
+    def _option(self, name: str) -> str:
+        """Return a name, or the number of its column where the name has marks of the option."""
+        low = name.strip().lower()
+        return str(self.header.index(low) + 1) if set(name) & set(',="') and low in self.header else name
 
     @property
     def parts(self) -> list[tuple[Array, Array]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from inputdesign_cli.finding import Finding, doubt, note
+from inputdesign_cli.finding import NOTE, Finding, FindingKind, doubt, finding, note
 
 TIMES_READ = note(
     "times-read",
@@ -93,6 +93,19 @@ _SPELLINGS = {
     **dict.fromkeys(("minute", "minutes"), "min"),
     **dict.fromkeys(("hour", "hours"), "h"),
 }
+
+
+@finding(NOTE, "column-by-unit", "If it is another column, name that with --columns.")
+def columns_by_unit(kind: FindingKind, taken: Mapping[str, str]) -> list[Finding]:
+    """A column was taken for a channel by its unit. Its name is not that of the channel in the spec.
+
+    Args:
+        taken: by channel, the column.
+    """
+    return [
+        kind.found(f"{column} as {channel}", where=channel, column=column)
+        for channel, column in taken.items()
+    ]
 
 
 def columns_against_spec(

@@ -66,7 +66,7 @@ def _lag_more(stated: Mapping[str, Plain]) -> str:
     listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items())
     return (
         f"write plant.parameters: {{{listed}}} and plant.continuous: {{numerator: [K], denominator: "
-        f"[{poles}, [T2, 1]]{late}}} in place of {kept} (uncertainty, too, goes by these names)"
+        f"[{poles}, [T2, 1]]{late}}} in place of {kept}; uncertainty, if there is one, needs the new names"
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.places import is_called
 from inputdesign_cli.findings.prepared_records import name_and_unit, plain_unit
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.sheet import Column, Sheet
@@ -200,7 +201,7 @@ def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None)
     Raises:
         DataError: `data-missing-column`, it is not clear which column has a role.
     """
-    named = {**({} if units is None else _by_channels(sheet, units)), **named}
+    named = {**({} if units is None else _by_channels(sheet, units, named)), **named}
     columns = _whole(sheet, with_channels(sheet, named))
     counts = (
         [_count(letter, sheet, columns) for letter in "uy"]
@@ -210,23 +211,31 @@ def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None)
     wanted = [role for letter, n in zip("uy", counts, strict=True) for role in _of(letter, n)]
     found = {role: columns.get(role, role) for role in wanted}
     loop = units is not None and units.closed_loop
-    references = _references(sheet, columns, counts[0], loop=loop) if units is None or loop else {}
+    unit = units.channels.get("u1", ("", ""))[1] if units is not None and loop else ""
+    references = _references(sheet, columns, counts[0], unit) if units is None or loop else {}
     unasked = units is None and not references.keys() & columns.keys()
     own = [column_named(sheet, name) for name in references.values()] if unasked else []
     usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
     return found | (references if usable else {}) | _time(sheet, columns)
 
 
-def _by_channels(sheet: Sheet, units: Units) -> dict[str, str]:
-    """Return the columns that have the names of the spec's channels, or else alone their units."""
+def _by_channels(sheet: Sheet, units: Units, typed: Mapping[str, str]) -> dict[str, str]:
+    """Return the columns that have the names of the spec's channels, or else alone their units.
+
+    Where the spec names a channel, a column with its unit must have a word of that name.
+
+    Args:
+        typed: columns that the user names, which are taken for nothing else.
+    """
     parts = {header: name_and_unit(header) for header in sheet.names}
     headers = {header: (name.lower(), plain_unit(unit)) for header, (name, unit) in parts.items()}
-    called = {letter: re.compile(rf"{letter}\d*(?![a-z0-9])") for letter in "uy"}
     asked = {
         channel: (name.lower(), plain_unit(unit))
         for channel, (name, unit) in units.channels.items()
-        if not any(called[channel[0]].match(header) for header in sheet.header)
+        if channel not in typed and not any(is_called(channel, header) for header in sheet.header)
     }
+    taken = {at for name in typed.values() for at in named_columns(sheet, name.strip().lower())}
+    headers = {name: own for i, (name, own) in enumerate(headers.items()) if i not in taken}
     found: dict[str, str] = {}
     for channel, (name, _) in asked.items():
         same = [header for header, own in headers.items() if name and own[0] == name]
@@ -234,8 +243,8 @@ def _by_channels(sheet: Sheet, units: Units) -> dict[str, str]:
     for channel, (name, unit) in asked.items():
         left = [header for header in headers if header not in found.values() and _role(header) != "r"]
         alike = [header for header in left if unit and headers[header][1] == unit]
-        words = set(name.split())
-        alike = [header for header in alike if words & set(headers[header][0].split())] or alike
+        if words := set(name.split()):
+            alike = [header for header in alike if words & set(headers[header][0].split())]
         if channel not in found and len(alike) == 1:
             found[channel] = alike[0]
     return found
@@ -264,19 +273,21 @@ def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
     return columns.get("time", "").strip().lower() == NO_TIMES and NO_TIMES not in sheet.header
 
 
-def _references(sheet: Sheet, columns: Mapping[str, str], inputs: int, *, loop: bool) -> dict[str, str]:
+def _references(sheet: Sheet, columns: Mapping[str, str], inputs: int, unit: str) -> dict[str, str]:
     """Return `r1` -> the column of the reference that is added to an input, if every input has one.
 
     Args:
-        loop: whether the spec has a controller, so that the only column called as references are is one.
+        unit: of the input of a loop: a column that is called as references are is r if it has this unit.
+            The set point of a controller has that of the output.
     """
     channels = _of("r", inputs)
     found = {name: columns.get(name, name) for name in channels if name in columns or name in sheet.header}
     if inputs == 1 and not found and "r" in sheet.header:
         found = {"r1": "r"}
-    asked = [name for name in sheet.names if _role(name) == "r"]
-    if inputs == 1 and not found and loop and len(asked) == 1:
-        found = {"r1": asked[0]}
+    if inputs == 1 and not found and unit:
+        asked = [name for name in sheet.names if _role(name) == "r"]
+        alike = [name for name in asked if plain_unit(name_and_unit(name)[1]) == plain_unit(unit)]
+        found = {"r1": alike[0]} if len(asked) == len(alike) == 1 else {}
     named = [name for name in channels if name in columns]
     if named and len(found) < inputs:
         missing = next(name for name in channels if name not in found)

@@ -12,8 +12,13 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
-from inputdesign_cli.findings.places import Record as Record, Recorded
-from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_against_spec
+from inputdesign_cli.findings.places import Record as Record, Recorded, is_called
+from inputdesign_cli.findings.prepared_records import (
+    TIMES_ASSUMED,
+    columns_against_spec,
+    columns_by_unit,
+    name_and_unit,
+)
 from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.columns import called, rising, roles_of, without_times
@@ -92,6 +97,14 @@ def _read(path: Path, units: Units, preparation: Preparation) -> Record:
     roles = roles_of(sheet, preparation.columns, units)
     signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
     found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
+    taken = {
+        channel: name
+        for channel, name in roles.items()
+        if channel not in ("time", *preparation.columns)
+        and not is_called(channel, name.lower())
+        and name_and_unit(name)[0].lower() != units.channels.get(channel, ("", ""))[0].lower()
+    }
+    found = [*found, *columns_by_unit(taken)]
     in_step = _in_step(signals, units, preparation)
     record = _record(in_step, units.sample_time, units.time_unit, preparation, roles, found)
     return replace(record, names=roles)

@@ -71,3 +71,7 @@ def test_the_command_that_solve_names_judges_its_record(run, tmp_path, plant, as
     np.savetxt("log.csv", rows, delimiter=",", header="time,u1,y1", comments="")
     code, out, err = run(*command, "--no-figures", "--set", f"accuracy.model_error.relative={asked}")
     assert code == expected, out + err
+    if not expected:  # records judged together do not stand in the way of the first alone
+        np.savetxt("more.csv", rows * [1.0, 1.0, 1.001], delimiter=",", header="time,u1,y1", comments="")
+        assert run(*command, "more.csv", "--no-figures")[0] != 2
+        assert (tmp_path / "runs/log_and_1_more_assessed/result.json").is_file()

@@ -114,11 +114,16 @@ def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
     ],
 )
 def test_a_column_goes_by_its_unit_where_no_other_has_it(header, channels, log):
-    assert read(log(f"time,{header}", EVEN), replace(UNITS, channels=channels)).lengths == (200,)
+    record = read(log(f"time,{header}", EVEN), replace(UNITS, channels=channels))
+    assert "column-by-unit" in codes(record)
+    again = record.columns_option.removeprefix("--columns ").strip("' ")
+    assert again == ",".join(f"{c}={h}" for c, h in zip(("u1", "y1"), header.split(","), strict=True))
 
 
-@pytest.mark.parametrize("header", ["outside (°C),room (°C)", "a [V],b [V]", "valve [%],room [K]"])
-def test_two_columns_of_a_unit_are_asked_for(header, log):
+@pytest.mark.parametrize(
+    "header", ["outside (°C),room (°C)", "a [V],b [V]", "valve [%],room [K]", "humidity [%],room (°C)"]
+)
+def test_columns_of_other_names_or_units_are_asked_for(header, log):
     units = replace(UNITS, channels={"u1": ("valve", "%"), "y1": ("", "degC")})
     with pytest.raises(DataError) as raised:
         read(log(f"time,{header}", EVEN), units)
@@ -129,8 +134,11 @@ def test_the_reference_of_a_loop_is_the_column_that_is_called_so(tmp_path):
     rows = "\n".join(f"{2 * k},{u},{y},{u + y}" for k, (u, y) in enumerate(zip(U, Y, strict=True)))
     (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],reference r [%]\n{rows}\n")
     channels = {"u1": ("inlet valve", "%"), "y1": ("", "cm")}
-    record = read(tmp_path / "d.csv", replace(UNITS, closed_loop=True, channels=channels))
-    np.testing.assert_allclose(record.r[:, 0], U + Y)
+    loop = replace(UNITS, closed_loop=True, channels=channels)
+    np.testing.assert_allclose(read(tmp_path / "d.csv", loop).r[:, 0], U + Y)
+    # The set point of a controller is in the unit of the output: it is not what is added to the input.
+    (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],setpoint [cm]\n{rows}\n")
+    assert read(tmp_path / "d.csv", loop).r is None
 
 
 def test_a_column_that_only_begins_like_a_time_is_none(log):
