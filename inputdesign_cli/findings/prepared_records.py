@@ -95,7 +95,7 @@ _SPELLINGS = {
 }
 
 
-@finding(NOTE, "column-by-unit", "If it is another column, name that with --columns.")
+@finding(NOTE, "column-by-unit", "Name the right column with --columns if this is wrong.")
 def columns_by_unit(kind: FindingKind, taken: Mapping[str, str]) -> list[Finding]:
     """A column was taken for a channel by its unit. Its name is not that of the channel in the spec.
 
