@@ -10,13 +10,13 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
-from inputdesign_cli.explore.sweep import Regressed, sweep, whitening
-from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.explore.sweep import Regressed, sweep, whitened, whitening
 
 _HIGHEST = 3
 # Of longer records means over stretches give a slope as well: a line is slow.
 _MOST_SAMPLES = 1500
-# A line counts if its slope is _CERTAIN deviations from zero, and it rises by _RISES times its scatter.
+# A line counts if it is _CERTAIN deviations from none, by the likelihood ratio, and it rises by _RISES times
+# its scatter.
 _CERTAIN, _RISES = 5.0, 1.0
 # A root of the noise that fades by fewer time constants within the records may be that of a random walk,
 # whose residuals look so beside all that was estimated.
@@ -44,11 +44,13 @@ def slopes_of(parts: Parts, *, known: bool = False) -> Array:
 def _line(parts: Parts, known: bool) -> float:
     """Return the slope of one output; zero unless it is far from none in noise of any colour.
 
-    The residual of an output-error model with a line is whitened by an autoregression. The deviation of
-    the slope follows from the whitened line.
+    The residual of an output-error model with a line is whitened by an autoregression. The likelihood ratio
+    of the whitened records judges, with the plant estimated anew beside a level alone: a plant that is slower
+    than the record, or leaks, may explain what looks like a line.
     """
     samples, longest = sum(len(y) for _, y in parts), max(len(y) for _, y in parts)
-    best = sweep(parts, max(min(_HIGHEST, samples // 12), 1), line=True).best
+    highest = max(min(_HIGHEST, samples // 12), 1)
+    best = sweep(parts, highest, line=True).best
     # A line that goes beyond what the output does is that of a plant which integrates.
     reach = max(float(np.ptp(y)) for _, y in parts)
     if not np.isfinite(best.slope) or abs(best.slope) * longest >= reach:
@@ -61,13 +63,20 @@ def _line(parts: Parts, known: bool) -> float:
     A = whitening(errors)
     if float(np.max(np.roots(A).real, initial=0.0)) > 1.0 - _WALKS / samples:
         return 0.0
-    power, size, count = 0.0, 0.0, 0
-    for e in (e for e in errors if len(e) > 2 * A.size):
-        new, line = filtered(A, [1.0], np.stack([e, np.arange(len(e), dtype=float)]))[:, A.size - 1 :]
-        power, count = power + float(new @ new), count + len(new)
-        size += float(np.sum((line - line.mean()) ** 2))
-    clear = abs(best.slope) * np.sqrt(size) > _CERTAIN * np.sqrt(power / max(count, 1))
-    return best.slope if clear else 0.0
+    white = whitened(parts, A)
+    line = sweep(white, highest, line=True).best
+    level = Regressed(white, line.order).output_error(line.delays, line.F)
+    own = Regressed([(u[:, :0], y) for u, y in white], line.order).output_error((), level.F)
+    if _gain(own.loss, level.loss, samples) < _CERTAIN**2:
+        # No input is answered. Then any line would pass for a plant that slowly returns from its start.
+        flat = np.concatenate([y - y.mean() for _, y in white])
+        return best.slope if _gain(float(np.mean(flat**2)), line.loss, samples) > _CERTAIN**2 else 0.0
+    return best.slope if _gain(level.loss, line.loss, samples) > _CERTAIN**2 else 0.0
+
+
+def _gain(loss: float, less: float, samples: int) -> float:
+    """Return the likelihood ratio of two mean squares of white residuals; chi-squared for one parameter."""
+    return samples * float(np.log(loss / max(less, 1e-300)))
 
 
 def levelled(parts: Parts, slopes: Array) -> list[tuple[Array, Array]]:

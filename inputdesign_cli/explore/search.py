@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.explore.division import busiest, cut
-from inputdesign_cli.explore.fits import LEAST_DECAY, NOT_COMPUTED, Parts, fits, is_steady
+from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady
 from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import (
     Regressed,
@@ -225,8 +225,7 @@ class _Records:
             judged.prediction[0],
             float(np.log(max(noise[0, 0], 1e-300))) + price(unknowns, self.samples),
             found.converged or physical,  # kinks at dead times stop a quick search early
-            # Of a plant by its time constants, none may be longer than the record.
-            shape.integrates or is_steady(model, self.samples, 1.0 if physical else LEAST_DECAY),
+            shape.integrates or is_steady(model, self.samples),
             certain(model.theta[plant], deviations, model.dead_times[plant], self.step * physical),
             tuple(test.name for test in failed(tests)),
         )

@@ -295,3 +295,19 @@ def test_a_bump_up_and_down_tells_gain_and_time_constant(seed):
     w = np.array([1e-3, 0.01, 0.03])
     truth = 0.8 * (1.0 - pole) * np.exp(-7j * w) / (1.0 - pole * np.exp(-1j * w))
     assert np.abs(found.model.plant_at(w)[:, 0, 0] / truth - 1.0).max() < 0.05
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("share", [3.0, 1.0, 0.3])
+def test_a_tank_that_leaks_has_a_time_constant_and_no_drift(share):
+    """Its time constant is `share` of the record. Gain over time constant is known far better than each."""
+    rng, samples = np.random.default_rng(4), 1200
+    T = share * samples * STEP
+    u = held(rng, samples, 130, (-3.0, -1.0, 2.0, 4.0))[:, None]
+    x, _ = SampledModel(lag_of([0.05 * T], [T, 1.0], 1.7), STEP).simulate(u, np.zeros(u.shape), 1.0)
+    found = explore_records([(u, 60.0 + with_noise(rng, x, 4e3, 0.9))], step=STEP)
+    assert not np.any(found.slopes)
+    named = dict(zip(found.model.names, found.estimate.theta, strict=True))
+    at = found.model.names.index("T")
+    assert abs(named["T"] - T) < 4.0 * np.sqrt(found.estimate.covariance[at, at]) < 0.5 * T
+    assert named["K"] / named["T"] == pytest.approx(0.05, rel=0.05)
