@@ -28,7 +28,7 @@ def asked(**more):
         "limits": "{amplitude: 1}",
         "accuracy": "{model_error: {relative: 0.2, band: [0.02, 2.5], alpha: 3}}",
         "spectrum": "{type: free}",
-        "signal": "{type: binary, seconds: 0.5}",
+        "signal": "{type: binary, seconds: 0.1}",
         "solver": "{windows: 8}",
     }
     return parse_spec("\n".join(f"{key}: {value}" for key, value in {**keys, **more}.items()))
@@ -64,7 +64,7 @@ def test_the_record_is_as_near_to_the_bound_as_stated_and_beats_every_pseudo_ran
 
 
 def test_a_record_of_few_held_values_is_the_best_of_all():
-    results = solve(asked(experiment="{samples: 24}", signal="{type: binary, hold: 4, seconds: 2}"))
+    results = solve(asked(experiment="{samples: 24}", signal="{type: binary, hold: 4, seconds: 0.1}"))
     u = results.signal[:, 0].reshape(-1, 4)
     assert np.all(u == u[:, :1])
     every = [ratio(np.repeat((1.0, *rest), 4)) for rest in product((-1.0, 1.0), repeat=5)]
@@ -153,7 +153,7 @@ def test_the_best_record_of_few_moves_is_found(returns):
         experiment="{samples: 12}",
         limits="{amplitude: 1, moves: 4}",
         solver="{windows: 4}",
-        signal=f"{{type: binary, seconds: 1, return: {str(returns).lower()}}}",
+        signal=f"{{type: binary, seconds: 0.1, return: {str(returns).lower()}}}",
     )
     found = solve(spec).signal[:, 0]
     free = 12 - returns
