@@ -16,6 +16,7 @@ noise: {variance: 1.0}
 accuracy: {criterion: T}
 limits: {amplitude: 1, rate: 0.2, samples: 500}
 spectrum: {type: multisine, lines: 50}
+solver: {any_spectrum: false}
 """
 HEATER = """
 sample_time: 5
