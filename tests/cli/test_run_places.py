@@ -6,12 +6,14 @@ import json
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from inputdesign_cli import questions
 from inputdesign_cli.errors import OutputError
+from inputdesign_cli.figures import plots
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import Origin, check_place, write_run
 from tests.support.outcomes import typed
@@ -310,8 +312,14 @@ def test_a_report_replaces_its_own_pages_only_or_goes_to_standard_output(run, an
     assert set(tmp_path.rglob("*")) == before
 
 
-def test_a_spec_has_the_form_of_its_figures(run, tmp_path):
+def test_a_spec_has_the_form_of_its_figures(run, tmp_path, monkeypatch):
     """A column is 3.5 inches wide, of 72 points each; the option comes before the spec."""
+    every = plots.draw_all
+
+    def one_figure(results, *form):
+        return every(replace(results, curves={"spectrum": results.curves["spectrum"]}), *form)
+
+    monkeypatch.setattr(plots, "draw_all", one_figure)
     spec = write(tmp_path / "a.yaml", "one")
     spec.write_text(spec.read_text() + "figures: {width: column, format: pdf}\n")
     assert run("analyse", "a.yaml")[0] == 0

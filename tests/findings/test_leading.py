@@ -93,6 +93,7 @@ def test_the_command_ends_the_matter(fault, seed, tmp_path):
 def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys):
     """In the folder of the user, with names that have blanks, and with the options that were typed."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("inputdesign_cli.figures.plots.draw_all", lambda *_: {})
     folder, idesign = Path("of today"), caller(monkeypatch, capsys)
     folder.mkdir()
     record(folder / "a record.csv", fault, 0)
