@@ -300,17 +300,18 @@ def test_nothing_follows_through_a_parameter_at_its_limit():
     ],
     ids=["leaks", "a lag more", "drifts"],
 )
-def test_a_linear_plant_of_another_structure_is_not_called_nonlinear(true, model, drift):
+@pytest.mark.parametrize("seeds", [3, pytest.param(8, marks=pytest.mark.slow)])
+def test_a_linear_plant_of_another_structure_is_not_called_nonlinear(true, model, drift, seeds):
     """A tank that fills and leaks, modelled as an integrator, had a gain that depended on its level."""
     named, refuted = [], 0
-    for seed in range(8):
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         u = 10.0 * np.repeat(rng.uniform(-1.0, 1.0, 36), 20)
         y = scipy.signal.lfilter(*true, u) + drift * np.sin(np.arange(720) / 120)
         found = identify(model, u[:, None], (y + 0.15 * rng.standard_normal(720))[:, None])
         refuted += bool(found.tests.failed)
         named += [one for one in found.tests.failed if one.fault in ("change", "nonlinear")]
-    assert refuted >= 6
+    assert refuted >= 0.75 * seeds
     assert not named
 
 

@@ -147,7 +147,7 @@ def test_the_record_of_a_shortest_experiment_may_be_too_long():
 
 
 def test_a_model_of_many_parameters_is_refused_with_what_fits():
-    zeros = ", ".join(["0"] * 150)
+    zeros = ", ".join(["0"] * 127)
     found = refused(f"plant: {{B: [0, 1], A: [1, {zeros}, 0.5]}}\nnoise: {{variance: 1}}\n{ASKED}")
     assert found.key == "plant"
     assert "127 parameters fit" in found.hint

@@ -257,7 +257,7 @@ conflicting-keys experiment.prior.parameters | experiment.prior={information: mo
 """),
     "uncertain loop": (LOOP, """
 bad-interval uncertainty.intervals.b1 | uncertainty={intervals: {b1: [-90, -30], f1: [-0.9, -0.7]}}
-no-stable-plant uncertainty | uncertainty={covariance: [[1.0e+4, 0], [0, 1]]}
+no-stable-plant uncertainty | uncertainty={covariance: [[1.0e+4, 0], [0, 1]], scenarios: 25}
 no-stable-plant uncertainty.stable_within | uncertainty={covariance: [[1, 0], [0, 1]], stable_within: 0.5}
 not-supported limits | GIVEN_ONE | limits={input_power: 9} | signal=null
 """),
