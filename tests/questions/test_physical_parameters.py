@@ -22,15 +22,7 @@ accuracy: {model_error: {relative: 0.1, band: [0.05, 1.5]}}
 spectrum: {type: fir, order: 8}
 solver: {tolerance: 1.0e-10}
 """
-# One plant: by its gain, time constant and dead time, by expressions, and by its coefficients.
-WORDS = {
-    "process": "{continuous: {gain: 2.0, time_constant: 3.0, dead_time: 1.685}, sample: zoh}",
-    "named": "{parameters: {K: 2.0, T: 3.0, L: 1.685}, sample: zoh, "
-    "continuous: {numerator: [K], denominator: [T, 1], delay: L}}",
-    "logarithms": "{parameters: {lnK: 0.6931471805599453, r: 0.3333333333333333, L: 16.85}, sample: zoh, "
-    "continuous: {numerator: [exp(lnK)*r], denominator: [1, r], delay: L/10}}",
-    "coefficients": "{continuous: {numerator: [2.0], denominator: [3.0, 1], delay: 1.685}, sample: zoh}",
-}
+PROCESS = "{continuous: {gain: 2.0, time_constant: 3.0, dead_time: 1.685}, sample: zoh}"
 
 
 def spec_of(plant, rest=REST) -> Spec:
@@ -61,7 +53,7 @@ def record_of(model, samples=600, seed=0):
 def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
     """Within four standard deviations, whatever the nominal values."""
     words = dict(zip(("gain", "time_constant", "dead_time"), json.loads(nominal), strict=True))
-    truth = build_model(spec_of(WORDS["process"]))
+    truth = build_model(spec_of(PROCESS))
     start = build_model(spec_of(json.dumps({"continuous": words, "sample": "zoh"})))
     u, y = record_of(truth)
     found = identify(start, u, y, start=start.theta)
