@@ -209,7 +209,8 @@ sys.argv = ['idesign', '--help']
 try: main()
 except SystemExit: pass
 """
-DESIGN = "from inputdesign_cli import load_spec, solve; solve(load_spec('specs/first_order.yaml', []))"
+SMALL = "load_spec('specs/first_order.yaml', ['spectrum.order=2'])"
+DESIGN = f"from inputdesign_cli import load_spec, solve; solve({SMALL})"
 
 
 @pytest.mark.parametrize(

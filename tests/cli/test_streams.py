@@ -138,7 +138,7 @@ command.main()
 WORK = ("Finalised()", "import dropping", 'type("Made", (), dict(attribute=Attribute()))')
 
 
-@pytest.mark.first(6)
+@pytest.mark.first(4)
 @pytest.mark.parametrize("work", WORK, ids=["finalised", "dropped", "wrapped"])
 @pytest.mark.parametrize("where", ["guarded", "outside"])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -93,7 +93,7 @@ def moved(seed):
     rng = np.random.default_rng(seed)
     u = np.repeat([0.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, -1.0], 15)
     y = 2.0 * answer(u, 4.0, 2.5) + 0.35 * rng.standard_normal(u.size)
-    lags, lates = np.linspace(1.0, 10.0, 73), np.linspace(0.02, 6.0, 200)
+    lags, lates = np.linspace(1.0, 10.0, 37), np.linspace(0.02, 6.0, 200)
     log = np.empty((lags.size, lates.size))
     for i, lag in enumerate(lags):
         for j, late in enumerate(lates):
@@ -150,8 +150,8 @@ def controlled(seed, samples=240):
     return u[:, None], y[:, None]
 
 
-@pytest.mark.parametrize("start", [10.0, 12.0])
-@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.first(2)
+@pytest.mark.parametrize(("seed", "start"), [(0, 12.0), (2, 10.0), (0, 10.0), (2, 12.0)])
 def test_the_best_minimum_is_found_twenty_deviations_beside(seed, start):
     """Each sample of dead time has a minimum: 9 was estimated as 10.9 +- 0.1, and the plant refuted."""
     found = identify(stated(TANK.format(start)), *controlled(seed), 5.0, feedback=True, rest=True)

@@ -73,9 +73,9 @@ def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
     assert bound.bound >= design.any_spectrum.certificate.bound * (1.0 - 1e-6)
 
     rng = np.random.default_rng(0)
-    starts = [bound.best, *(np.sign(rng.standard_normal((samples, 1))) for _ in range(4))]
+    starts = [bound.best, np.sign(rng.standard_normal((samples, 1)))]
     search = FlipSearch([goal], np.array([[-1.0], [1.0]]), samples)
-    record, ratio = search.best(starts, rng, enough=0.0, over=lambda: False, changes=20)
+    record, ratio = search.best(starts, rng, enough=0.0, over=lambda: False, changes=5)
     assert ratio == pytest.approx(best, rel=1e-9)
     assert goal.worst(goal.plant.information(record)) == pytest.approx(ratio, rel=1e-9)
 
@@ -88,14 +88,13 @@ def test_held_values_have_a_bound_of_their_own():
     assert 0.6 * best <= np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("amplitude", [1e-14, 1e-6, 1e9])
-def test_the_bound_on_errors_falls_as_the_amplitude_grows(amplitude):
+def test_the_bound_on_errors_falls_as_the_amplitude_grows():
     bounds = []
-    for size in (1.0, amplitude):
+    for size in (1.0, 1e-14, 1e-6, 1e9):
         design = designed(PLANTS[0][0], 20, ERROR, limits={"amplitude": {"input": size}})
         found = bound_over_records(design.problem, design.any_spectrum, 20, windows=5)
         bounds.append(np.sqrt(found.bound) * size)
-    assert bounds[1] == pytest.approx(bounds[0], rel=1e-3)
+    assert bounds[1:] == pytest.approx([bounds[0]] * 3, rel=1e-3)
 
 
 def test_fewer_samples_than_the_bound_do_not_suffice():
@@ -110,11 +109,11 @@ def test_fewer_samples_than_the_bound_do_not_suffice():
 
 def test_two_inputs():
     plant = {"B": [[[0, 1.0], [0, 0.5]]], "F": [[[1, -0.5], [1, 0.3]]]}
-    design = designed(plant, 5, {"criterion": "D"})
-    bound = bound_over_records(design.problem, design.any_spectrum, 5, windows=4)
-    goal = worst_of(design, 5)
+    design = designed(plant, 4, {"criterion": "D"})
+    bound = bound_over_records(design.problem, design.any_spectrum, 4, windows=3)
+    goal = worst_of(design, 4)
     letters = np.array(list(product((-1.0, 1.0), repeat=2)))
-    best = min(goal.worst(goal.plant.information(np.array(u))) for u in product(letters, repeat=5))
+    best = min(goal.worst(goal.plant.information(np.array(u))) for u in product(letters, repeat=4))
     assert np.sqrt(bound.bound) <= best * (1.0 + 1e-9)
 
 
@@ -132,7 +131,7 @@ def test_a_record_shorter_than_the_longest_run_is_searched():
     goal = worst_of(design, 5)
     start = np.ones((5, 1))
     search = FlipSearch([goal], np.array([[-1.0], [1.0]]), 5)
-    _, found = search.best([start], np.random.default_rng(0), enough=0.0, over=lambda: False, changes=20)
+    _, found = search.best([start], np.random.default_rng(0), enough=0.0, over=lambda: False, changes=5)
     assert found == pytest.approx(best_of_all(goal, 5), rel=1e-9)
 
 
