@@ -153,15 +153,6 @@ def test_a_model_of_many_parameters_is_refused_with_what_fits():
     assert "127 parameters fit" in found.hint
 
 
-@pytest.mark.slow
-def test_a_wide_plant_of_long_polynomials_is_refused():
-    row = ", ".join(["[0" + ", 1" * 100 + "]"] * 20)
-    assert (
-        refused(f"plant: {{B: [{', '.join([f'[{row}]'] * 20)}]}}\nnoise: {{variance: 1}}\n{ASKED}").key
-        == "plant"
-    )
-
-
 def test_the_solver_is_given_what_is_left(slow_solver):
     text = f"{PLANT}{ASKED}experiment: {{samples: 500}}\n".replace("order: 3", "order: 20")
     solve(parse_spec(text + "solver: {time_limit: 10000}"))

@@ -40,7 +40,6 @@ bad-limit limits.spectrum | limits={spectrum: {max: 1, min: {numerator: [1.5]}}}
 not-sampled accuracy.weighted_variance.weight | accuracy={weighted_variance: {weight: {continuous: {numerator:
   [1], denominator: [1, 1]}}, max: 1}}
 unknown-word accuracy.weighted_variance.relative | accuracy={weighted_variance: {max: 1, relative: perhaps}}
-needs-limits accuracy.model_error | objective=best_accuracy
 not-supported solver.method | solver={method: lmi} | limits={input_power: 1}
 conflicting-keys signal.periods | signal={periods: 3}
 conflicting-keys signal.hold | signal={hold: 7}
@@ -133,7 +132,6 @@ out-of-range experiment.controller.pid.Kp | UNDER {pid: {Kp: 0}}} | plant=ONE
 out-of-range experiment.controller.pid.Ti | UNDER {pid: {Kp: 1, Ti: 0}}} | plant=ONE
 improper-transfer experiment.controller.pid.Tf | UNDER {pid: {Kp: 1, Td: 1, Tf: 0}}} | plant=ONE
 unknown-key experiment.controller.pid.Ki | UNDER {pid: {Kp: 1, Ki: 3}}} | plant=ONE
-unknown-word experiment.controller.pid.sample | UNDER {pid: {Kp: 1, sample: forward}}} | plant=ONE
 out-of-range experiment.controller.delay | UNDER {pid: {Kp: 1}, delay: -1}} | plant=ONE
 unstable-loop experiment.controller | UNDER {pid: {Kp: -3, Ti: 1}}} | plant=ONE
 missing-key experiment.controller.sample | UNDER {continuous: {numerator: [1], denominator: [1, 0]}}} |
@@ -165,8 +163,6 @@ improper-transfer plant.continuous.numerator[0][0] | plant.continuous.numerator=
 unstable-polynomial plant.continuous.denominator[0][0] | plant.continuous.denominator=[[[1, -1.5, 1.6], [1, 2,
   1.1]], [[1, 0.5, 1.1], [1, 1, 0.3]]]
 bad-band spectrum.band | spectrum.band=[2, 2]
-out-of-range limits.input_power | limits.input_power=0
-conflicting-keys limits.input_power.min | limits.input_power={min: 20, max: 10}
 needs-band spectrum | spectrum={type: free}
 not-identifiable plant | plant.continuous={numerator: [[[1, 1], [1]]], denominator: [[[1, 2, 1], [1, 1]]]} |
   noise.variance=1
@@ -178,11 +174,9 @@ not-supported signal.type | signal.type=binary
 not-supported signal.hold | signal.hold=2
 not-supported spectrum.factor_columns | accuracy={standard_deviation: {'b0[1,1]': 0.1}} |
   spectrum.factor_columns=1
-unsuitable-key noise.C | noise.C=[1, 0.5]
 """),
     "matrix loop": (MATRIX_LOOP, """
 wrong-shape experiment.controller.numerator | experiment.controller.numerator=[[[0.3], [0]]]
-wrong-shape experiment.controller | experiment.controller={numerator: [1]}
 unstable-loop experiment.controller | experiment.controller.numerator=[[[-0.3], [0]], [[0], [0.3]]]
 """),
     "sensitivity": (SENSITIVITY, """
@@ -388,18 +382,14 @@ not-supported limits.energy | limits={energy: 5}
 """),
     "regression_fir": (None, """
 wrong-shape SQUARED.estimated | SQUARED.estimated=[1, 2]
-wrong-shape SQUARED.neglected | SQUARED.neglected=[1, 2]
 out-of-range SQUARED.target | SQUARED.target=0
 out-of-range SQUARED.neglected_norm | SQUARED.neglected_norm=-0.1
 out-of-range noise.variance | noise.variance=0
 out-of-range limits.energy | SQUARED.target=null | limits.energy=0
-needs-limits SQUARED | SQUARED.target=null
 not-supported limits.energy | limits.energy=3
 zero-weights SQUARED.estimated | SQUARED.estimated=[0]
-wrong-shape simulation.plant.parameters | simulation.plant.parameters=[1]
 unsuitable-key noise.C | noise.C=[1, 0.5]
 not-supported experiment.prior | experiment.prior={information: [[1]]}
-needs-limits objective | objective=shortest_experiment
 not-supported limits.amplitude | limits.amplitude=1
 not-supported solver.method | solver.method=lmi
 not-supported signal.type | signal.type=multisine
@@ -409,7 +399,6 @@ not-supported SQUARED | spectrum={given: {type: white, power: 1}}
     "motor_loop": (None, """
 unstable-loop experiment.controller | experiment.controller.numerator=[-40, 36.2]
 algebraic-loop experiment.controller | plant.continuous={numerator: [1, 9], denominator: [1, 2]}
-unsuitable-key experiment.controller | plant.sample=null
 wrong-shape experiment.controller.numerator | experiment.controller={numerator: [[[40]]]}
 infinite-information plant | plant.continuous.denominator=[1, 12, 0]
 admissible-not-positive accuracy.model_error | accuracy.model_error.sensitivity.max_db=4
@@ -417,8 +406,6 @@ unstable-loop experiment.controller | accuracy.model_error.sensitivity={max_db: 
   [-11], denominator: [1]}}
 wrong-shape accuracy.model_error.sensitivity.controller.numerator | accuracy.model_error.sensitivity={max_db:
   6, controller: {numerator: [[[9]]]}}
-unsuitable-key spectrum.type | experiment.controller=null | plant.sample=null |
-  accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [9], denominator: [1]}}
 """),
 }  # fmt: skip
 # What rows say in short.

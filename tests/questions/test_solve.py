@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
-from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.questions import execute
 from inputdesign_cli.questions.least_cost.sought import GridMethod
 from tests.support.first_order_specs import ERROR, PLANT
+from tests.support.outcomes import codes_in
 from tests.support.refusals import refusals
 
 ROOT = Path(__file__).parent.parent.parent
@@ -81,8 +81,9 @@ def test_equal_seeds_give_equal_signals():
 def test_grid_method_reports_itself_honestly():
     outcome = solve(spec_of(SMALL, solver="{method: lmi, grid: 60}"))
     assert outcome.result["status"] == "optimal_on_grid"
-    assert any("on the grid of 60 frequencies" in note for note in outcome.result["notes"])
-    assert "on a grid of 60 frequencies" in summary(outcome.outcome, "s", [])
+    (told,) = [one for one in outcome.result["findings"] if one["code"] == "accuracy-on-grid"]
+    assert told["figures"]["grid"] == 60
+    assert told["figures"]["worst_ratio"] == pytest.approx(1.0, abs=1e-2)
     assert outcome.result["cost"] == pytest.approx(solve(spec_of(SMALL)).result["cost"], rel=1e-5)
 
 
@@ -132,7 +133,7 @@ def test_the_bound_over_every_spectrum_can_be_left_out(kind):
     assert fast["objective"]["value"] == whole["objective"]["value"]
     free = kind == "free"  # itself every spectrum
     assert ("any_spectrum_bound" in fast["objective"]) is free
-    assert any("--fast" in note for note in fast.get("notes", [])) is not free
+    assert ("other-spectra-left-out" in codes_in(fast)) is not free
 
 
 # Where a spec names a table, which is TABLE.
@@ -195,9 +196,3 @@ def test_bad_tables(tmp_path, of, content, code, words):
 @pytest.mark.parametrize("path", sorted((ROOT / "specs").glob("*.yaml")), ids=lambda p: p.stem)
 def test_shipped_specs_validate(path):
     validate(load_spec(path))
-
-
-def test_confidence_sets_alpha():
-    """Two parameters in G: the 95 % quantile of chi-squared with two degrees of freedom is 5.991."""
-    spec = parse_spec(SMALL.replace("alpha: 2.45", "confidence: 0.95"))
-    assert solve(spec).result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)), rel=1e-12)
