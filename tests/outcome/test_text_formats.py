@@ -26,6 +26,7 @@ from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_line, csv_rows, csv_text
 from tests.support.commands import caller
 from tests.support.curves import CURVES
+from tests.support.refusals import refused
 
 
 def bits(x: float) -> bytes:
@@ -131,7 +132,8 @@ experiment: {samples: 120}
 accuracy: {model_error: {relative: 0.3}}
 spectrum: {type: fir, order: 2}
 signal: {candidates: 2}
-uncertainty: {scenarios: 3, fresh: 20, intervals: {"a1[1]": [-0.72, -0.68], "b1[2,2]": [1.1, 1.3]}}
+solver: {any_spectrum: false}
+uncertainty: {scenarios: 2, fresh: 2, intervals: {"a1[1]": [-0.72, -0.68], "b1[2,2]": [1.1, 1.3]}}
 """
 ENTRIES = {"a1[1]", "a1[2]", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]"}
 
@@ -305,6 +307,5 @@ def test_what_figures_show_comes_back_as_it_was(tmp_path):
 )  # fmt: skip
 def test_what_is_no_such_file_is_told_by_its_name(content, tmp_path):
     (tmp_path / FIGURES).write_bytes(content)
-    with pytest.raises(DataError, match=r"figures\.json") as caught:
-        read_curves(tmp_path)
-    assert caught.value.diagnostics[0].code == "run-unreadable"
+    (told,) = refused(read_curves, tmp_path, kind=DataError)
+    assert (told.code, "figures.json" in told.message) == ("run-unreadable", True)

@@ -9,6 +9,7 @@ from inputdesign_cli.plant import Rational, TransferMatrix, delayed, discretised
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from tests.support.plants import stated
+from tests.support.refusals import code_of
 
 
 def by_definition(b, a, x):
@@ -131,5 +132,7 @@ def test_of_correlated_outputs():
 
 
 def test_noise_that_hardly_forgets_is_refused():
-    with pytest.raises(InaccurateError, match="hardly forgets"):
-        noise("noise: {D: [1, -0.99999], variance: 1.0}")
+    assert (
+        code_of(noise, "noise: {D: [1, -0.99999], variance: 1.0}", kind=InaccurateError)
+        == "integral-inaccurate"
+    )

@@ -138,7 +138,7 @@ def test_plants_in_s_are_assessed(relative, enough, write):
 @pytest.mark.slow
 def test_a_held_input_taken_for_its_interpolation_is_told(write):
     held = recorded_in_s(parse_spec(EACH, overrides=HELD), 1500, 1)
-    assert "plant.sample: zoh" in " ".join(identify(parse_spec(EACH), write(held)).result["notes"])
+    assert "input-taken-as-band-limited" in codes(identify(parse_spec(EACH), write(held)))
 
 
 LOOPS = {

@@ -8,12 +8,12 @@ import pytest
 
 from inputdesign_cli import load_spec, simulate, solve
 from inputdesign_cli.design.regression.model import Regression
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.monte_carlo.regression import run_experiments
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.signal.moments import delayed_regressors, free_regressors
-from tests.support.refusals import refusal
+from tests.support.refusals import code_of, refusal
 
 SPECS = Path(__file__).parents[2] / "specs"
 FREE, FIR = SPECS / "regression.yaml", SPECS / "regression_fir.yaml"
@@ -160,18 +160,16 @@ def test_a_run_has_its_files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("verb", "override", "code", "part"),
+    ("verb", "override", "code"),
     [
-        (solve, "signal.periods=7", "bad-period", "7 equal periods"),
-        (simulate, "simulation=null", "missing-key", "there are none"),
-        (simulate, "simulation.compare=[prbs]", "not-supported", "prbs"),
-        (simulate, "experiment.samples=1", "wrong-shape", "too few"),
+        (solve, "signal.periods=7", "bad-period"),
+        (simulate, "simulation=null", "missing-key"),
+        (simulate, "simulation.compare=[prbs]", "not-supported"),
+        (simulate, "experiment.samples=1", "wrong-shape"),
     ],
 )
-def test_what_cannot_be_made_or_simulated(verb, override, code, part):
-    with pytest.raises(SpecError, match=part) as error:
-        verb(load_spec(FIR, [override]))
-    assert error.value.diagnostics[0].code == code
+def test_what_cannot_be_made_or_simulated(verb, override, code):
+    assert code_of(verb, load_spec(FIR, [override])) == code
 
 
 def test_an_infeasible_target_says_what_would_be_feasible():

@@ -12,6 +12,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.questions.frequency_response.measure import whole_periods
 from inputdesign_cli.records import Record
+from tests.support.refusals import code_of
 
 PERIOD = 20
 
@@ -53,8 +54,8 @@ def test_as_many_periods_as_lie_between_the_gaps_count(gaps, skip, step, files):
     data = record(pieces, step=step, files=files)
     most = files * most_by_trial(pieces, skip)
     if most < 2:
-        with pytest.raises(DataError, match="whole periods of 20 samples"):
-            whole_periods(Periods(PERIOD, skip=skip), data, "a.csv", step)
+        few = code_of(whole_periods, Periods(PERIOD, skip=skip), data, "a.csv", step, kind=DataError)
+        assert few == "too-few-samples"
         return
     counted = whole_periods(Periods(PERIOD, skip=skip), data, "a.csv", step)
     kept, periods, repeats = counted.data, counted.periods, counted.repeats
@@ -79,8 +80,10 @@ def test_records_without_gaps_stay_as_they_are():
 
 def test_blocks_with_a_gap_are_refused():
     data = record([(0, 50), (51, 160)])
-    with pytest.raises(DataError, match="blocks of whole periods"):
-        whole_periods(Periods(PERIOD, blocks=2, skip=1), data, "a.csv", 1.0)
+    assert (
+        code_of(whole_periods, Periods(PERIOD, blocks=2, skip=1), data, "a.csv", 1.0, kind=DataError)
+        == "bad-period"
+    )
 
 
 TEXT = """

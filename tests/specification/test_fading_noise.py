@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.building.system import build_model
+from tests.support.refusals import code_of
 
 LAG = "plant: {continuous: {gain: 1, time_constant: 60}, sample: zoh}\n"
 POLYNOMIAL = "plant: {B: [0, 1], F: [1, -0.5]}\n"
@@ -57,8 +57,7 @@ def test_the_spec_keeps_the_words_and_can_be_read_again():
     assert "correlation_time: 60" in spec.to_yaml()
     assert "variance" not in spec.to_yaml()
     assert parse_spec(spec.to_yaml()).noise == spec.noise
-    with pytest.raises(SpecError, match="stands beside standard_deviation"):
-        spec.with_(**{"noise.variance": 2.0})
+    assert code_of(spec.with_, **{"noise.variance": 2.0}) == "conflicting-keys"
 
 
 @pytest.mark.parametrize("fades", [0.0, 20.0, 300.0])

@@ -25,3 +25,11 @@ def refusal(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> 
     """The only complaint with which `ask` ends."""
     (found,) = refusals(ask, kind)
     return found
+
+
+def code_of(
+    call: Callable[..., object], *given: object, kind: type[IdesignError] = SpecError, **named: object
+) -> str:
+    """The code of the only complaint with which a call with these arguments ends."""
+    (found,) = refused(call, *given, kind=kind, **named)
+    return found.code

@@ -1,12 +1,14 @@
 """A weight with a pole on the stability limit in its band is refused by its name, whatever it weighs."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import DataError, SpecError
+from tests.support.refusals import refusals
 
 SPEC = """\
 plant: {B: [0, 1], F: [1, -0.7]}
@@ -36,12 +38,16 @@ def refused(content):
     return caught.value.diagnostics[0]
 
 
+def frequency(told):
+    return float(re.search(r"([\d.]+) rad/s", told.message)[1])
+
+
 @pytest.mark.parametrize("at", POLES)
 @pytest.mark.parametrize("key", KEYS)
 def test_a_pole_on_the_circle_is_named_with_its_frequency(key, at):
     told = refused(KEYS[key]({"numerator": [1], "denominator": POLES[at]}))
-    assert told.key == key
-    assert f"{at:.4g} rad/s: it is infinite there" in told.message
+    assert told.code in ("admissible-not-positive", "bad-limit")
+    assert (told.key, frequency(told)) == (key, pytest.approx(at, rel=1e-3))
 
 
 def test_a_band_without_it_does():
@@ -56,15 +62,14 @@ def test_a_zero_is_named_where_nothing_may_vanish(at):
     weight = {"numerator": POLES[at], "denominator": [1]}
     for bound in ("max", "min"):
         told = refused({**BESIDE, "limits": {"spectrum": {bound: weight}}})
-        assert f"vanishes at {at:.4g} rad/s" in told.message
+        assert frequency(told) == pytest.approx(at, rel=1e-3)
     error = {"absolute": 1, "weight": weight, "region": "ellipsoid"}
-    assert f"vanishes at {at:.4g} rad/s" in refused({"accuracy": {"model_error": error}}).message
+    assert frequency(refused({"accuracy": {"model_error": error}})) == pytest.approx(at, rel=1e-3)
 
 
 @pytest.mark.parametrize("value", [9e99, 1e308, 1e-320])
 def test_a_table_has_numbers_that_a_spec_may_have(value, tmp_path):
     (tmp_path / "t.csv").write_text(f"frequency,r_adm\n0,1\n1,{value}\n3.2,1\n")
     table = "accuracy: {model_error: {table: t.csv}}\n"
-    with pytest.raises(DataError, match="in row 3") as caught:
-        solve(parse_spec(SPEC + table, folder=tmp_path))
-    assert caught.value.diagnostics[0].key == "accuracy.model_error.table"
+    (told,) = refusals(lambda: solve(parse_spec(SPEC + table, folder=tmp_path)), DataError)
+    assert (told.code, told.key, "row 3" in told.message) == ("bad-table", "accuracy.model_error.table", True)
