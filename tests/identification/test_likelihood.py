@@ -23,10 +23,6 @@ MODELS = {
 }
 
 
-def lagged(first):
-    return scipy.linalg.toeplitz(first, np.zeros(len(first)))
-
-
 def response(above, below, samples):
     impulse = np.eye(1, samples)[0]
     return scipy.signal.lfilter(above, below, impulse)

@@ -14,11 +14,13 @@ from inputdesign_cli.design.convex.demands import Alternative
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
+from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.common.robust import tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
-from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
+from tests.support.refusals import code_of
+from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, solved
 
 
 @pytest.mark.first(3)
@@ -130,7 +132,8 @@ def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
     text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 9}")
     plant = "uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]%s}"
     assert solved(text, plant % "")["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-6)
-    assert complaint(text, plant % ", floor: 0").code == "admissible-not-positive"
+    without = parse_spec(text, overrides=[plant % ", floor: 0"])
+    assert code_of(build_task, without) == "admissible-not-positive"
     fixed = solved(text, plant % ", r_adm: fixed")
     assert fixed["cost"] < solved(text, plant % "")["cost"]
 
@@ -218,14 +221,14 @@ def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
 
 def test_fresh_plants_are_tried_as_long_as_there_is_time():
     """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
-    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
+    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 60}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     batches = list(done.plants.afresh())
     shares = [
         one.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch.plants)
     ]
     whole = robust_result(done, done.plants)
-    assert whole.entry.fresh.draws == len(shares) == 120
+    assert whole.entry.fresh.draws == len(shares) == 60
     assert whole.entry.fresh.missed == sum(share > 1.0 + 1e-6 for share in shares) > 0
     assert whole.entry.fresh.largest == pytest.approx(max(shares), rel=1e-12)
     assert whole.findings == ()
@@ -241,7 +244,7 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
     assert cut.entry.fresh.draws == first
     assert cut.entry.fresh.missed == sum(share > 1.0 + 1e-6 for share in shares[:first])
     assert [one.code for one in cut.findings] == ["fresh-plants-cut-short"]
-    assert cut.findings[0].figures == {"tried": first, "asked": 120}
+    assert cut.findings[0].figures == {"tried": first, "asked": 60}
 
 
 @pytest.mark.slow

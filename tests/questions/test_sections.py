@@ -64,8 +64,6 @@ SPECIAL = {
         "solver": "{time_limit: 1.0e-9}",
     },
 }
-# What then has no time left.
-OUT_OF_TIME = {("campaign", "solver")}
 # What `assess` does as well, within a few seconds each.
 ALIKE = {("identify", "signal")}
 # Commands that a spec need not ask a design of.

@@ -92,7 +92,6 @@ scalars = st.one_of(
 )
 KEYS = {str(k) for d in DATA for p in places(d) for k in p} | {"", "x", "1", "table", "max", "min"}
 keys = st.sampled_from(sorted(KEYS))
-TARGETS = sorted({"", *(".".join(map(str, p)) for d in DATA for p in places(d))})
 values = st.recursive(
     scalars,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(keys, inner, max_size=3),

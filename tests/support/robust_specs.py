@@ -1,10 +1,6 @@
 """Specs of plants that are not known, and what is made of them."""
 
-import pytest
-
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import SpecError
-from inputdesign_cli.questions import build_task
 from tests.support.first_order_specs import PLANT
 from tests.support.matrix_specs import ARX
 
@@ -52,9 +48,3 @@ COVARIANCE = "[[0.01, 0, 0], [0, 0.001, 0], [0, 0, 0.0004]]"
 
 def solved(text, *overrides):
     return solve(parse_spec(text, overrides=list(overrides))).result
-
-
-def complaint(text, *overrides):
-    with pytest.raises(SpecError) as caught:
-        build_task(parse_spec(text, overrides=list(overrides)))
-    return caught.value.diagnostics[0]
