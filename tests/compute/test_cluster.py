@@ -176,7 +176,7 @@ def test_a_sweep_whose_scheduler_ends_is_finished_later(tmp_path):
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "tls://127.0.0.1:9"])
 def test_no_cluster_is_a_complaint(address):
     with pytest.raises(DataError, match="TLS asks for certificates" if "tls" in address else None) as caught:
-        list(Cluster(address, patience=0.5).run(jobs.square, [1]))
+        list(Cluster(address, patience=0.1).run(jobs.square, [1]))
     assert "tls" in address or caught.value.diagnostics[0].code == "cluster-unreachable"
 
 

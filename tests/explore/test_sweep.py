@@ -64,13 +64,14 @@ def test_orders_of_the_noise_are_found(C, D):
         np.testing.assert_allclose(polynomial, expected, atol=0.07)
 
 
-def test_the_range_of_a_delay_holds_it():
+@pytest.mark.parametrize("seeds", [5, pytest.param(10, marks=pytest.mark.slow)])
+def test_the_range_of_a_delay_holds_it(seeds):
     inside = 0
-    for seed in range(10):
+    for seed in range(seeds):
         one = record(np.random.default_rng(seed), 5, ratio=2.0)
         ((low, high),) = delay_ranges([one], sweep([one], 1).by_order[1], least=0, most=60)
         inside += low <= 5 <= high
-    assert inside >= 8
+    assert inside >= 0.8 * seeds
 
 
 def drifting(seed, slope, samples=1600, pole=0.92):

@@ -214,18 +214,21 @@ def test_bad_data_is_refused_and_the_channel_named(change, code, named):
 
 
 @pytest.mark.parametrize(
-    ("model", "runs"),
+    ("model", "runs", "samples"),
     [
-        (arx(), 200),
-        *(pytest.param(one, 500, marks=pytest.mark.slow) for one in (arx(per_output=False), box_jenkins())),
+        (arx(), 200, 1500),
+        *(
+            pytest.param(one, 500, 3000, marks=pytest.mark.slow)
+            for one in (arx(per_output=False), box_jenkins())
+        ),
     ],
     ids=["arx", "common", "bj"],
 )
-def test_estimates_reach_the_cramer_rao_bound(model, runs):
-    u, y = simulated(model, 3000, np.random.default_rng(16), runs)
+def test_estimates_reach_the_cramer_rao_bound(model, runs, samples):
+    u, y = simulated(model, samples, np.random.default_rng(16), runs)
     found = fit_batch(model, u, y, start=model.theta)
     assert np.all(found.converged)
-    information = theory(model, 3000)
+    information = theory(model, samples)
     alone = identify(model, u[3], y[3], start=model.theta)
     # With a noise model the single estimate has the noise before the record as well.
     apart = (found.theta[3] - alone.theta) / np.sqrt(np.diag(alone.covariance))

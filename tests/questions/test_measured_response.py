@@ -232,15 +232,15 @@ def dead(share):
     return lambda x: np.sign(x) * np.maximum(np.abs(x) - share * np.std(x), 0.0)
 
 
-@pytest.mark.first(6)
+@pytest.mark.first(4)
 @pytest.mark.parametrize(
     ("text", "where", "curve", "noise"),
     [
         (FAULTY, "before", clipping(1.2), 0.005),
-        (FAULTY, "before", clipping(0.5), 0.2),
         (FAULTY, "before", dead(0.3), 0.1),
         (FAULTY, "before", lambda x: x + 0.1 * x**3, 0.1),
         (SHIPPED, "behind", cubic(-0.02), 0.1),
+        (FAULTY, "before", clipping(0.5), 0.2),
         (SHIPPED, "before", saturating(1.0), 0.1),
         (FAULTY, "before", dead(1.0), 0.005),
         (FAULTY, "before", lambda x: x + 0.1 * x**3, 0.005),

@@ -27,6 +27,7 @@ spectrum: {type: multisine, lines: 6}
 signal: {samples: 600}
 simulation: {runs: 100, seed: 2}
 """
+FAST = "solver.any_spectrum=false"
 GIVEN = "spectrum={given: {type: white, power: 450}}"
 TRUE = "[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]"
 
@@ -52,7 +53,7 @@ def within_wishart(simulation):
 
 @pytest.fixture(scope="module")
 def flexible():
-    return simulated(FLEXIBLE, "simulation.runs=200").result
+    return simulated(FLEXIBLE, "simulation.runs=200", FAST).result
 
 
 def test_the_flexible_transmission_keeps_its_promise_on_its_model_only(flexible):
@@ -135,7 +136,7 @@ def test_what_is_known_before_does_not_grow_with_the_record(region):
 
 @pytest.fixture(scope="module")
 def studied():
-    return simulated(ARX, "spectrum.order=2", "simulation={runs: 60, compare: [white, prbs]}")
+    return simulated(ARX, "spectrum.order=2", "simulation={runs: 60, compare: [white, prbs]}", FAST)
 
 
 def test_the_promise_is_kept_on_the_design_model(studied):
@@ -203,7 +204,7 @@ def test_a_true_system_of_another_structure_has_no_theory():
 
 
 def test_a_loop_keeps_its_promise():
-    outcome = simulated(LOOP, "simulation={runs: 50, compare: [white]}")
+    outcome = simulated(LOOP, "simulation={runs: 50, compare: [white]}", FAST)
     result, simulation = outcome.result, outcome.result["simulation"]
     within_wishart(simulation)
     design = simulation["inputs"]["design"]
