@@ -15,6 +15,17 @@ import scipy.optimize
 from inputdesign_cli.spectrum.svec import svec_layout
 
 
+def textbook_value(M, criterion):
+    """log det M, -tr M^-1, the smallest eigenvalue or tr M."""
+    values = np.linalg.eigvalsh(M)
+    return {
+        "D": np.sum(np.log(np.maximum(values, 1e-300))),
+        "A": -np.sum(1 / values),
+        "E": values[0],
+        "T": values.sum(),
+    }[criterion]
+
+
 class Spectral:
     """Half-band polynomial spectra of `experiment` under a total input and a total output power."""
 
@@ -83,13 +94,7 @@ class Spectral:
         return whole @ (vectors / np.sqrt(values))
 
     def value(self, x, criterion):
-        values = np.linalg.eigvalsh(self.information(x))
-        return {
-            "D": np.sum(np.log(np.maximum(values, 1e-300))),
-            "A": -np.sum(1 / values),
-            "E": values[0],
-            "T": values.sum(),
-        }[criterion]
+        return textbook_value(self.information(x), criterion)
 
     def bound(self, x, criterion, weight=None):
         """An upper bound of the criterion over the family."""

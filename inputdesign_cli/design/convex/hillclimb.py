@@ -11,17 +11,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 
-CriterionName = Literal["D", "A", "E", "T"]
 _MAX_STEPS = 100
 _SETTLED = 1e-7
 _STRETCH = (8.0, 3.0, 1.0)
@@ -32,52 +32,34 @@ class QuadraticDesign:
     """The problem for a factor: M_lm = baseline_lm + tr(A_lm H H^*), tr(P H H^*) <= cap for each limit.
 
     `maps` (k, k, n, n) holds the A_lm and `limits` pairs (P, cap), Hermitian where H may be complex.
-    `scale` is L (k, k): the criterion is of L M L^T (raw or relative parameters).
     """
 
     maps: NDArray
     baseline: Array
     limits: tuple[tuple[NDArray, float], ...]
-    criterion: CriterionName
-    scale: Array
+    criterion: Criterion
 
     @property
     def real(self) -> QuadraticDesign:
         """Return the problem for the real and imaginary parts of H, one above the other."""
         if not np.iscomplexobj(self.maps):
             return self
-        return QuadraticDesign(
-            _embedded(self.maps),
-            self.baseline,
-            tuple((_embedded(P), cap) for P, cap in self.limits),
-            self.criterion,
-            self.scale,
-        )
+        limits = tuple((_embedded(P), cap) for P, cap in self.limits)
+        return replace(self, maps=_embedded(self.maps), limits=limits)
 
     def information(self, H: Array) -> Array:
         """Return M for a real factor H (n, c), as (k, k)."""
         return self.baseline + np.einsum("lmab,ac,bc->lm", self.maps, H, H, optimize=True)
 
     def value(self, information: Array) -> float:
-        """Return log det, -tr of the inverse, smallest eigenvalue or trace of L M L^T."""
-        return criterion_value(self.criterion, self.scale @ information @ self.scale.T)
+        """Return the criterion of M (k, k), larger is better; minus infinity where M is singular, T aside."""
+        level = self.criterion.level(information)
+        return self.criterion.value(level) if level > 0.0 else -np.inf
 
     def feasible(self, H: Array) -> Array:
         """Scale H until one limit binds."""
         used = max(float(np.sum(H * (P @ H))) / cap for P, cap in self.limits)
         return H / np.sqrt(used)
-
-
-def criterion_value(criterion: CriterionName, information: Array) -> float:
-    """Return the criterion of M (k, k), larger is better; minus infinity for singular M under D and A."""
-    eigenvalues = np.linalg.eigvalsh(0.5 * (information + information.T))
-    if criterion == "T":
-        return float(np.trace(information))
-    if criterion == "E":
-        return float(eigenvalues[0])
-    if eigenvalues[0] <= 0:
-        return -np.inf
-    return float(np.sum(np.log(eigenvalues)) if criterion == "D" else -np.sum(1.0 / eigenvalues))
 
 
 @dataclass(frozen=True)
@@ -161,19 +143,20 @@ class _Step:
         for P, cap in design.limits:
             root = np.kron(scipy.linalg.sqrtm(P / cap).real, np.eye(columns))
             constraints.append(cp.norm(root @ self._x) <= 1.0)
-        inverse = np.linalg.inv(design.scale)
+        letter, scale = design.criterion.letter, design.criterion.scaling
+        inverse = np.linalg.inv(scale)
         unit = inverse @ inverse.T
         unit = unit / np.linalg.norm(unit, 2)
         objective: Any
-        if design.criterion == "D":
+        if letter == "D":
             objective = cp.log_det(M)
-        elif design.criterion == "A":
+        elif letter == "A":
             objective = -cp.matrix_frac(np.linalg.cholesky(unit), M)
-        elif design.criterion == "E":
+        elif letter == "E":
             objective = cp.Variable()
             constraints.append(M - objective * unit >> 0)
         else:
-            gain = design.scale.T @ design.scale
+            gain = scale.T @ scale
             objective = cp.trace(gain / np.linalg.norm(gain, 2) @ M)
         self._problem: Any = cp.Problem(cp.Maximize(objective), constraints)
 

@@ -97,8 +97,7 @@ class FewColumns:
             np.array([[basis.gram(entry) for entry in row] for row in maps]),
             problem.baseline_information,
             tuple((basis.gram(functional.vector), limit.bound) for limit, functional in functionals),
-            criterion.letter,
-            criterion.scaling,
+            criterion,
         )
         columns, rng = min(self.columns, basis.gram_order), np.random.default_rng(self.seed)
         found = hill_climb(quadratic, columns, starts=_STARTS, rng=rng, guesses=[root])
