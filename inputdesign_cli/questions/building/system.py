@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
-from inputdesign_cli.design.convex.limits import Weight
+from inputdesign_cli.design.convex.limits import Goal, Weight
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.identification import Earlier
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
@@ -48,6 +48,8 @@ from inputdesign_cli.specification.models.plant import (
 
 # A pole this near to the unit circle is on it, but for rounding.
 _ROUNDING = 1e-9
+GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
+"""What a design varies, by its `objective` in the spec."""
 
 
 def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> StateSpaceModel:

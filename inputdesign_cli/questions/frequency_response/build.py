@@ -18,7 +18,7 @@ from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.model_error import positive_table
 from inputdesign_cli.questions.building.signal_settings import build_record_request
 from inputdesign_cli.questions.building.spectra import build_power_limits, implied_limits
-from inputdesign_cli.questions.building.system import build_cost, build_model
+from inputdesign_cli.questions.building.system import GOALS, build_cost, build_model
 from inputdesign_cli.questions.building.tables import has_column
 from inputdesign_cli.questions.building.uncertainty import build_simulation
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
@@ -28,7 +28,6 @@ from inputdesign_cli.signal import harmonic_grid
 from inputdesign_cli.specification import FrequencyResponse, Spec
 from inputdesign_cli.specification.models.sizes import most
 
-_GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
 # Periods that are tried for a hint, up to that many times as long.
 _LONGEST, _TRIED = 1e3, 400
@@ -57,7 +56,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
     stated = spec.accuracy.frequency_response
     assert stated is not None
     _check_supported(spec)
-    goal: Goal = "given" if not spec.designs else _GOALS[spec.goal]
+    goal: Goal = "given" if not spec.designs else GOALS[spec.goal]
     periods = _periods(spec, stated, shortest=goal == "samples")
     model = build_model(spec)
     grid = _grid(spec, stated, periods.period)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from inputdesign_cli.design.convex.demands import Question
-from inputdesign_cli.design.convex.limits import Goal
 from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design
 from inputdesign_cli.questions.building.header import build_header
@@ -20,6 +19,7 @@ from inputdesign_cli.questions.building.spectra import (
     implied_limits,
 )
 from inputdesign_cli.questions.building.system import (
+    GOALS,
     build_cost,
     build_experiment,
     check_known,
@@ -35,15 +35,13 @@ from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
 
-_GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
-
 
 def build_convex(spec: Spec) -> ConvexTask:
     """Build the design task for requirements and criteria that are convex in the information matrix."""
     check_supported(spec)
     experiment = build_experiment(spec)
     requirements, side = build_asked(spec, experiment)
-    goal, cost = _GOALS[spec.goal], build_cost(spec)
+    goal, cost = GOALS[spec.goal], build_cost(spec)
     experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
     check_pairs(spec, experiment.model.names)
     check_signal(spec)
