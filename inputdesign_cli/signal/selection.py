@@ -101,7 +101,7 @@ class Record:
     @property
     def power(self) -> float:
         """Return the mean square, of all inputs together."""
-        return _power(self.samples)
+        return power_of(self.samples)
 
 
 def best_record(
@@ -176,7 +176,7 @@ class _Candidates:
         if best is None or self.generator.samples > LONG:  # short records take no time to speak of
             seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
-        drawn = float(np.sum(np.mean(values**2, axis=0)))
+        drawn = power_of(values)
         if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
             values = values * np.sqrt(power / drawn)
         if self.generator.kind.slewed:
@@ -282,7 +282,7 @@ class _Candidates:
             return strongest
         fit = self._fitting(values)
         tried = [strongest, *(self._affordable(record, share * fit) for share in _CLIPPED)]
-        within = [samples for samples in tried if _power(samples) <= _power(strongest) * MET]
+        within = [samples for samples in tried if power_of(samples) <= power_of(strongest) * MET]
         return min(within, key=self.evaluator.ratio)
 
     def _fitting(self, values: Array) -> float:
@@ -293,8 +293,8 @@ class _Candidates:
     def _of_designed_power(self, record: Callable[[float], Array]) -> Array:
         """Return the record of the power of the design, or of the most below that the limits allow."""
         power = self.generator.spectrum.power
-        level = level_of_power(lambda a: _power(record(a)), power, 1.0)
-        while _power(record(level)) > power * MET:
+        level = level_of_power(lambda a: power_of(record(a)), power, 1.0)
+        while power_of(record(level)) > power * MET:
             level *= 1.0 - 1e-3
         return self._affordable(record, level)
 
@@ -324,6 +324,6 @@ def _of_peaks(values: Array, peaks: Array) -> Array:
     return values * (peaks / np.where(largest > 0.0, largest, 1.0))
 
 
-def _power(samples: Array) -> float:
+def power_of(samples: Array) -> float:
     """Return the mean square, summed over the channels."""
     return float(np.sum(np.mean(samples**2, axis=0)))

@@ -35,9 +35,10 @@ from inputdesign_cli.questions.assessment.identify import Identification, estima
 from inputdesign_cli.questions.campaign.acceptance import accepted, table_of
 from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests, signals_in
 from inputdesign_cli.questions.campaign.plans import Planner, other_minima, standing
-from inputdesign_cli.questions.campaign.schedule import Rules, Standing, power_of
+from inputdesign_cli.questions.campaign.schedule import Rules, Standing
 from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.signal.selection import power_of
 
 # Data that say nothing yet; more of them will.
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}

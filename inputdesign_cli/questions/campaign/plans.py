@@ -22,13 +22,14 @@ from inputdesign_cli.plant import Model, close_loop
 from inputdesign_cli.plant.model import SampledPlant
 from inputdesign_cli.questions.assessment.identify import ModelQuestion
 from inputdesign_cli.questions.building.rebuild import Change, Rebuild
-from inputdesign_cli.questions.campaign.schedule import REACHED, Planned, Rules, Standing, power_of
+from inputdesign_cli.questions.campaign.schedule import REACHED, Planned, Rules, Standing
 from inputdesign_cli.questions.common.record import design_cost, given_record
 from inputdesign_cli.questions.given.solve import GivenExcitation
 from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
+from inputdesign_cli.signal.selection import power_of
 from inputdesign_cli.spectrum import FlatBasis, TabulatedSpectrum
 
 # A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.

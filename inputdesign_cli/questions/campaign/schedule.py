@@ -178,8 +178,3 @@ class Planned:
     def applied(self) -> Array:
         """Return the samples of the next part, (take, r)."""
         return self.record[: self.take]
-
-
-def power_of(record: Array) -> float:
-    """Return the mean square of all channels (n, r) together."""
-    return float(np.sum(np.mean(record**2, axis=0)))
