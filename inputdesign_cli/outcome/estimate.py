@@ -10,6 +10,13 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.codec import NULL
 from inputdesign_cli.outcome.design import RequirementMet, Rival
 
+Variance = float | tuple[tuple[float, ...], ...]
+
+
+def variance_of(covariance: Array) -> Variance:
+    """Return the variance of the noise of one output, or its covariance (p, p) by rows."""
+    return float(covariance[0, 0]) if covariance.size == 1 else tuple(map(tuple, covariance.tolist()))
+
 
 @dataclass(frozen=True)
 class DetectionLines:
@@ -92,7 +99,7 @@ class Identification:
     method: str | None = None
     theta: Mapping[str, float] | None = None
     standard_deviation: Mapping[str, float] | None = None
-    variance: float | tuple[tuple[float, ...], ...] | None = None
+    variance: Variance | None = None
     converged: bool | None = None
     steps: int | None = None
     starts: int | None = None

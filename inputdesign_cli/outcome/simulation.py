@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.codec import others
 from inputdesign_cli.outcome.design import LossMoments, Powers, TheoreticalLoss
+from inputdesign_cli.outcome.estimate import Variance
 
 Limits = tuple[float, float]
 
@@ -150,7 +151,7 @@ class Simulation:
     excitation: str | None = None
     parameters: tuple[str, ...] | None = None
     true_parameters: Mapping[str, float] | None = None
-    true_variance: float | tuple[tuple[float, ...], ...] | None = None
+    true_variance: Variance | None = None
     wishart_range: tuple[float, ...] | None = None
     improvement: Improvement | None = None
     oracle_cost: float | None = None

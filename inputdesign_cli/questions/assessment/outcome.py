@@ -34,7 +34,7 @@ from inputdesign_cli.outcome.curves import (
     ResponseCurves,
     ResponsePanel,
 )
-from inputdesign_cli.outcome.estimate import PriorAgreement, Test
+from inputdesign_cli.outcome.estimate import PriorAgreement, Test, variance_of
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
@@ -60,7 +60,7 @@ def identification_entry(
     return Identification(
         theta=dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
         standard_deviation=_deviations(estimate),
-        variance=float(estimate.noise[0, 0]) if single else tuple(map(tuple, estimate.noise.tolist())),
+        variance=variance_of(estimate.noise),
         converged=estimate.search.converged,
         steps=estimate.search.steps,
         starts=estimate.search.starts,

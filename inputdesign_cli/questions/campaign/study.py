@@ -29,7 +29,7 @@ from inputdesign_cli.monte_carlo.study import responses
 from inputdesign_cli.outcome import Simulation
 from inputdesign_cli.outcome.campaign import State
 from inputdesign_cli.outcome.curves import Curves, RunCurves, TradeCurves
-from inputdesign_cli.outcome.estimate import Verdict
+from inputdesign_cli.outcome.estimate import Verdict, variance_of
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 from inputdesign_cli.plant import Model
@@ -139,9 +139,7 @@ class CampaignTask:
             seed=self.seed,
             samples=samples,
             true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
-            true_variance=float(model.covariance[0, 0])
-            if model.outputs == 1
-            else tuple(map(tuple, model.covariance.tolist())),
+            true_variance=variance_of(model.covariance),
             inputs={name: way_entry(ended, oracle) for name, ended in ways.items()},
             oracle_cost=None if oracle is None else oracle.cost / samples,
             oracle_record_cost=None if record is None else record / samples,

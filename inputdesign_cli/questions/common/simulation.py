@@ -26,6 +26,7 @@ from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redraw
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
 from inputdesign_cli.monte_carlo.study import PredictedError, Trials, tried_on
 from inputdesign_cli.outcome import Powers, Simulation as Studied, curves as plots
+from inputdesign_cli.outcome.estimate import variance_of
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
@@ -241,7 +242,6 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
         *simulated_runs.one_minimum(searched),
     ]
     model, rng = true.model, np.random.default_rng(plan.seed)
-    several = tuple(map(tuple, model.covariance.tolist()))
     entry = Studied(
         runs=plan.runs,
         seed=plan.seed,
@@ -249,7 +249,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
         samples=true.samples,
         excitation="new" if plan.renewed else "record",
         true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
-        true_variance=float(model.covariance[0, 0]) if model.outputs == 1 else several,
+        true_variance=variance_of(model.covariance),
         wishart_range=tuple(wishart_range(nominal.size, plan.runs, rng)) if plan.runs > 1 else (),
     )
     return with_study(results, entry, started, findings, tables, curves)
