@@ -30,10 +30,6 @@ class SignalConstraint:
     adjoint: LinearMap
     bound: Array
 
-    def tightened(self, factor: float) -> SignalConstraint:
-        """Return the constraint with this share of its bound."""
-        return SignalConstraint(self.apply, self.adjoint, factor * self.bound)
-
 
 def slow_moves(values: Array, rate: float) -> Array:
     """Return the record nearest to `values` (n,), in the largest deviation, with moves up to `rate`.

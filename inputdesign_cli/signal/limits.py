@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -140,7 +140,7 @@ class Limiter:
                     column = np.clip(column, -reach, reach)
                 limited[:, channel] = follow(column, rate)
             if self.constraints:
-                tightened = tuple(one.tightened(shrink) for one in self.constraints)
+                tightened = tuple(replace(one, bound=shrink * one.bound) for one in self.constraints)
                 limited = restrained(limited, tightened, returns=self.settings.returns)
             record = self._converted(limited)
             # Rounding may lift what the record causes over its bound by a little.

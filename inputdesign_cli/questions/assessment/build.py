@@ -19,7 +19,6 @@ from inputdesign_cli.questions.assessment.identify import Identification, ModelQ
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.model_error import build_confidence, unstated_errors
-from inputdesign_cli.questions.building.rebuild import restated
 from inputdesign_cli.questions.building.requirements import build_requirements
 from inputdesign_cli.questions.building.signal_settings import operating_points
 from inputdesign_cli.questions.building.system import (
@@ -110,7 +109,7 @@ def question_at(stated: Spec, model: Model, samples: int, factor: Array, source:
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
     """
-    spec = restated(stated, model, source)
+    spec = stated.revised(blocks_of(model), file=source, design=False)
     raw = build_experiment(spec).with_samples(samples)
     experiment = replace(raw, factor=factor)
 

@@ -17,14 +17,6 @@ Built = TypeVar("Built")
 _PRIOR = {*SOURCES, "parameters"}
 
 
-def restated(spec: Spec, model: Model, source: str) -> Spec:
-    """Return the spec with a model in place of plant and noise; diagnostics name its `source`.
-
-    No design need be asked for. Raises `SpecError`: the spec does not go with this model.
-    """
-    return spec.revised(blocks_of(model), file=source, design=False)
-
-
 @dataclass(frozen=True)
 class Change:
     """Describes how the design of a part differs from the design of the whole experiment.

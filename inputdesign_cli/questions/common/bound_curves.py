@@ -17,7 +17,7 @@ from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome import Spectrum, curves as plots
+from inputdesign_cli.outcome import curves as plots
 from inputdesign_cli.outcome.curves import OptimalityCurves, SpectrumCurves
 from inputdesign_cli.outcome.design import WHITE
 from inputdesign_cli.outcome.results import Table
@@ -313,9 +313,3 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
             within, _ = best_directions(known.price.density(w[seen]), known.value.density(w[seen]))
             columns["ratio_records"] = within
     return Table(columns), OptimalityCurves(frequency, ratio, marks / units.frequency, within)
-
-
-def described_spectrum(units: Units, basis: Basis, x: Array) -> Spectrum:
-    """Return the entry of the outcome for a designed spectrum."""
-    details = dict(basis.described(x, units.frequency))
-    return Spectrum(str(details.pop("type")), details)

@@ -20,7 +20,7 @@ from inputdesign_cli.findings import designs
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
-from inputdesign_cli.questions.common.bound_curves import described_spectrum, distinct
+from inputdesign_cli.questions.common.bound_curves import distinct
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.delivery import KINDS
 from inputdesign_cli.questions.common.robust import Plants, delivered
@@ -86,6 +86,7 @@ def design_outcome(done: Designed) -> Outcome:
     found, problem, answer = done.design.result, done.design.problem, done.answer
     used, costs = spent(done, found.basis, found.x)
     cost = paid_for(problem.paid, costs)
+    spectrum = dict(found.basis.described(found.x, done.header.units.frequency))
     outcome = Outcome(
         title=done.header.title,
         status=answer.status,
@@ -95,7 +96,7 @@ def design_outcome(done: Designed) -> Outcome:
         power=used,
         limits=(*_power_limits(done), *_density_limits(done)) or None,
         information=information_of(done.experiment, done.information),
-        spectrum=described_spectrum(done.header.units, found.basis, found.x),
+        spectrum=out.Spectrum(str(spectrum.pop("type")), spectrum),
         baseline=out.Baseline(_white(done, cost)),
         solver=answer.solver,
     )
