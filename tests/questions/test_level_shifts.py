@@ -106,7 +106,10 @@ def found_with(samples, places, split="halves"):
         for at in places
     )
     estimate = SimpleNamespace(tests=SimpleNamespace(shifted=shifts))
-    return SimpleNamespace(estimate=estimate, samples=np.arange(samples), split=split)
+    model = SimpleNamespace(outputs=1)
+    return SimpleNamespace(
+        estimate=estimate, samples=np.arange(samples), split=split, integrates=(), model=model
+    )
 
 
 @pytest.mark.parametrize(
