@@ -25,7 +25,8 @@ from inputdesign_cli.plant.frequencies import SLACK
 Entry = tuple[int, int]
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
-_BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
+# Slow plants and integrating controllers round the ratio there to about nine digits.
+_BESIDE_ZERO, _FLAT, _ROUNDING = 1e-6, 1e-8, 1e-12
 # Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
@@ -335,7 +336,7 @@ class OverFrequency(Requirement):
         if found.frequency is None or lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
             return found
         at_zero = float(self.ratios(information, np.zeros(1))[0])
-        return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _ROUNDING) else found
+        return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _FLAT) else found
 
 
 def inverse_factor(information: Array) -> Array:

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from inputdesign_cli import analyse, parse_spec
 from inputdesign_cli.accuracy import (
     Absolute,
     Criterion,
@@ -237,3 +238,19 @@ def test_the_slope_of_squared_ratios_is_their_difference(model, entry, weighted)
     up, down = (shares @ requirement.ratios(M + sign * turn, w) ** 2 for sign in (1.0, -1.0))
     change = -2.0 * np.sum(requirement.slope(M, w, shares) * turn)
     assert up - down == pytest.approx(change, rel=1e-6)
+
+
+@pytest.mark.parametrize("leak", [1e-3, 1.5e-4, 1e-5])
+def test_what_is_worst_at_zero_stands_at_zero(leak):
+    """A slow plant and an integrating controller round the ratio near zero: it stood at 3.7e-09 rad/s."""
+    found = analyse(
+        parse_spec(f"""
+sample_time: 5
+plant: {{continuous: {{numerator: [0.02], denominator: [1, {leak}], delay: 9}}, sample: zoh}}
+noise: {{variance: 0.02}}
+experiment: {{samples: 720, controller: {{pid: {{Kp: 1.25, Ti: 160}}}}}}
+accuracy: {{loop: {{tuning: {{simc: {{}}}}, max_sensitivity_db: 6}}}}
+spectrum: {{given: {{type: white, power: 10}}}}
+""")
+    ).result["model_error"]
+    assert found["worst_frequency"] == 0.0
