@@ -88,8 +88,13 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         found = [one for one in against if one.code == DRIFT.code]
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
-    if command == _NEXT[DRIFT.code] and estimate is not None:
-        command = _leaking(estimate, data.time) or (_EXPLORE if _drifts(estimate) else command)
+    drifts, own = [one for one in against if one.code == DRIFT.code], command == _NEXT[DRIFT.code]
+    if estimate is not None and drifts and (own or first.code == "plant-structure"):
+        # Past inputs explain what a leak takes away, as they explain a missing lag.
+        if leaks := _leaking(estimate, data.time):
+            alike, command = drifts, leaks
+        elif own and _drifts(estimate):
+            command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed
         command = _EXPLORE

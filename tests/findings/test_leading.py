@@ -155,8 +155,8 @@ def test_what_explains_the_others_comes_first(codes, first):
     assert leading([], None, DATA) is None
 
 
-def led(plant, noise):
-    """The command after a drift, of a model with this plant and noise."""
+def led(plant, noise, *codes):
+    """The command after a drift and findings with these codes, of a model with this plant and noise."""
     text = f"sample_time: 10\nplant: {plant}\nnoise: {noise}\n"
     model = build_model(parse_spec(text, design=False))
     estimate = SimpleNamespace(
@@ -164,7 +164,7 @@ def led(plant, noise):
     )
     line = np.linspace(0.0, 9.0, 200)[:, None] + np.random.default_rng(0).standard_normal((200, 1))
     data = Record(np.sin(np.arange(200.0))[:, None], line, None, np.arange(200.0), (200,), (("a.csv", 200),))
-    return leading([Finding("drift", REFUTED, "drift")], estimate, data).command
+    return leading([Finding(code, REFUTED, code) for code in ("drift", *codes)], estimate, data).command
 
 
 LAG = "{continuous: {gain: 1, time_constant: 60}, sample: zoh}"
@@ -178,4 +178,6 @@ def test_no_command_asks_for_what_the_model_has_already():
     assert "noise.drift=true" in led(TANK, noise)
     assert led(TANK, noise.replace("}", ", drift: true}")).startswith("idesign explore")
     named = TANK.replace("{cont", "{parameters: {slope: 0.02}, cont").replace("[0.02]", "[slope]")
-    assert '"plant.continuous.denominator=[1, leak]"' in led(named, noise)
+    for more in ((), ("plant-structure",), ("plant-structure", "noise-structure")):
+        assert '"plant.continuous.denominator=[1, leak]"' in led(named, noise, *more)
+    assert "leak" not in led(LAG, "{variance: 1}", "plant-structure")
