@@ -17,7 +17,7 @@ _HIGHEST = 3
 _MOST_SAMPLES = 1500
 # A line counts if it is _CERTAIN deviations from none, by the likelihood ratio, and it rises by _RISES times
 # its scatter.
-_CERTAIN, _RISES = 5.0, 1.0
+_CERTAIN, _RISES = 3.5, 1.0
 # A root of the noise that fades by fewer time constants within the records may be that of a random walk,
 # whose residuals look so beside all that was estimated.
 _WALKS = 40.0
@@ -63,7 +63,7 @@ def _line(parts: Parts, known: bool) -> float:
     A = whitening(errors)
     if float(np.max(np.roots(A).real, initial=0.0)) > 1.0 - _WALKS / samples:
         return 0.0
-    white = whitened(parts, A)
+    white = whitened(parts, A) or parts  # records that are all shorter than the noise lasts
     line = sweep(white, highest, line=True).best
     level = Regressed(white, line.order).output_error(line.delays, line.F)
     own = Regressed([(u[:, :0], y) for u, y in white], line.order).output_error((), level.F)

@@ -283,7 +283,7 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
         left = Regressed(first, swept.best.order).errors(swept.best)
         if all(np.all(np.isfinite(e)) for e in left):
             C, D = noise_model(left, int(feedback or only == "bj"))
-            white = whitened(first, whitening(left))
+            white = whitened(first, whitening(left)) or white
         swept = sweep(white, highest, least=int(feedback))
     longest = max(len(y) for _, y in judging)
     late = max(max(one.delays) for one in swept.by_order.values()) + _SETTLES
