@@ -140,8 +140,7 @@ class Phrase:
 
     def __init__(self, text: str, key: str, clock: float = 1.0, unit: str = "") -> None:
         """Begin with the whole answer to a question; refuse numbers too large or too small to be meant."""
-        spoken = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", in_figures(text))
-        self.text, self.key, self._left, self._clock, self._unit = text, key, spoken, clock, unit
+        self.text, self.key, self._left, self._clock, self._unit = text, key, in_figures(text), clock, unit
         check_numbers(text, key)
 
     def take(self, pattern: str) -> re.Match[str] | None:
@@ -267,9 +266,10 @@ def check_numbers(text: str, key: str) -> None:
 def in_figures(text: str) -> str:
     """Return a text with "0.1 second" for "a tenth of a second", and "rises by -2" for "falls by 2".
 
-    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 %".
+    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 %", and "an hour" becomes "1 hour".
     """
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", text)
+    figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
     figures = _BETWEEN.sub(_middle, figures)
     return _FALLS.sub(r"rises by \g<about>-", figures)
 

@@ -303,6 +303,15 @@ def test_a_time_between_two_ends_is_an_interval(said):
     assert found.intervals["dead_time"] == pytest.approx((180.0, 360.0), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("said", "seconds"), [("about an hour", 3600), ("half an hour", 1800), ("two minutes", 120)]
+)
+def test_times_in_words_are_those_of_a_plant(said, seconds, tmp_path):
+    plant = f"gain 2, time constant {said}, dead time 10 s"
+    spec = heard(f"PI loop with 6 dB: {plant}, 45 +- 5 %, two days, noise 0.1", tmp_path, *["no"] * 3).spec()
+    assert spec.plant.continuous.time_constant == seconds
+
+
 def test_a_sentence_stands_beside_answers(tmp_path):
     """The plant of an answer stays; the sentence says the rest, which was dropped before."""
     answers = read_answers(None, ["plant=gain 2, time constant 180 s, dead time 25 s"])
