@@ -66,16 +66,16 @@ def _line(parts: Parts, known: bool) -> float:
     white = whitened(parts, A) or parts  # records that are all shorter than the noise lasts
     line = sweep(white, highest, line=True).best
     level = Regressed(white, line.order).output_error(line.delays, line.F)
-    own = Regressed([(u[:, :0], y) for u, y in white], line.order).output_error((), level.F)
-    if _gain(own.loss, level.loss, samples) < _CERTAIN**2:
-        # No input is answered. Then any line would pass for a plant that slowly returns from its start.
-        flat = np.concatenate([y - y.mean() for _, y in white])
-        return best.slope if _gain(float(np.mean(flat**2)), line.loss, samples) > _CERTAIN**2 else 0.0
-    return best.slope if _gain(level.loss, line.loss, samples) > _CERTAIN**2 else 0.0
+    undriven = Regressed([(u[:, :0], y) for u, y in white], line.order).output_error((), level.F)
+    count, flat = sum(len(y) for _, y in white), np.concatenate([y - y.mean() for _, y in white])
+    # If no input is answered, a plant that slowly returns from its start would explain any line.
+    answered = _gain(undriven.loss, level.loss, count) > _CERTAIN**2
+    without = level.loss if answered else float(np.mean(flat**2))
+    return best.slope if _gain(without, line.loss, count) > _CERTAIN**2 else 0.0
 
 
 def _gain(loss: float, less: float, samples: int) -> float:
-    """Return the likelihood ratio of two mean squares of white residuals; chi-squared for one parameter."""
+    """Return twice the log likelihood ratio of two mean squares of white residuals: chi-squared by chance."""
     return samples * float(np.log(loss / max(less, 1e-300)))
 
 

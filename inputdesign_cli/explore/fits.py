@@ -28,7 +28,7 @@ NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgErro
 _BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
 # A mode that loses less than this over the whole record is not distinguishable from one on the limit.
-LEAST_DECAY = 0.01
+_LEAST_DECAY = 0.01
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,9 @@ def _nearest(responses: NDArray[np.float64], left: Array) -> Array:
     return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
 
 
-def is_steady(model: Model, samples: int, decay: float = LEAST_DECAY) -> bool:
-    """Return whether a plant is stable, and its slowest mode loses `decay` or more within the samples."""
-    return output_error_form(model).radius < 1.0 - decay / samples
+def is_steady(model: Model, samples: int) -> bool:
+    """Return whether a plant is stable, and its slowest mode visibly decays within the samples."""
+    return output_error_form(model).radius < 1.0 - _LEAST_DECAY / samples
 
 
 @singledispatch
