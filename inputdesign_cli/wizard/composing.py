@@ -14,7 +14,7 @@ from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard import questions as asking
-from inputdesign_cli.wizard.grammar import Phrase, not_linear, short
+from inputdesign_cli.wizard.grammar import Phrase, beyond_models, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, Question, bad_answer, in_their_words, question
@@ -132,7 +132,7 @@ def compose(
     rate, output = limited(said["limits"], plant)
     made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
     two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
-    heard = [*plant.heard, *remarks, *not_linear(", ".join(said.values()))]
+    heard = [*plant.heard, *remarks, *beyond_models(", ".join(said.values()))]
     heard += _of_controller(plant, control, said["loop"], hold)
     facts = {
         "said": said,

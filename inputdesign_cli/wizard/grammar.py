@@ -103,12 +103,17 @@ _NONLINEAR = (
     r"friction|stiction|stick[- ]slip|sticks?|sticky|backlash|hysteresis|dead[- ]?(?:band|zone)|saturat\w*"
     r"|non-?linear\w*"
 )
-NONLINEAR = re.compile(
-    r"(?:\b(?:and|with|has|some|a (?:bit|little) of|much|strong|dry|static|coulomb)\s+)*"
-    rf"(?<!viscous )\b(?P<what>(?:{_NONLINEAR})\b"
-    rf"(?:\s+(?:a (?:bit|little)|sometimes|at low speeds?|of {_DIGITS}[^,;]*))*)",
+_GROWS = (
+    r"(?:\s+(?:that|which|and))?\s+(?:grows?|rises?|increases?|depends?)\s+(?:with|on)\s+(?:the|its)\s+\w+"
+)
+_LEAKS = rf"(?:leak\w*(?:{_GROWS}|\s+slowly)?|(?:outflow|outlet|losses|drain)(?:\s+flow)?{_GROWS})"
+BEYOND = re.compile(
+    r"(?:\b(?:and|with|has|some|an?|a (?:bit|little) of|much|strong|dry|static|coulomb|slow|small)\s+)*"
+    rf"(?<!viscous )\b(?:(?P<what>(?:{_NONLINEAR})\b"
+    rf"(?:\s+(?:a (?:bit|little)|sometimes|at low speeds?|of {_DIGITS}[^,;]*))*)|(?P<leak>{_LEAKS})\b)",
     re.I,
 )
+"""What is said of the plant and no model of the wizard has: it is said back."""
 
 
 def orders(words: str, kind: str, within: str = WITHIN) -> tuple[str, str]:
@@ -221,7 +226,7 @@ class Phrase:
     def finish(self, also: str = "") -> None:
         """Refuse what was not read, except words without content and `also` (words between blanks)."""
         known = also.lower().split()
-        for piece in NONLINEAR.sub(" ", self._left).split("|"):  # what is nonlinear is said back
+        for piece in BEYOND.sub(" ", self._left).split("|"):
             if any(word not in known for word in unread(piece)):
                 raise bad_answer(self.key, f'"{piece.strip(" ,;.:")}" is not understood')
 
@@ -288,13 +293,18 @@ def unread(text: str) -> list[str]:
     return [word for word in re.split(r"[\s,;.:|]+", text.lower()) if word and word not in _FILLING.split()]
 
 
-def not_linear(text: str) -> list[str]:
-    """Return the remark on friction and the like, which no linear model has; none where no word says so."""
-    found = dict.fromkeys(one["what"].lower() for one in NONLINEAR.finditer(text))
-    why = "no linear model has it, and the design leaves it out"
-    return (
-        [f"{', '.join(found)}: {why}. Move so far that it matters little; assess tests it"] if found else []
+def beyond_models(text: str) -> list[str]:
+    """Return remarks on what no model of the wizard has: friction and the like, and leaks."""
+    said = list(BEYOND.finditer(text))
+    rough, leaks = (
+        ", ".join(dict.fromkeys(one[group].lower() for one in said if one[group]))
+        for group in ("what", "leak")
     )
+    why = "no linear model has it, and the design leaves it out. Move so far that it matters little; assess"
+    found = [f"{rough}: {why} tests it"] if rough else []
+    if leaks:
+        found.append(f"{leaks}: the model of a plant that integrates has no leak; assess tests for one")
+    return found
 
 
 def needed(value: float | None, key: str, what: str) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from inputdesign_cli.wizard import grammar, plants, wishes
-from inputdesign_cli.wizard.grammar import NONLINEAR, check_numbers, in_figures, not_linear, orders, unread
+from inputdesign_cli.wizard.grammar import BEYOND, beyond_models, check_numbers, in_figures, orders, unread
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
 _TURNS = ("loop", "wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
@@ -89,7 +89,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     if other := _OTHER_LAWS.search(text):
         raise bad_answer("wish", f'"{other[0]}": settings are found for PI and PID')
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
-    left = NONLINEAR.sub(_taken, in_figures(text))
+    left = BEYOND.sub(_taken, in_figures(text))
     for key in _TURNS:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):
@@ -100,7 +100,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         return Heard({})
     beside = [part for clause in _ENDS.split(left) for part in _left_over(clause)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
-    remarks = [*not_linear(text), *([f"nothing follows from: {', '.join(beside)}"] if beside else [])]
+    remarks = [*beyond_models(text), *([f"nothing follows from: {', '.join(beside)}"] if beside else [])]
     if "wish" in answers and wishes.unbounded(answers["wish"]):
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")

@@ -258,7 +258,8 @@ def unbounded(text: str) -> bool:
 
 
 def _margin(said: Phrase) -> str:
-    """Return the margin of a loop as an entry of the spec."""
+    """Return the margin of a loop as an entry of the spec; a number says how safe a safe margin is."""
+    safe = said.take(r"\b(?:safe|usual|good)\b(?:\s*margins?\b)?") is not None
     factor = said.take(rf"\bgain margin\b\s*(?:of\s*)?{ALONE}{NUMBER}(\s*dB\b)?")
     if factor is not None:
         size = 10.0 ** (float(factor[1]) / 20.0) if factor[2] else float(factor[1])
@@ -272,10 +273,10 @@ def _margin(said: Phrase) -> str:
             why = f"{peak:g} dB are no margin: 6 dB are usual, and {MOST_DECIBELS:g} the most"
             raise bad_answer("wish", why)
         return f"max_sensitivity_db: {short(needed(peak, 'wish', 'the margin in dB'))}"
-    if said.take(r"\b(?:safe|usual|good)\b(?:\s*margins?\b)?") is not None:
-        return f"max_sensitivity_db: {_SAFE:g}"
     said.take(r"\bphase margin\b")
     degrees = said.number(rf"{ALONE}{NUMBER}\s*(?:degrees\b|deg\b|°)")
+    if degrees is None and safe:
+        return f"max_sensitivity_db: {_SAFE:g}"
     if degrees is None:
         raise bad_answer(
             "wish", "it does not say the margin: 6 dB, 29 degrees, gain margin 2 or a safe margin"

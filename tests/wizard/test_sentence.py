@@ -312,6 +312,34 @@ def test_times_in_words_are_those_of_a_plant(said, seconds, tmp_path):
     assert spec.plant.continuous.time_constant == seconds
 
 
+@pytest.mark.parametrize(
+    ("margin", "entry"),
+    [
+        ("a safe margin", {"max_sensitivity_db": 6.0}),
+        ("a safe margin (gain margin 2)", {"gain_margin": 2.0}),
+        ("a good phase margin of 30 degrees", {"phase_margin": 30.0}),
+    ],
+)
+def test_a_number_says_how_safe_a_margin_is(margin, entry, tmp_path):
+    plant = "gain 2, time constant 100 s, dead time 10 s, 45 +- 5 %, 2 h, noise 0.1"
+    spec = heard(f"PI loop with {margin}: {plant}", tmp_path, *["no"] * 3).spec()
+    loop = spec.accuracy.loop
+    stated = {name: getattr(loop, name) for name in ("max_sensitivity_db", "gain_margin", "phase_margin")}
+    assert {name: value for name, value in stated.items() if value is not None} == entry
+
+
+@pytest.mark.parametrize(
+    "leak", ["a slow outflow that grows with the level", "the tank leaks slowly", "it has a small leak"]
+)
+def test_a_leak_is_said_back_and_its_words_are_not_of_the_noise(leak, tmp_path):
+    tank = (
+        "level rises about 0.5 cm per minute per %, dead time 20 s, noise of 0.15 cm, valve 50 +- 10 %, 2 h"
+    )
+    draft = heard(f"PI loop with 6 dB: {tank}, {leak}", tmp_path, *["no"] * 3)
+    assert any("assess tests for one" in note for note in draft.notes)
+    assert "slow" not in draft.text.split("noise:")[1].split("accuracy:")[0]
+
+
 def test_a_sentence_stands_beside_answers(tmp_path):
     """The plant of an answer stays; the sentence says the rest, which was dropped before."""
     answers = read_answers(None, ["plant=gain 2, time constant 180 s, dead time 25 s"])
