@@ -191,7 +191,7 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
 
 def _usable(found: FrequencyResponse | None) -> FrequencyResponse | None:
     """Return the response at its finite frequencies; None if there are none."""
-    if found is None or not np.any(at := np.all(np.isfinite(found.noise), axis=1)):
+    if found is None or not np.any(at := np.all(np.isfinite(found.radius), axis=(1, 2))):
         return None
     G, radius, noise, coherence = found.G[at], found.radius[at], found.noise[at], found.coherence[at]
     return FrequencyResponse(found.frequency[at], G, radius, noise, coherence, found.method)
@@ -254,9 +254,38 @@ def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> 
     errors = residuals[:, :outputs] - residuals[:, outputs:] @ G.T
     freedom = len(matrix) - matrix.shape[1]
     power = np.sum(np.abs(errors) ** 2, axis=0) / freedom
-    spread = np.sum(np.abs(back.T @ inverse[:inputs]) ** 2, axis=1)
     explained = np.mean(np.abs(target[:, outputs:] @ G.T) ** 2, axis=0)
-    return G, _radius(np.outer(power, spread), freedom), power, _coherence(explained, power)
+    coherence = _coherence(explained, power)
+    if inputs == 1:
+        spread = float(np.sum(np.abs(inverse[:1]) ** 2))
+        return G, _radius_of_ratio(from_x[:, 0], residuals, spread, freedom), power, coherence
+    spreads = np.sum(np.abs(back.T @ inverse[:inputs]) ** 2, axis=1)
+    return G, _radius(np.outer(power, spreads), freedom), power, coherence
+
+
+def _radius_of_ratio(from_x: ComplexArray, residuals: ComplexArray, spread: float, freedom: int) -> Array:
+    """Return the radius (p, 1) of discs about G = y/u that hold every G which y - G u does not refute.
+
+    Behind a reference u has an error as well. The region is a disc about another centre ([fieller-1954]);
+    without a bound, NaN.
+
+    Args:
+        from_x: (p + 1,), responses of the outputs and of the input to x.
+        residuals: (n, p + 1), of the regression on x.
+        spread: variance of these responses, relative to the variance of the residuals.
+    """
+    within = spread * float(scipy.special.fdtri(2, 2 * freedom, CONFIDENCE))
+    *outputs, u = from_x
+    *errors, of_u = residuals.T
+    size = abs(u) ** 2 - within * np.sum(np.abs(of_u) ** 2) / freedom
+    if size <= 0.0:
+        return np.full((len(outputs), 1), np.nan)
+    found = []
+    for y, e in zip(outputs, errors, strict=True):
+        centre = (y * np.conj(u) - within * np.vdot(of_u, e) / freedom) / size
+        rest = (abs(y) ** 2 - within * np.sum(np.abs(e) ** 2) / freedom) / size
+        found.append(abs(centre - y / u) + np.sqrt(max(abs(centre) ** 2 - rest, 0.0)))
+    return np.array(found)[:, None]
 
 
 def _coherence(explained: Array, noise: Array) -> Array:
