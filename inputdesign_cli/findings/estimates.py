@@ -79,7 +79,8 @@ def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, n
 @finding(
     NOTE,
     "start-estimated",
-    "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
+    "If the plant was at rest before, `identify` and `assess` are more accurate with its levels as "
+    "--operating-point.",
 )
 def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Finding]:
     """The initial state of a record was estimated too. To estimate it, and the levels, costs accuracy.
@@ -91,7 +92,7 @@ def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Find
         return []
     remedy = kind.remedy
     if levels:
-        remedy = "The record does not begin at rest at the levels of --operating-point."
+        remedy = "The record does not begin at rest, or the levels of --operating-point are not exact."
     if not estimate.start.rest_refuted:
         return [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))

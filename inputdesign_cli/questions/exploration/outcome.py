@@ -94,6 +94,18 @@ def _structure(candidate: Candidate) -> Structure:
     )
 
 
+_DIRECT = "The direct method is used; the noise model must then be right"
+_LOOP = (
+    "the data may come from a loop, or the input was logged late, or the columns are swapped. They are taken "
+    f"for data of a loop. {_DIRECT}, and without a reference that moves the plant may not be identifiable: "
+    "add a reference or dither, and write experiment.controller"
+)
+_BEHIND_REFERENCE = (
+    f"the data come from a loop behind the reference. {_DIRECT}. For a design write experiment.controller "
+    "in the spec"
+)
+
+
 def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> Iterator[str]:
     """Yield remarks on the record and on the choice of the model."""
     outputs, inputs = found.model.outputs, found.model.inputs
@@ -116,10 +128,7 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
     for j, p in loops:
         yield (
             f"the noise of the outputs helps to predict {signal_name('u', j, inputs)} (probability "
-            f"{chance(p)} by chance): the data may come from a loop, or the input was logged late, or the "
-            "columns are swapped. They are taken for data of a loop. The direct method is used; the noise "
-            "model must then be right, and without a reference that moves the plant may not be "
-            "identifiable: add a reference or dither, and write experiment.controller"
+            f"{chance(p)} by chance): {_LOOP if log.r is None else _BEHIND_REFERENCE}"
         )
     for j in perhaps_zero(found.model, found.estimate, inputs=True) if inputs > 1 else ():
         yield (
