@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
-from tests.support.refusals import code_of
+from tests.support.refusals import code_of, refused
 
 SPECS = Path(__file__).parents[2] / "specs"
 WEIGHT = "{numerator: [1, 0.5]}"
@@ -128,7 +128,8 @@ def test_no_model_of_the_ellipsoid_breaks_the_bound_and_one_reaches_it(error, bo
 def test_what_is_no_fraction_is_refused():
     error = "accuracy.model_error={relative: 0.1, region: ellipsoid}"
     both = ["plant.F=[[[1, 0.1], [1]], [[1], [1]]]"]
-    assert code_of(validate, load_spec(SPECS / "two_by_two_arx.yaml", [error, *both])) == "not-supported"
+    (told,) = refused(validate, load_spec(SPECS / "two_by_two_arx.yaml", [error, *both]))
+    assert (told.code, "[1,1]" in told.message) == ("not-supported", True)
     sampled = CONTINUOUS.replace("[1, 1]]]}}", "[1, 1]]]}, sample: zoh}").replace("[0, 2.0]", "[0, 3.0]")
     assert code_of(validate, parse_spec(sampled, overrides=["accuracy={}", error])) == "not-supported"
 
