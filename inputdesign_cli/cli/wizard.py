@@ -42,7 +42,7 @@ def wizard(
     `idesign assess` takes it as --operating-point. What is written is an ordinary spec.
     """
     from inputdesign_cli.wizard.questions import needed_of, read_answers
-    from inputdesign_cli.wizard.sentence import spread
+    from inputdesign_cli.wizard.sentence import not_understood, spread
 
     if answers is not None and output.exists() and output.samefile(answers):
         hint = "choose another name for the spec with -o"
@@ -66,6 +66,8 @@ def wizard(
         from inputdesign_cli.wizard.composing import compose, with_spectrum
 
         if draft is None:
+            if said.unclear:
+                raise not_understood(said.unclear[0])
             draft = compose(said.texts, output.stem, output.parent, remarks=said.remarks)
             draft.validate()
         draft = with_spectrum(draft, _result)
@@ -116,13 +118,15 @@ def _asked(
     """
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.composing import Conversation
-    talk = Conversation(said.texts, output.stem, output.parent, brief=brief, remarks=said.remarks)
+    talk = Conversation(
+        said.texts, output.stem, output.parent, brief=brief, remarks=said.remarks, unclear=said.unclear
+    )
     while (one := talk.question) is not None:
         default = one.default or ""  # stands in grey at the prompt
         asks = f"{one.asks} (Enter: {default})" if default else one.asks
         text = _typed(asks, one.allowed, default) if terminal else _piped(asks)
         if text is None:
-            return None, replace(said, texts=talk.answers)
+            return None, replace(said, texts=talk.answers, remarks=talk.remarks, unclear=talk.unclear)
         with status("thinking ...", quiet=quiet):
             wrong = talk.answer(text if text.strip() else default)
         if wrong is not None and not terminal:  # the lines that follow answer other questions

@@ -18,7 +18,7 @@ from inputdesign_cli.wizard.grammar import Phrase, beyond_models, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, Question, bad_answer, in_their_words, question
-from inputdesign_cli.wizard.sentence import Heard, in_sentence, question_of
+from inputdesign_cli.wizard.sentence import Heard, in_sentence, not_understood, question_of
 from inputdesign_cli.wizard.wishes import (
     Range,
     channels_of,
@@ -244,8 +244,9 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
 class Conversation:
     """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again.
 
-    The first answer may be a sentence that answers several questions. Then only the others are asked, and
-    three about the actuator. An answer that names its question, as in "time=2 h", may come at any time.
+    The first answer may be a sentence that answers several questions. Then its parts that are not understood
+    are asked for in other words, and after them the other questions, and three about the actuator. An answer
+    that names its question, as in "time=2 h", may come at any time.
     """
 
     def __init__(
@@ -256,23 +257,29 @@ class Conversation:
         *,
         brief: bool = False,
         remarks: Sequence[str] = (),
+        unclear: Sequence[str] = (),
     ) -> None:
         """Begin with the answers that are known, from a sentence if `brief`; the rest as of `compose`."""
         self.answers, self._stem, self._folder = dict(known), stem, folder
-        self._remarks = tuple(remarks)
+        self.remarks, self.unclear = list(remarks), list(unclear)
         self._plant: PlantAnswer | None = None
         self._brief = brief
+        self._refused: dict[str, str] = {}  # the answer on a plant that may lack a quantity
         self.draft: Draft | None = None  # of all answers, once they are there
 
     @property
     def question(self) -> Question | None:
         """Return the next question; None if all are answered."""
+        if self.unclear:
+            return asking.in_other_words(self.unclear[0])
         there = {*self.answers, *asking.known_from(self.answers)}
         left = (one for one in QUESTIONS if one.key not in there)
         return next((one for one in left if not self._brief or one.always or one.default is None), None)
 
     def answer(self, text: str) -> IdesignError | None:
         """Answer the question, and return the error of an answer, whose question then comes again.
+
+        Then the answer may be the rest of one that was refused.
 
         Raises:
             OutputError: a file next to the spec cannot be written.
@@ -282,16 +289,62 @@ class Conversation:
         named = _NAMED.match(text)
         key, text = (named[1].lower(), named[2]) if named else (asked.key, text)
         try:
+            if asked.key == asking.UNCLEAR:
+                return self._in_other_words(text, key, asked)
             heard = in_sentence(text) if key == "plant" else Heard({})
-            self._brief = self._brief or bool(heard.answers)
-            self._remarks = heard.remarks or self._remarks
-            self.answers |= heard.answers or {key: text}
-            self._plant = None if key == "plant" else self._plant
+        except IdesignError as refusal:
+            return refusal
+        self._brief = self._brief or bool(heard.answers)
+        self.remarks += heard.remarks
+        self.unclear += heard.unclear
+        before = self._refused.get(key)
+        error = self._added(heard.answers or {key: text})
+        if error is None or (before and self._added({key: f"{before}, {text}"}) is None) or heard.unclear:
+            return None  # what is not understood may say what the sentence lacks
+        meant = question_of(text)
+        if heard.answers or error.diagnostics[0].key != key or named or meant in (None, key):
+            return error
+        hint = f'to answer "{question(meant or key).asks}" write {meant}={text}'
+        return type(error)([replace(one, hint=f"{hint}; {one.hint}") for one in error.diagnostics])
+
+    def _in_other_words(self, text: str, key: str, asked: Question) -> IdesignError | None:
+        """Add the answer to what was not understood, which is left out, with a remark, if there is none.
+
+        Args:
+            key: of the question that the answer names; otherwise of the one that is asked.
+
+        Raises:
+            SpecError: `bad-answer`, it is not understood either.
+        """
+        kept, parts, refused = dict(self.answers), list(self.unclear), self._refused
+        earlier = refused | kept
+        if text == asked.default:
+            heard = Heard({}, (f"left out: {parts[0]}",))
+        elif key != asked.key:
+            heard = Heard({key: text})
+        elif not (heard := in_sentence(text, least=1)).answers:
+            raise not_understood(text)
+        more = dict(heard.answers)
+        if key == asked.key:
+            more = {one: ", ".join(filter(None, (earlier.get(one), said))) for one, said in more.items()}
+        self.unclear[:1] = heard.unclear
+        error = self._added(more if self.unclear else earlier | more)
+        if error is not None and error.diagnostics[0].key in more:
+            self.answers, self.unclear, self._refused = kept, parts, refused
+            return error
+        self.remarks += heard.remarks
+        return None if self.unclear else error
+
+    def _added(self, answers: Mapping[str, str]) -> IdesignError | None:
+        """Add answers; return the error of one that cannot be used, which is taken away again."""
+        self.answers |= answers
+        try:
             # The plant, which may be a log to be explored, is read once only.
+            self._plant = None if "plant" in answers else self._plant
             if self._plant is None and (plant := self.answers.get("plant", "").strip()):
                 self._plant = understand_plant(plant, self._stem, self._folder)
             said = {**_MEANWHILE, **asking.known_from(self.answers), **self.answers}
-            draft = compose(said, self._stem, self._folder, self._plant, self._remarks)
+            draft = compose(said, self._stem, self._folder, self._plant, self.remarks)
             if self.question is None:
                 draft.validate()
                 self.draft = draft
@@ -299,13 +352,10 @@ class Conversation:
             raise  # no answer can help
         except IdesignError as error:
             wrong = error.diagnostics[0].key
-            if self.answers.pop(wrong, None) is None and wrong != key:
+            if (refused := self.answers.pop(wrong, None)) is None:
                 return None  # it is about what stands in for an answer
             if wrong == "plant":
-                self._plant = None
-            meant = question_of(text)
-            if wrong != key or named or meant in (None, key):
-                return error
-            hint = f'to answer "{question(meant or key).asks}" write {meant}={text}'
-            return type(error)([replace(one, hint=f"{hint}; {one.hint}") for one in error.diagnostics])
+                self._plant, self._refused = None, {wrong: refused}
+            return error
+        self._refused = {} if "plant" in answers else self._refused
         return None

@@ -54,6 +54,8 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+_SYMBOLS = {"k": "gain", "t": "time constant", "tau": "time constant", "l": "dead time", "theta": "dead time"}
+_SYMBOL = re.compile(rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta)\s+)(?=(?:{ABOUT}\s*)?[-+.\d])", re.I)
 _FALLS = re.compile(
     rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
@@ -70,7 +72,8 @@ AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_T
 _SETTING = rf"{OF}{NUMBER}(?:\s*(?:ms|s|sec|min|h)\b)?"
 SETTINGS = rf"(?:PID?\s+)?Kp{_SETTING}(?:(?:\s*,\s*|\s+and\s+|\s+)T[id]{_SETTING})*"
 """Settings of a controller, as in "Kp 1, Ti 60 s"."""
-SIGNAL = "(?:level|temperature|speed|pressure|flow|position|concentration|output|sensor|measurement)"
+SIGNAL = "(?:level|temp(?:erature)?|speed|pressure|flow|position|concentration|output|sensor|measurement)"
+SENSOR = r"(?:sensor|encoder|thermocouple|transmitter|thermometer)\b"
 DRIVE = (
     "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"
     "|input|actuator)"
@@ -87,7 +90,7 @@ _BEHIND = {
     "rate": _RATE,
     "slope": rf"{_RATE}(?:{_BASE})?",
     "speed": rf"(?:\s*(?P<size>(?!(?:per|and)\b)[^\s\d,;|/]+))?\s*(?:per|/)\s*{_TIME}(?:{_BASE})?",
-    "gain": rf"(?:\s*(?!plus/)(?P<size>[^\s\d,;|+±]*){_BASE})?",
+    "gain": rf"(?:\s*(?!plus/)(?P<size>(?:[^\s\d,;|+±][^\s,;|+±]*)?){_BASE})?",
     "any": rf"(?P<size>{UNIT})",
     "none": "",
 }
@@ -271,9 +274,11 @@ def check_numbers(text: str, key: str) -> None:
 def in_figures(text: str) -> str:
     """Return a text with "0.1 second" for "a tenth of a second", and "rises by -2" for "falls by 2".
 
-    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 %", and "an hour" becomes "1 hour".
+    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 %", "an hour" becomes "1 hour", and
+    "T = 3 s" becomes "time constant 3 s".
     """
-    figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", text)
+    figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
+    figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
     figures = _BETWEEN.sub(_middle, figures)
     return _FALLS.sub(r"rises by \g<about>-", figures)

@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 
 _NONE: Mapping[str, float] = MappingProxyType({})
 _WHAT = rf"(?:(?:the )?(?:{SIGNAL}|room|tank|water))"
-RISES = rf"(?:{_WHAT} )?(?:rises|grows|increases|climbs|warms|heats|raises)(?: {_WHAT})?(?: by| with)?"
+RISES = (
+    rf"(?:{_WHAT} )?(?:rises|grows|increases|climbs|goes up|warms|heats|raises"
+    rf"|(?:reacts|responds|changes)(?= by))(?: {_WHAT})?(?: by| with)?"
+)
 # Names of what is said of a plant -> words, and the kind of unit. What rises in a time integrates.
 QUANTITIES = {
     "rise": (RISES, "speed"),
@@ -39,6 +42,18 @@ QUANTITIES = {
     "time_constant": (r"time constant|lag|(?:reacts?|responds?)(?: with)?in", "time"),
     "dead_time": ("dead time|delay", "time"),
 }
+BARE_GAIN = (
+    r"<ABOUT>?\s*<ALONE><NUMBER>(?:\s*[^\s\d,;|+±%][^\s,;|+±%]*)?\s*(?:/|\bper\b)\s*"
+    r"(?!(?:cent|s|sec|second|min|minute|h|hour|d|day)\b)(?:<NUMBER>\s*)?[^\s\d,;|]+"
+    r"(?: of (?:the )?<DRIVE>)?(?:<WITHIN>)"
+)
+"""A gain without its name, as in "about 20 rad/s per V"; a time unit makes it a slope."""
+RISES_WHEN = (
+    r"(?P<rise>(?:(?:the|my|our) )?<RISES><OF><NUMBER><UNIT>(?:\s*(?:per|/)\s*<UNIT_OF_TIME>)?)"
+    r"\s+(?:when|if|for)\s+(?P<rest>(?:[a-z]+\s+){0,5}?)(?:by\s+)?(?P<per><NUMBER><UNIT>)"
+    r"(?=\s*(?:[,;.]|$|(?:more|in|after|within|and)\b))"
+)
+"""A gain as in "rises by 1.5 degC when the valve opens 10 %"."""
 NO_DELAY = r"\b(?:no|without|hardly any|negligible)\s+(?:dead time|delay)\b"
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
 _SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
@@ -158,7 +173,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     ]
     taken = f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}'
     heard = [f"{taken}; the design holds for all of these"] if vague else []
-    if reacts := re.search(r"\b(?:reacts?|responds?)\b", text, re.I):
+    if reacts := re.search(r"\b(?:reacts?|responds?)\b(?! by)", text, re.I):
         heard.append(f'"{reacts[0]}" is taken as the time constant, in which it gets 63 % of the way')
     plant = PlantAnswer(
         (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds"),

@@ -44,6 +44,8 @@ _SECTIONS = dict(
     sorted(((path, one.key) for one in QUESTIONS for path in one.sets), key=lambda at: -len(at[0]))
 )
 _ALL = f"the questions are {', '.join(KEYS)}"
+UNCLEAR = "unclear"
+"""The key of what is asked about a part of a sentence; no answer can name it."""
 AS_LOGGED = ("as the log", "as in the log", "as in this log")
 _COLUMNS = re.compile(r'--columns "([^"]*)"')
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
@@ -52,6 +54,12 @@ _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 def question(key: str) -> Question:
     """Return the question of a key."""
     return next(one for one in QUESTIONS if one.key == key)
+
+
+def in_other_words(part: str) -> Question:
+    """Return the question about a part of a sentence that is not understood."""
+    allowed = 'the same in other words, as in "valve 40 +- 15 %", "time constant 1 h" or "time=2 h"'
+    return Question(UNCLEAR, f'"{part}" is not understood. In other words?', allowed, "leave it out")
 
 
 def known_from(answers: Mapping[str, str]) -> dict[str, str]:
@@ -108,12 +116,13 @@ def file_of(key: str, path: Path) -> Path:
 class Answers:
     """Holds the answers by question, and the places of answers in a file (else of its beginning).
 
-    `remarks` are on what a sentence says beside its answers.
+    `remarks` are on what a sentence says beside its answers, `unclear` its parts that are not understood.
     """
 
     texts: dict[str, str] = field(default_factory=dict)
     places: dict[str, Location] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    unclear: list[str] = field(default_factory=list)
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -1,6 +1,6 @@
 """A whole wish in a sentence, taken apart into pieces that answer questions.
 
-What is left over is refused, or said back.
+What is left over is asked for in other words where it may matter, and said back otherwise.
 """
 
 from __future__ import annotations
@@ -9,22 +9,27 @@ import re
 from dataclasses import dataclass
 from functools import cache
 
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard import grammar, plants, wishes
 from inputdesign_cli.wizard.grammar import BEYOND, beyond_models, check_numbers, in_figures, orders, unread
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
-_TURNS = ("loop", "wish", "noise", "plant", "hold", "converter", "return", "limits", "range", "names", "time")
+_TURNS = (
+    *("loop", "wish", "drift", "noise", "plant", "hold"),
+    *("converter", "return", "limits", "range", "names", "time"),
+)
 """The questions that a sentence may answer, in the order in which their pieces are taken out of it."""
-_PLANT = "|".join(f"<{kind}: {words}>" for words, kind in plants.QUANTITIES.values())
+_QUANTITIES = {name: f"<{kind}: {words}>" for name, (words, kind) in plants.QUANTITIES.items()}
+_PLANT = "|".join(_QUANTITIES.values())
 # <NUMBER> and the like in a pattern of a piece.
 _MACROS = {**vars(grammar), **vars(plants), **vars(wishes), "PLANT": _PLANT}
 _MACRO = re.compile(r"<([A-Z_]+|[a-z]+: [^<>]*)>")
 _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
-_NEGATION = re.compile(r"\b(?:not?|never|without|except|unless|neither|nor|but)\b|n't\b", re.I)
-# Words whose number is missing, or is none that is understood: to drop them would say something else.
-_SIZED = re.compile(
-    r"\b(?:dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
+# What is left is asked for again if it has a number or a negation, or words whose number is missing.
+_MATTERS = re.compile(
+    r"\d|n't\b|\b(?:not?|never|without|except|unless|neither|nor|but|"
+    r"dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
     r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month)s?|half|twice|doubled?|peak\S*)\b",
     re.I,
 )
@@ -35,23 +40,20 @@ _RATED = re.compile(
     re.I,
 )
 _OTHER_LAWS = re.compile(r"\b(?:PD|P|I|LQG?|MPC)[- ](?:loop|controller|control|regulator)\b")
-_JOINS = r"(?:for|of|in|with|a|an|the|my|our|i|we|have|is|and|to)"
+_JOINS = r"(?:for|of|in|with|after|within|a|an|the|my|our|i|we|have|is|and|to)"
 _BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.I)
-_WORD = r"(?!(?:is|are|was|has|have|does|do|will|must|should|may|can)\b)[a-z'-]+"
-_ABOUT_WHAT = re.compile(
-    r"[\s|]*(?:(?:(?:i|we) (?:have|want|need)|this is|it is|there is|consider|for)\b[\s|]*)?"
-    rf"(?:{_WORD}(?:[\s|]+{_WORD}){{0,5}}|(?:the )?(?:less|shorter|sooner|faster) (?:is )?(?:the )?better)"
-    r"[\s|]*",
-    re.I,
-)
 
 
 @dataclass(frozen=True)
 class Heard:
-    """Holds what a sentence says: answers by question, and remarks on what answers none."""
+    """Holds what a sentence says: answers by question, and remarks on what answers none.
+
+    `unclear` are parts that are not understood, and may change the meaning of the rest.
+    """
 
     answers: dict[str, str]
     remarks: tuple[str, ...] = ()
+    unclear: tuple[str, ...] = ()
 
 
 def question_of(text: str) -> str | None:
@@ -67,7 +69,12 @@ def _pieces(key: str) -> tuple[tuple[str, str], ...]:
 
 
 def _expanded(pattern: str) -> str:
-    """Return a pattern in which <NUMBER> and the like stand for pieces of the grammar."""
+    """Return a pattern in which <NUMBER> and the like stand for pieces of the grammar.
+
+    Groups of a piece have no names, unless the piece is the whole pattern.
+    """
+    if pattern[1:-1] in _MACROS:
+        pattern = _MACROS[pattern[1:-1]]
 
     def piece(found: re.Match[str]) -> str:
         kind, _, words = found[1].partition(": ")
@@ -79,57 +86,78 @@ def _expanded(pattern: str) -> str:
     return pattern
 
 
+@cache
+def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
+    """Return the patterns of times behind a gain, of times that are named, and of a dead time."""
+    time = r"(?:<ABOUT>\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|and\b))"
+    joined = r"[,;]?\s+(?:(?:and|after|within|in|with)\s+)*"
+    gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
+    times = rf"(?:{gain}){joined}(?P<lag>{time})(?:[,;]\s+(?P<late>{time}))?"
+    named = "|".join(_QUANTITIES[name] for name in ("rise", "slope", "time_constant"))
+    late = f"{_QUANTITIES['dead_time']}|<NO_DELAY>"
+    one, two, three = (re.compile(_expanded(pattern), re.I) for pattern in (times, named, late))
+    return one, two, three
+
+
+def _with_names(text: str) -> tuple[str, list[str]]:
+    """Name times behind a gain, as in "gain 1.7 degC/%, 262 s, 31 s", and return remarks on them."""
+    times, named, late = _behind_a_gain()
+    found = times.search(text)
+    if found is None or named.search(text):
+        return text, []
+    names = {"lag": "time constant"}
+    if found["late"] and not late.search(text):
+        names["late"] = "dead time"
+    for group in reversed(names):
+        text = f"{text[: found.start(group)]}{names[group]} {text[found.start(group) :]}"
+    return text, [f"{found[group]}, behind the gain, is taken as the {name}" for group, name in names.items()]
+
+
 def in_sentence(text: str, least: int = 2) -> Heard:
     """Return the answers by question, or none if the text answers fewer questions than `least`.
 
     Raises:
-        SpecError: `bad-answer` for what answers no question, where it has a number, a negation or a verb.
+        SpecError: `bad-answer` for numbers that cannot be meant, and for controllers other than PI and PID.
     """
     check_numbers(text, "plant")
     if other := _OTHER_LAWS.search(text):
         raise bad_answer("wish", f'"{other[0]}": settings are found for PI and PID')
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
-    left = BEYOND.sub(_taken, in_figures(text))
+    said, named = _with_names(in_figures(text))
+    left = BEYOND.sub(_taken, said)
     for key in _TURNS:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):
-                said = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
-                found.setdefault(key, []).append((piece.start(), said.strip(" ,.")))
+                says = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
+                found.setdefault(key, []).append((piece.start(), says.strip(" ,.")))
                 left = left[: piece.start()] + _taken(piece) + left[piece.end() :]
     if len(found) < least:
         return Heard({})
-    beside = [part for clause in _ENDS.split(left) for part in _left_over(clause)]
+    parts = [part.strip() for clause in _ENDS.split(left) for part in clause.split("|") if unread(part)]
+    unclear = [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
+    beside = [_BARE.sub("", part) for part in parts if part not in unclear]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
-    remarks = [*beyond_models(text), *([f"nothing follows from: {', '.join(beside)}"] if beside else [])]
+    remarks = [
+        *named,
+        *beyond_models(text),
+        *([f"nothing follows from: {', '.join(beside)}"] if beside else []),
+    ]
     if "wish" in answers and wishes.unbounded(answers["wish"]):
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")
-    return Heard(answers, tuple(remarks))
+    return Heard(answers, tuple(remarks), tuple(unclear))
 
 
 def _taken(piece: re.Match[str]) -> str:
     """Return what stands in the place of a piece, as long as it is: the part of it that is left."""
     rest = piece.groupdict().get("rest") or ""
     before = piece.start("rest") - piece.start() if rest else len(piece[0])
-    return ("|".ljust(before) + rest).ljust(len(piece[0]), "|")
+    return ("|" * before + rest).ljust(len(piece[0]), "|")
 
 
-def _left_over(clause: str) -> list[str]:
-    """Return the words of a clause that no piece has and that have content.
-
-    Raises:
-        SpecError: `bad-answer` where they may change the meaning of the rest.
-    """
-    parts = [part.strip() for part in clause.split("|") if unread(part)]
-    understood = "|" in clause or not parts or _ABOUT_WHAT.fullmatch(clause)
-    unsized = next((sized[0] for part in parts if (sized := _SIZED.search(part))), None)
-    if unsized:
-        raise bad_answer("plant", f'"{unsized}" has no number that is understood, as in "dead time 3 min"')
-    rest = [_RATED.sub("", part) for part in parts]
-    wrong = next((part for part in rest if re.search(r"\d", part) or _NEGATION.search(part)), None)
-    if wrong or not understood:
-        raise bad_answer("plant", f'"{wrong or clause.strip()}" is not understood')
-    return [_BARE.sub("", part) for part in parts]
+def not_understood(part: str) -> SpecError:
+    """Return the error about a part of a sentence."""
+    return bad_answer("plant", f'"{part}" is not understood')
 
 
 def spread(answers: Answers, sentence: str | None = None) -> bool:
@@ -151,6 +179,7 @@ def spread(answers: Answers, sentence: str | None = None) -> bool:
         if sentence is None:
             del answers.texts["plant"]
         answers.remarks.extend(heard.remarks)
+        answers.unclear.extend(heard.unclear)
     for key, text in heard.answers.items():
         if answers.texts.setdefault(key, text) is text and "plant" in answers.places:
             answers.places[key] = answers.places["plant"]

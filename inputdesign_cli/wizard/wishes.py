@@ -33,6 +33,21 @@ _WITHIN = {
 # The share of the amplitude by which an operating point may differ from the middle of the range.
 _MIDDLE = 0.05
 
+IN_UNIT = r"(?:\s*(?:\bin\s+|\()(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
+"""The unit behind what moves, as in "valve in %" and "valve (%)"."""
+STANDS = (
+    r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|now|normally|usually|currently|nominally)\s+)*"
+    r"(?:(?:held|kept)\s+)?(?:around|about|at|near)"
+)
+MOVES = (
+    r"(?:(?:i|we|it|and|which|that|may|can|could|might|should|is allowed to|be)\s+)*"
+    r"(?:moved?|moves|go|goes|swings?|vary|varied|varies|changed?|changes|stepped|deviates?)"
+    r"(?:\s+(?:it|by|over))*"
+)
+BOTH_WAYS = (
+    r"(?:up (?:and|or) down|(?:either|each) way|(?:to|on) (?:either|each|both) sides?"
+    r"|in (?:both|either) directions?)"
+)
 ACTUATOR = rf"(?:(?!(?:the|our|my|move|may|can|by|from|around|when|open|if|i)\b)[a-z]+ )?{DRIVE}"
 
 
@@ -54,8 +69,8 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
     """
     ours = plant.units[1] if plant else ""
     said, number = Phrase(text, "range", unit=ours), f"{NUMBER}({UNIT})"
-    at = rf"\b(?:around|about|at)\b\s*{number}"
-    named = said.take(rf"\b(?:(?:the|our|my)\s+)?({ACTUATOR})\b")
+    at = rf"\b{STANDS}\s*{number}"
+    named = said.take(rf"\b(?:(?:the|our|my)\s+)?({ACTUATOR})\b{IN_UNIT}")
     ends = said.take(rf"(?<![-+±\w.]){number}\s*(?:to\b|\.\.|[-–](?=\s*\d))\s*{number}") or said.take(
         rf"\bbetween\s+{number}\s*and\s+{number}"
     )
@@ -65,12 +80,19 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
         sizes = [(found[1], found[2]), (found[3], found[4])]
     else:
         around = said.take(at)
-        by = said.take(rf"(?:{PLUS_MINUS}|\bby\b)\s*{number}") or (around and said.take(number))
+        by = (
+            said.take(rf"(?:{PLUS_MINUS}|\bby\b)\s*{number}")
+            or said.take(rf"{number}\s*{BOTH_WAYS}")
+            or (around and said.take(number))
+        )
         if by is None:
             raise bad_answer("range", f'"{text}" is no range')
         sizes = [(around[1], around[2]) if around else ("0", ""), (by[1], by[2])]
-    said.finish("move moves moved go goes swing swings from stands sits rests run runs operate keep")
-    unit = next((one.strip() for _, one in sizes if one.strip()), "")
+    said.take(MOVES)
+    said.take(BOTH_WAYS)
+    said.finish("move stands sits rests runs run operate keep from allowed possible permitted only")
+    units = [*(one.strip() for _, one in sizes), (named and named["in_unit"]) or ""]
+    unit = next(filter(None, units), "")
     one, other = (said.sized(float(number), own.strip() or unit) for number, own in sizes)
     middle, side = (one, other) if ends is None else (0.5 * (one + other), 0.5 * (other - one))
     if ends is not None and not one < other:
@@ -252,8 +274,8 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
 
 def unbounded(text: str) -> bool:
     """Return whether a wish asks for a loop and names no margin."""
-    return bool(re.search(LOOP, text, re.I)) and not re.search(
-        r"\bmargin|\bdB\b|\bdeg|°|\bsafe\b", text, re.I
+    return bool(re.search(rf"{LOOP}|\bPID?\b", text, re.I)) and not re.search(
+        r"\bmargin|\bdB\b|\bdeg|°|\bsafe\b|\bM_?s\b|sensitivity", text, re.I
     )
 
 
@@ -268,6 +290,9 @@ def _margin(said: Phrase) -> str:
             raise bad_answer("wish", why)
         return f"gain_margin: {short(size)}"
     peak = said.number(rf"{ALONE}{NUMBER}\s*dB\b")
+    size = said.after(r"M_?s|max(?:imum|\.)? sensitivity", "none")
+    if peak is None and size is not None:
+        peak = 20.0 * math.log10(needed(size, "wish", "the largest sensitivity"))
     if peak is not None:
         if peak > MOST_DECIBELS:
             why = f"{peak:g} dB are no margin: 6 dB are usual, and {MOST_DECIBELS:g} the most"
