@@ -33,8 +33,8 @@ def instructions(results: Results, spec: str) -> list[str]:
     where = "" if around is None else " at the operating point"
     how = " as r in u = r - C y (C y counted from rest; r is no position of the actuator)" if in_loop else ""
     said = [
-        f"Bring the plant to rest{where}, apply signal.csv{how}, "
-        f"and log {', '.join(logged[:-1])} and {logged[-1]} every {step}."
+        f"Bring the plant to rest{where}, log {', '.join(logged[:-1])} and {logged[-1]} every {step}, "
+        f"and apply signal.csv{how}."
     ]
     levels = " and ".join(f"{level:.6g}" for level in around or () if level)
     if in_loop:
@@ -47,5 +47,6 @@ def instructions(results: Results, spec: str) -> list[str]:
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-        judge += f" --operating-point {point}   (REST: the mean of {' and '.join(outputs)} before it began)"
+        rest = f"the mean of {' and '.join(outputs)} in rows before it begins"
+        judge += f" --operating-point {point}   (REST: {rest})"
     return [*said, judge]

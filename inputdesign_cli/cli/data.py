@@ -25,6 +25,7 @@ def explore(
     data: list[Path],
     *,
     rows: Rows,
+    spec: Path | None = None,
     validate: Path | None = None,
     structure: Literal["any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"] = "any",
     into: Into,
@@ -32,13 +33,13 @@ def explore(
 ) -> None:
     """Find a model in a log, and write a spec for the next experiment.
 
-    Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
-    judged on the other; the simplest that explains it as well is taken. Writes model.yaml, a
-    commented spec.yaml for `idesign solve`, figures and report.html; prints a summary. Exits with 1, and
-    says why, where no model deserves trust.
+    Needs no spec; of one that is given, the next keeps what it asks for. Delays, orders and the family of
+    the model are estimated on one part of the record and judged on the other; the simplest that explains it
+    as well is taken. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and report.html;
+    prints a summary. Exits with 1, and says why, where no model deserves trust.
     """
     ending = "explored" if validate is None else "validated"
-    sources = [*([validate] if validate is not None else []), *data]
+    sources = [*filter(None, [spec, validate]), *data]
     place = Place(into, f"{data[0].stem}_{ending}", sources)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
@@ -46,13 +47,20 @@ def explore(
         model = None if validate is None else read_spec(validate, Changes(), design=False)
         place = place.checked(model)
         only = None if structure == "any" else structure
-        found = questions.explore(data, rows.of(data), model=model, structure=only)
+        asked = None if spec is None else read_spec(spec, Changes())
+        found = questions.explore(data, rows.of(data), model=model, structure=only, asked=asked)
     keep(found.results, place, shown, page=validate is None)
     if found.reasons:
         raise typer.Exit(EXIT_MISSED)
     if validate is None and not (shown.quiet or shown.json_output or into.no_output):
-        spec = shlex.quote(str(place.directory / "spec.yaml"))
-        typer.echo(f"Then: idesign solve {spec}   (say in it how accurate the model must be)")
+        found_spec = str(place.directory / "spec.yaml")
+        if spec is None:
+            then = f"idesign solve {shlex.quote(found_spec)}   (say in it how accurate the model must be)"
+        else:
+            options = [*typed(rows), *(found.levels.split() if rows.detrend == "none" else [])]
+            again = ["-o", f"{place.directory}_assessed"]  # the usual place holds the run of the other spec
+            then = shlex.join(["idesign", "assess", found_spec, *options, *again, *map(str, data)])
+        typer.echo(f"Then: {then}")
 
 
 def identify(
@@ -123,12 +131,12 @@ def assess(
             operating_point=levels.point,
             preparation=rows.of(data),
         )
-    again = typed(changes, levels, rows)
+    again, explores = typed(changes, levels, rows), ["idesign", "explore", "--spec", str(spec)]
     begins = {
         "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
         # The longer beginning comes first: columns that the command has are not named twice.
-        "idesign explore --columns": ["idesign", "explore", *typed(replace(rows, columns="")), "--columns"],
-        "idesign explore": ["idesign", "explore", *typed(rows)],
+        "idesign explore --columns": [*explores, *typed(replace(rows, columns="")), "--columns"],
+        "idesign explore": [*explores, *typed(rows)],
         "idesign solve SPEC": ["idesign", "solve", str(spec), *typed(changes)],
     }
     keep(_with_typed(assessment.results, begins), place, shown)

@@ -187,6 +187,7 @@ def explore(
     *,
     model: Spec | None = None,
     structure: Family | None = None,
+    asked: Spec | None = None,
 ) -> Exploration:
     """Find a model in a log, without a spec; or judge a given model by it.
 
@@ -195,21 +196,22 @@ def explore(
         preparation: which column is which, and what to do to the record before.
         model: to judge, as a spec (`load_spec(.., design=False)`).
         structure: the structure to take; None: the simplest that explains the log as well as any.
+        asked: a spec (`load_spec`), of which the next one keeps what it asks for.
 
     Raises:
-        SpecError: the model cannot be judged.
+        SpecError: the model cannot be judged, or cannot be asked for this.
         DataError: the log cannot be used, or determines no model at all.
         InaccurateError: the numbers of the log leave the range of double precision.
     """
     from inputdesign_cli.questions.building.header import build_header
-    from inputdesign_cli.questions.exploration.build import model_to_judge, naming_model
+    from inputdesign_cli.questions.exploration.build import Asked, model_to_judge, naming_model
     from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
     from inputdesign_cli.records import Preparation
 
     prepared = preparation or Preparation()
     if model is None:
         with sound_arithmetic(most_extreme({})):
-            return explore_log(_paths(data), prepared, structure)
+            return explore_log(_paths(data), prepared, structure, Asked.of(asked) if asked else None)
     with _placed(model), naming_model(model):
         return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
 

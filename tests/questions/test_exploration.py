@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -66,6 +67,29 @@ def test_the_spec_that_is_written_solves_at_once(run):
     )
     played = results.tables["signal"].columns["u1 input"]
     assert low - 1e-9 <= np.min(played) < np.max(played) <= high + 1e-9
+
+
+def test_commands_lead_from_a_refuted_spec_to_a_verdict_on_what_it_asks(run, tmp_path, monkeypatch):
+    """The plant of the spec has no dead time; explore keeps the accuracy and the limits of the spec."""
+    monkeypatch.chdir(tmp_path)
+    asks = "accuracy: {model_error: {relative: 0.5}}\nlimits: {amplitude: 3}\nsignal: {offset: 40}\n"
+    plant = "plant: {continuous: {gain: 1, time_constant: 2}, sample: zoh}\nnoise: {variance: 0.01}\n"
+    Path("spec.yaml").write_text(
+        f"sample_time: 0.5\ntime_unit: min\n{plant}{asks}experiment: {{samples: 200}}\n"
+    )
+    command = f"assess --remove-means --no-figures spec.yaml {run.parent / 'log.csv'}"
+    codes = []
+    for begin in ("next: idesign ", "Then: idesign ", ""):
+        done = CliRunner().invoke(app, shlex.split(command))
+        codes.append(done.exit_code)
+        assert done.stdout, done.stderr
+        command = done.stdout.splitlines()[-1].removeprefix(begin)
+    assert codes[:2] == [5, 0]
+    assert codes[2] in (0, 1)
+    spec = load_spec(tmp_path / "runs" / "log_explored" / "spec.yaml")
+    assert (spec.limits.amplitude.input, spec.accuracy.model_error.relative) == (3, 0.5)
+    wrong = spec.with_(time_unit="s")
+    assert code_of(explore, run.parent / "log.csv", asked=wrong) == "data-wrong-unit"
 
 
 def test_the_model_is_judged_on_other_data(run, tmp_path):

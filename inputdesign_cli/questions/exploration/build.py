@@ -6,7 +6,7 @@ import json
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +35,51 @@ _LOOP = (
 )
 
 
+# Sections of a spec that ask for a design, whatever the plant.
+_WISHES = (
+    *("experiment", "cost", "accuracy", "objective", "limits"),
+    *("spectrum", "signal", "solver", "figures"),
+)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Holds what a spec asks for, by its sections, and the unit of its times."""
+
+    time_unit: str
+    sections: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, spec: Spec) -> Asked:
+        """Return what a spec asks for, whatever the plant."""
+        sections = {key: part for key, part in spec.content.items() if key in _WISHES}
+        match sections:
+            case {"experiment": {"prior": _, **rest}}:  # it is of other parameters
+                sections["experiment"] = rest
+        return cls(spec.time_unit, sections)
+
+    def check_unit(self, time_unit: str) -> None:
+        """Raise `SpecError` (`data-wrong-unit`) unless a log counts times in the same unit."""
+        if self.time_unit != time_unit:
+            message = f"the spec counts times in {self.time_unit}, and the log in {time_unit}"
+            raise bad_spec("data-wrong-unit", message, hint=f"write it in {time_unit}", key="time_unit")
+
+
 def spec_text(
-    log: Record, found: Found, sources: Sequence[Path], reasons: Sequence[str] = (), *, loop: bool = False
+    log: Record,
+    found: Found,
+    sources: Sequence[Path],
+    reasons: Sequence[str] = (),
+    *,
+    loop: bool = False,
+    asked: Asked | None = None,
 ) -> str:
     """Return a spec that `idesign solve` accepts: the model, and the most informative input of that power.
 
     Args:
         reasons: why the model deserves no trust.
         loop: whether inputs seem to answer the outputs.
+        asked: what another spec asks for, in place of that input.
     """
     source = " ".join(" and ".join(path.name for path in sources).split())
     families = ", ".join(
@@ -92,6 +129,11 @@ def spec_text(
     if found.integrates:  # power at frequency zero determines the gain of an integrator without end
         sections["spectrum"] = {"type": "multisine", "lines": 100}
         sections["signal"] = {"type": "multisine", "seed": 1, "offset": level}
+    if asked:
+        kept = {key: part for key, part in sections.items() if key not in _WISHES}
+        sections, first = {**kept, **asked.sections}, next(iter(asked.sections))
+        comments = {key: comments[key] for key in ("title", "plant", "noise")}
+        comments[first] = ["From here on as in the spec that explore was given."]
     return _commented(sections, comments)
 
 

@@ -36,7 +36,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
 from inputdesign_cli.questions.assessment.outcome import fit_of, fit_to_log, response_without_model
 from inputdesign_cli.questions.common.delivery import adding
-from inputdesign_cli.questions.exploration.build import build_explored, spec_text
+from inputdesign_cli.questions.exploration.build import Asked, build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import (
     exploration_notes,
     exploration_of,
@@ -54,21 +54,30 @@ _SEE = "see whether the model is of this plant, and gain, delay, units and colum
 
 @dataclass(frozen=True)
 class Exploration:
-    """Holds the results, reasons against trust in any model (empty if one has it), and failed tests."""
+    """Holds the results, reasons against trust in any model (empty if one has it), and failed tests.
+
+    `levels` is the option with which `assess` takes levels away from this log as was done here.
+    """
 
     results: Results
     reasons: tuple[str, ...] = ()
     against: tuple[str, ...] = ()
+    levels: str = "--remove-means"
 
 
-def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None = None) -> Exploration:
+def explore(
+    paths: Sequence[Path], preparation: Preparation, only: Family | None = None, asked: Asked | None = None
+) -> Exploration:
     """Find a model of the plant that a log is of; raise `DataError` if it cannot be read or determines none.
 
     Args:
         only: the structure to take; None: the simplest that explains the log as well as any.
+        asked: what the spec that is written asks for; None: the most informative experiment.
     """
     started = time.perf_counter()
     whole_log = log = read_logs(paths, preparation)
+    if asked is not None:
+        asked.check_unit(log.time_unit)
     looped = bool(loops := answers_output(log.parts))
     with blaming_columns(paths[0], log):
         try:
@@ -108,13 +117,15 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     findings = [replace(one, message=f"no trust: {one.message}") for one in doubts]
     findings += () if lines is None else response_note(lines)
     findings += silent_lines_answer(silent)
-    results = replace(results, resolved_spec=spec_text(log, found, paths, reasons, loop=looped))
+    text = spec_text(log, found, paths, reasons, loop=looped and not asked, asked=asked)
+    results = replace(results, resolved_spec=text)
     fit = fit_to_log(cast(FitCurves, results.curves["fit"]), whole_log, data)
     curves = {**structure_curves(found), **curves, "fit": fit}
     results = adding(results, outcome, findings, tables, curves)
     against = [*shifted_levels(found.estimate, data, log.time_unit)]
     against += refutations(found.model, found.estimate)
-    return Exploration(results, reasons, tuple(one.message for one in against))
+    levels = "--detrend linear" if np.any(found.slopes) else "--remove-means"
+    return Exploration(results, reasons, tuple(one.message for one in against), levels)
 
 
 def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = None) -> tuple[Record, Found]:
