@@ -76,7 +76,7 @@ def _disagreements(done: Designed, outcome: Outcome, apart: float, *, on_grid: b
     spectrum = read_plain(_WrittenSpectrum, plain(outcome.spectrum))
     plants = [_Reread(done, spectrum, scenario) for scenario in problem.scenarios]
     # The nominal plant, and others that keep nearly all that is admitted.
-    kept = kept_by(problem, done.design, done.experiment.samples)
+    kept = kept_by(problem, done.design, done.experiment.samples) if problem.others else []
     doubtful = [one for n, one in enumerate(plants) if n == 0 or kept[n].share > _DOUBTFUL]
     for reread in doubtful if not on_grid else ():
         for promised in reread.scenario.side if goal == "factor" else reread.scenario.requirements:
