@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -239,13 +240,13 @@ class Accuracy(Section, not_both=(("model_error", "loop"),)):
             band=self.loop.band,
         )
 
-    @property
+    @cached_property
     def requirements(self) -> tuple[str, ...]:
         """Return the keys of the requirements that are given, in the order of the contract."""
         names = (key for key in type(self).model_fields if key not in _NO_REQUIREMENTS)
         return self.stated(*names, *(("mean_squared_error",) if self._bounds_mean_square else ()))
 
-    @property
+    @cached_property
     def goals(self) -> tuple[str, ...]:
         """Return the keys that ask for the best that limits allow."""
         least = () if self._bounds_mean_square else ("mean_squared_error",)
