@@ -32,7 +32,7 @@ from inputdesign_cli.accuracy.requirement import (
     Violation as Violation,
     active_entries as active_entries,
     inverse_factor as inverse_factor,
-    least_ratio as least_ratio,
+    least_ratios as least_ratios,
     worst as worst,
     worst_ratio as worst_ratio,
 )

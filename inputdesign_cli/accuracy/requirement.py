@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -367,9 +368,21 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
     return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
 
 
-def least_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    """Return a lower bound on `worst_ratio`, without a slow search."""
-    return _largest(requirements, lambda requirement, information: requirement.least(information))
+def least_ratios(requirements: Sequence[Requirement]) -> Callable[[Array], Array]:
+    """Return lower bounds on `worst_ratio` (n,) for informations (n, k, k), without a slow search.
+
+    They are NaN where rounding would decide.
+    """
+    least = _largest(requirements, lambda requirement, information: requirement.least(information))
+
+    def ratios(informations: Array) -> Array:
+        found = np.full(len(informations), np.nan)
+        for number, information in enumerate(informations):
+            with suppress(np.linalg.LinAlgError):
+                found[number] = least(information)
+        return found
+
+    return ratios
 
 
 def _largest(

@@ -45,9 +45,9 @@ class RecordTransforms:
         return self.experiments[0]
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return the response of inputs or outputs to the samples (n, r) alone, (n, channels)."""
-        answer = np.einsum("ncr,nr->nc", self._responses(of), self._transform(record))
-        return self._back(answer)
+        """Return the response of inputs or outputs to the samples (.., n, r) alone, (.., n, channels)."""
+        answer = np.einsum("ncr,...nr->...nc", self._responses(of), self._transform(record))
+        return self._back(answer, 1)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """Return the transpose of `signals`, applied to weights (n, channels), (n, r)."""
@@ -57,26 +57,28 @@ class RecordTransforms:
         return falling * np.fft.irfft(answer, self._length, axis=0)[: self.samples]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """Return psi (n, k, p), the gradient of the prediction, in these coordinates, noise whitened to I."""
+        """Return psi (.., n, k, p) of the prediction, in these coordinates, noise whitened to I."""
         transform = self._transform(record)
         model = self.experiment.model
-        if self.experiment.size * model.outputs * model.inputs * len(transform) <= _KEPT:
-            return self._back(np.einsum("nkpr,nr->nkp", self._gradient, transform))
+        frequencies = transform.shape[-2]
+        if self.experiment.size * model.outputs * model.inputs * frequencies <= _KEPT:
+            return self._back(np.einsum("nkpr,...nr->...nkp", self._gradient, transform), 2)
         parts = []
-        for start in range(0, len(transform), _FREQUENCIES_AT_ONCE):
+        for start in range(0, frequencies, _FREQUENCIES_AT_ONCE):
             part = slice(start, start + _FREQUENCIES_AT_ONCE)
             F = self.experiment.excitation_gradient(self._frequencies[part])
-            parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
-        return self._back(np.concatenate(parts))
+            parts.append(np.einsum("nkpr,...nr->...nkp", F, transform[..., part, :]))
+        return self._back(np.concatenate(parts, axis=-3), 2)
 
     def _transform(self, record: Array) -> ComplexArray:
-        """Return the Fourier transform (frequencies, r) of the samples (n, r), weighted."""
-        return np.fft.rfft(record * self._weights[:, None], self._length, axis=0)
+        """Return the Fourier transform (.., frequencies, r) of the samples (.., n, r), weighted."""
+        return np.fft.rfft(record * self._weights[:, None], self._length, axis=-2)
 
-    def _back(self, transform: ComplexArray) -> NDArray[np.float64]:
-        """Return (n, ..) samples of a transform (frequencies, ..) of weighted ones."""
-        weights = self._weights.reshape(-1, *(1 for _ in transform.shape[1:]))
-        return np.fft.irfft(transform, self._length, axis=0)[: self.samples] / weights
+    def _back(self, transform: ComplexArray, behind: int) -> NDArray[np.float64]:
+        """Return samples of a transform of weighted ones, with `behind` axes behind the frequencies."""
+        found = np.fft.irfft(transform, self._length, axis=-1 - behind)
+        first = np.moveaxis(np.moveaxis(found, -1 - behind, 0)[: self.samples], 0, -1 - behind)
+        return first / self._weights.reshape(-1, *(1 for _ in range(behind)))
 
     @cached_property
     def _weights(self) -> Array:
@@ -152,22 +154,23 @@ class RecordFilters:
         return cls(experiment, model)
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return the response of the input or the output to the samples (n, 1) alone, as (n, 1)."""
+        """Return the response of the input or the output to the samples (.., n, 1) alone, in their shape."""
         numerator, denominator = self._responses[of]
-        return filtered(numerator, denominator, record, axis=0)
+        return filtered(numerator, denominator, record, axis=-2)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """Return the transpose of `signals` (n, 1); a filter run backwards in time is its own."""
         return self.signals(of, weights[::-1])[::-1]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """Return psi (n, k, 1), the gradient of the prediction, in these coordinates, noise whitened to 1."""
-        sources, samples = self._sources(record), len(record)
-        raw = np.zeros((samples, self.experiment.size))
+        """Return psi (.., n, k, 1) of the prediction, in these coordinates, noise whitened to 1."""
+        sources, samples = self._sources(record), record.shape[-2]
+        raw = np.zeros((*record.shape[:-1], self.experiment.size))
         for column, parameter in enumerate(self.model.parameters):
             if parameter.letter in sources and parameter.power < samples:
-                raw[parameter.power :, column] = sources[parameter.letter][: samples - parameter.power]
-        return (raw @ self._whitener)[:, :, None]
+                moved = sources[parameter.letter][..., : samples - parameter.power]
+                raw[..., parameter.power :, column] = moved
+        return (raw @ self._whitener)[..., None]
 
     @cached_property
     def _whitener(self) -> Array:
@@ -191,17 +194,17 @@ class RecordFilters:
         }
 
     def _sources(self, record: Array) -> dict[str, Array]:
-        """Return the gradient with respect to a coefficient of A, B or F, but for its delay, (n,).
+        """Return the gradient with respect to a coefficient of A, B or F, but for its delay, (.., n).
 
         It is minus the derivative of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters run
         one after the other: a double pole in one product of their denominators costs half the digits.
         """
         m, letters = self.model, self.model.letters
         B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]
-        by_b = filtered(D, np.convolve(C, F), self.signals("input", record)[:, 0])
+        by_b = filtered(D, np.convolve(C, F), self.signals("input", record)[..., 0])
         sources = {"b": by_b}
         if "a" in letters:
-            sources["a"] = filtered(-D, C, self.signals("output", record)[:, 0])
+            sources["a"] = filtered(-D, C, self.signals("output", record)[..., 0])
         if "f" in letters:
             sources["f"] = filtered(-B, F, by_b)
         return sources
@@ -220,7 +223,7 @@ class FiniteRecord:
     step: float = 1.0
 
     def information(self, record: Array) -> Array:
-        """Return M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (n, r), in these coordinates, (k, k)."""
+        """Return M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (.., n, r), (.., k, k)."""
         return self.known + self._excited(record)
 
     def information_of_experiment(self, record: Array) -> Array:
@@ -230,11 +233,11 @@ class FiniteRecord:
 
     def _excited(self, record: Array) -> Array:
         psi = self.gradient(record)
-        flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
-        return np.asarray(flat @ flat.T)
+        flat = psi.swapaxes(-3, -2).reshape(*record.shape[:-2], self.experiment.size, -1)
+        return np.asarray(flat @ flat.swapaxes(-2, -1))
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """Return psi of the prediction, from rest, in these coordinates, noise whitened to I, (n, k, p)."""
+        """Return psi (.., n, k, p) from rest, in these coordinates, noise whitened to I."""
         return self._answers.gradient(record)
 
     @cached_property
@@ -244,12 +247,12 @@ class FiniteRecord:
         return self.experiment.prior_information + share * self.experiment.noise_information
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return the response of inputs or outputs to the samples (n, r) alone, from rest, (n, channels)."""
+        """Return the response (.., n, channels) of inputs or outputs to samples (.., n, r), from rest."""
         return record if self._is_record(of) else self._answers.signals(of, record)
 
     def mean_squares(self, of: PowerKind, record: Array) -> Array:
-        """Return the powers of these signals (channels,)."""
-        return np.mean(self.signals(of, record) ** 2, axis=0)
+        """Return the powers of these signals (.., channels)."""
+        return np.asarray(np.mean(self.signals(of, record) ** 2, axis=-2))
 
     def plants_with_own(self, of: PowerKind) -> int:
         """Return the number of plants with signals of their own: one if the record itself has them."""
@@ -292,7 +295,7 @@ class FiniteRecords(FiniteRecord):
     others: tuple[Experiment, ...] = ()
 
     def information(self, record: Array) -> NDArray[np.float64]:
-        """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
+        """Return the information of each plant as in `FiniteRecord` (1 + others, .., k, k)."""
         return np.array([plant.information(record) for plant in self._each])
 
     @cached_property

@@ -80,7 +80,7 @@ class Redrawn:
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
         """Return records of the generator's kind of signal."""
-        values = np.stack([self.generator.values(rng) for _ in range(runs)])
+        values = self.generator.several([rng] * runs)
         records = np.repeat(values, self.generator.settings.hold, axis=1)
         found = np.mean(records**2, axis=1, keepdims=True)
         return np.asarray(records * np.sqrt(self.powers / np.maximum(found, 1e-300)))

@@ -6,8 +6,9 @@ import numpy as np
 import scipy.linalg.blas
 from numpy.typing import ArrayLike, NDArray
 
-# Samples times coefficients beyond which it pays to load scipy.signal: that takes a third of the start.
-_LARGE = 50_000
+# Samples times coefficients beyond which it pays to load scipy.signal: that takes a third of the start. The
+# second number is for several rows, whose recursions take less time per sample if they are short.
+_LARGE, _LARGE_TOGETHER = 50_000, 200_000
 
 
 def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis: int = -1) -> NDArray:
@@ -19,7 +20,8 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis
     b, a = b / a[0], a / a[0]
     if a.size == b.size == 1 or values.size == 0:
         return b[0] * values
-    if values.size * max(a.size, b.size) > _LARGE:
+    coefficients = max(a.size, b.size)
+    if values.shape[axis] * coefficients > _LARGE or values.size * coefficients > _LARGE_TOGETHER:
         import scipy.signal
 
         return np.asarray(scipy.signal.lfilter(b, a, values, axis=axis))

@@ -124,14 +124,15 @@ class Target:
         cost: weights of the powers (of all channels together, or one weight a channel), to rank records
             that meet the target.
         designed: the cost of the design in the same weights; its power when not given.
-        least_ratio: a lower bound of `worst_ratio`, in a shorter time; to leave out records early.
+        least_ratios: maps informations of several records, stacked before all other axes but that of the
+            plants, to lower bounds of `worst_ratio` (runs,), in a shorter time; NaN where none is known.
     """
 
     worst_ratio: Callable[[Array], float]
     meets: bool = False
     cost: Mapping[PowerKind, float | tuple[float, ...]] = field(default_factory=lambda: {"excitation": 1.0})
     designed: float | None = None
-    least_ratio: Callable[[Array], float] | None = None
+    least_ratios: Callable[[Array], Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -172,23 +173,25 @@ class Evaluator:
 
     def cost(self, samples: Array) -> float:
         """Return the weighted sum of the powers."""
-        cost = 0.0
-        for kind, weight in self.target.cost.items():
-            cost += float(np.sum(np.asarray(weight) * self.plant.mean_squares(kind, samples)))
-        return cost
+        return float(self._costs(samples))
 
-    def costs_more(self, samples: Array, cost: float) -> bool:
-        """Return whether multiples of the samples miss the target as long as they cost no more than that."""
-        least = self.target.least_ratio
-        own = self.cost(samples)
-        if least is None or cost <= 0.0 or own <= 0.0:
-            return False
-        known = self.plant.known
-        square = cost / own
-        try:
-            return least(known + square * (self.plant.information(samples) - known)) > MET
-        except np.linalg.LinAlgError:
-            return False
+    def _costs(self, samples: Array) -> Array:
+        """Return the weighted sums (..,) of the powers of records (.., n, r)."""
+        costs = np.zeros(samples.shape[:-2])
+        for kind, weight in self.target.cost.items():
+            costs = costs + np.sum(np.asarray(weight) * self.plant.mean_squares(kind, samples), axis=-1)
+        return costs
+
+    def least_ratios(self, samples: Array, cost: float) -> Array:
+        """Return lower bounds (runs,) on the ratios of multiples of records (runs, n, r) at this cost.
+
+        They are NaN where none is known.
+        """
+        least, own = self.target.least_ratios, self._costs(samples)
+        if least is None or cost <= 0.0:
+            return np.full(len(samples), np.nan)
+        squares = np.divide(cost, own, out=np.zeros_like(own), where=own > 0.0)
+        return least(self.plant.information(np.sqrt(squares)[:, None, None] * samples))
 
     def needed_level(self, samples: Array) -> float | None:
         """Return the level that the accuracy needs, were there no limits; None when no level is enough."""

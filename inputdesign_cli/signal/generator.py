@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -82,15 +83,22 @@ class SignalGenerator:
 
     def values(self, rng: np.random.Generator) -> Array:
         """Return one record, faded in and out, before each value is held, (samples // hold, r)."""
+        return self.several([rng])[0]
+
+    def several(self, rngs: Sequence[np.random.Generator]) -> Array:
+        """Return a record from each of the generators, as `values` does, (runs, samples // hold, r)."""
         settings = self.settings
         if self.factor is not None and self.method == "filtered_noise" and settings.periods == 1:
-            whole = self.factor.filtered(self.samples, rng)[:: settings.hold, None]
+            noise = np.stack([self.factor.filtered(self.samples, rng) for rng in rngs])
+            whole = noise[:, :: settings.hold, None]
         else:
-            whole = np.tile(self.kind.draw(self._draft, rng), (settings.periods, 1))
+            draft = self._draft
+            drawn = np.stack([self.kind.draw(draft, rng) for rng in rngs])
+            whole = np.tile(drawn, (1, settings.periods, 1))
         if settings.ramp:
-            whole = whole * settings.taper(len(whole))[:, None]
+            whole = whole * settings.taper(whole.shape[1])[:, None]
         if settings.returns:
-            whole[-1] = 0.0
+            whole[:, -1] = 0.0
         return whole
 
     @property

@@ -22,6 +22,8 @@ _CLIPPED = (1.0, 1.4, 2.0, 3.0)
 _FAR = 40.0
 # So often at most the times of switching of ramps between two levels are changed.
 _SWITCHINGS = 600
+# So many samples of candidates at most are drawn and compared at once.
+_AT_ONCE = 10_000
 LONG = 2000
 """Samples beyond which a record takes seconds to make, so that searches for a better one try less."""
 # Other phases hardly change the ratio of a record. Luck does not make up for a larger miss than this if the
@@ -126,19 +128,20 @@ def best_record(
     bounds, settings = bounds or Bounds(), generator.settings
     limiter = Limiter.of(limiting or plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
-    best = candidates.record(_stream(settings.seed, 0))
-    missed = [best.worst_ratio]
-    for number in range(1, max(settings.candidates, settings.most_candidates)):
+    together = 1 if first else candidates.together
+    number = max(min(together, settings.candidates), 1)
+    best, missed = candidates.better(range(number), None)
+    while number < max(settings.candidates, settings.most_candidates):
         if (first and best.met) or (number >= settings.candidates and candidates.suffices(best)):
             break
         if bounds.hard and candidates.free_level and not best.met and _hopeless(missed, len(best.samples)):
             break
+        end = number + max(min(together, settings.candidates - number), 1)
         try:
-            other = candidates.record(_stream(settings.seed, number), best)
+            best, ratios = candidates.better(range(number, end), best)
         except OutOfTimeError:
             break
-        missed.append(other.worst_ratio)
-        best = min((best, other), key=candidates.rank)
+        number, missed = end, [*missed, *ratios]
     return best
 
 
@@ -171,31 +174,67 @@ class _Candidates:
         """Return whether the search may end: little is left to gain, or limits stand in the way."""
         return not self.evaluator.target.meets or not self.limiter.plain or record.extra_power <= _LITTLE
 
-    def record(self, rng: np.random.Generator, best: Record | None = None) -> Record:
-        """Return one candidate at its level, or the best so far where it is seen early to be no better."""
+    @property
+    def together(self) -> int:
+        """Return how many candidates are compared at once: several where most of them can be left out."""
+        return max(_AT_ONCE // self.generator.samples, 1) if self._free else 1
+
+    def drawn(self, numbers: Sequence[int]) -> list[tuple[Array, np.random.Generator]]:
+        """Return the values (m, r) of candidates with the power of the design, and their random numbers."""
+        rngs = [_stream(self.generator.settings.seed, number) for number in numbers]
+        found = []
+        for values, rng in zip(self.generator.several(rngs), rngs, strict=True):
+            power = power_of(values)
+            if power > 0.0:  # a few samples may all be zeros of the sinusoids, and excite nothing
+                values = values * np.sqrt(self.generator.spectrum.power / power)
+            if self.generator.kind.slewed:
+                values = self._switched(values, self._strongest, rng)
+            found.append((values, rng))
+        return found
+
+    def better(self, numbers: Sequence[int], best: Record | None) -> tuple[Record, list[float]]:
+        """Return the best of these candidates and the best so far, and the worst ratios of all tried.
+
+        A candidate is left out where, at the cost of the best, it misses the target. The one with the least
+        ratio there comes first: it leaves out most of the others.
+
+        Raises:
+            OutOfTimeError: the time limit has passed.
+        """
         if best is None or self.generator.samples > LONG:  # short records take no time to speak of
             seconds_left()
-        values, power = self.generator.values(rng), self.generator.spectrum.power
-        drawn = power_of(values)
-        if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
-            values = values * np.sqrt(power / drawn)
-        if self.generator.kind.slewed:
-            values = self._switched(values, self._strongest, rng)
+        left, ratios = self.drawn(numbers), list[float]()
+        while left:
+            if self._free and (best is None or best.met):
+                held = np.repeat([values for values, _ in left], self.limiter.settings.hold, axis=1)
+                cost = self._designed * (1.0 if best is None else 1.0 + best.extra_power)
+                least = self.evaluator.least_ratios(held, cost)
+                order = np.argsort(least, kind="stable")
+                left = [left[n] for n in order if best is None or not least[n] > MET]
+            if left:
+                other = self.record(*left.pop(0), switched=best is None)
+                ratios.append(other.worst_ratio)
+                best = other if best is None else min((best, other), key=self.rank)
+        assert best is not None
+        return best, ratios
+
+    def record(self, values: Array, rng: np.random.Generator, *, switched: bool = False) -> Record:
+        """Return the record of the values of a candidate at its level; `switched` is as in `_levelled`."""
         factor, evaluator = self.generator.factor, self.evaluator
-        designed = evaluator.target.designed or power
-        if best is not None and best.met and self._free:
-            held = np.repeat(values, self.limiter.settings.hold, axis=0)
-            if evaluator.costs_more(held, (1.0 + best.extra_power) * designed):
-                return best
-        samples, met = self._levelled(values, rng, switched=best is None)
+        samples, met = self._levelled(values, rng, switched=switched)
         return Record(
             samples,
             self.generator.method,
             evaluator.ratio(samples),
             None if factor is None else factor.residual,
-            evaluator.cost(samples) / designed - 1.0,
+            evaluator.cost(samples) / self._designed - 1.0,
             met,
         )
+
+    @property
+    def _designed(self) -> float:
+        """Return the cost of the design, or its power."""
+        return self.evaluator.target.designed or self.generator.spectrum.power
 
     @cached_property
     def free_level(self) -> bool:

@@ -1,6 +1,7 @@
 """What a finite record tells is what a simulation of the same samples measures."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
@@ -143,6 +144,16 @@ def test_several_plants_answer_side_by_side(models, of):
     )
     weights = np.random.default_rng(3).normal(size=wanted.shape)
     assert np.sum(together.adjoint_of_each(of, weights) * record) == pytest.approx(np.sum(weights * wanted))
+
+
+@pytest.mark.parametrize("model", [arx(), SLOW, random_case(1).model, random_case(5).model])
+def test_several_records_answer_as_each_does_alone(model):
+    plant = FiniteRecord(Experiment(model, 120).whitened(1.0), 120)
+    records = np.random.default_rng(4).normal(size=(3, 120, model.inputs))
+    outputs = (partial(one, "output") for one in (plant.signals, plant.mean_squares))
+    for answer in (plant.information, *outputs):
+        alone = np.stack([answer(record) for record in records])
+        np.testing.assert_allclose(answer(records), alone, atol=1e-12 * np.abs(alone).max())
 
 
 @pytest.mark.parametrize("seed", range(8))

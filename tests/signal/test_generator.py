@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli.accuracy import worst_ratio
+from inputdesign_cli.accuracy import least_ratios, worst_ratio
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal.evaluation import Target
 from inputdesign_cli.signal.generator import SignalGenerator
@@ -120,6 +120,23 @@ def test_shifted_sequences_are_nearly_uncorrelated():
     assert peaks.size == 1
     assert min(peaks[0], 127 - peaks[0]) == 63
     np.testing.assert_allclose(np.delete(cross, peaks), -1 / 127, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["filtered_noise", "multisine", "binary"])
+@pytest.mark.parametrize("seed", range(3))
+def test_leaving_candidates_out_early_changes_no_record(method, seed):
+    """The bounds on ratios only save time: every candidate that they leave out costs more than the best."""
+    case = random_case(seed)
+    experiment = case.experiment(300).whitened(1.0)
+    requirements = [case.requirement(experiment)]
+    spectrum = DesignedSpectrum.of(FirBasis(1, 3), COLOURED)
+    made = SignalGenerator(spectrum, SignalSettings(method, candidates=6, most_candidates=9), 300)
+    target = Target(worst_ratio(requirements), meets=True)
+    early = replace(target, least_ratios=least_ratios(requirements))
+    plant = FiniteRecord(experiment, 300)
+    every, some = (best_record(made, plant, one) for one in (target, early))
+    assert some.met
+    np.testing.assert_array_equal(some.samples, every.samples)
 
 
 def record_of(experiment, basis, x, seed=0):

@@ -177,14 +177,14 @@ def test_values_that_are_zero_make_a_record_of_zeros(monkeypatch, experiment, ki
     def ratio(information):
         return 0.45 / float(np.linalg.norm(np.linalg.cholesky(information), -2))
 
-    def zeros(self, rng):
-        return np.zeros((self.samples // self.settings.hold, self.spectrum.inputs))
+    def zeros(self, rngs):
+        return np.zeros((len(rngs), self.samples // self.settings.hold, self.spectrum.inputs))
 
-    monkeypatch.setattr(SignalGenerator, "values", zeros)
+    monkeypatch.setattr(SignalGenerator, "several", zeros)
     bounds = bounds_of(experiment.inputs, **LIMITS.get(limited, {}))
     settings = SignalSettings(**SETTINGS[kind], candidates=2)
     generator = SignalGenerator(SPECTRA[experiment.inputs], settings, experiment.samples)
-    target = Target(ratio, meets, {"output": 1.0}, least_ratio=ratio)
+    target = Target(ratio, meets, {"output": 1.0}, least_ratios=lambda M: np.full(len(M), np.nan))
     with np.errstate(divide="raise", invalid="raise", over="raise"):
         record = best_record(generator, FiniteRecord(experiment, experiment.samples), target, bounds)
     assert not record.samples.any()

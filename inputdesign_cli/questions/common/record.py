@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Requirement, criterion_of, least_ratio, worst_ratio
+from inputdesign_cli.accuracy import Requirement, criterion_of, least_ratios, worst_ratio
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
@@ -35,6 +36,7 @@ _HOPELESS = 1e3
 _LATE = 0.8
 
 Family = Basis | TabulatedSpectrum
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def make_record(
     meets = problem.goal != "factor" and request.meets
     plants = [scenario.experiment.with_samples(experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
-    bounding = [least_ratio(scenario.requirements) for scenario in problem.scenarios]
+    bounding = [least_ratios(scenario.requirements) for scenario in problem.scenarios]
     spectrum = spectrum_of(request, design.result.basis, design.result.x)
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
     generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
@@ -142,11 +144,15 @@ def make_record(
             return others[0]
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
-    score, bound = scores[0], bounding[0]
-    if len(plants) > 1:
-        score, bound = partial(_largest, scores, numbers), partial(_largest, bounding, numbers)
-    cost = design_cost(design, request.cost)
-    target = Target(score, meets, request.cost, cost, bound if meets else None)
+    def score(informations: Array) -> float:
+        return max(_at_each(scores, numbers, informations))
+
+    def bound(informations: Array) -> Array:
+        return np.max(_at_each(bounding, numbers, informations), axis=0)
+
+    cost, alone = design_cost(design, request.cost), len(plants) == 1
+    bounds_of = bounding[0] if alone else bound
+    target = Target(scores[0] if alone else score, meets, request.cost, cost, bounds_of if meets else None)
     while True:
         at, limits = together(numbers), together(limiting)
         record = best_record(generator, at, target, bounds, first=first, limiting=limits)
@@ -165,11 +171,11 @@ def make_record(
         limiting += higher
 
 
-def _largest(
-    of: Sequence[Callable[[Array], float]], numbers: Sequence[int], informations: NDArray[np.float64]
-) -> float:
-    """Return the largest value at the plants of these numbers, from their information (plants, k, k)."""
-    return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+def _at_each(
+    of: Sequence[Callable[[Array], T]], numbers: Sequence[int], informations: NDArray[np.float64]
+) -> list[T]:
+    """Return the values at the plants of these numbers, from their information (plants, .., k, k)."""
+    return [of[n](M) for n, M in zip(numbers, informations, strict=True)]
 
 
 def _with_powers(bounds: Bounds, design: Design) -> Bounds:
@@ -301,12 +307,9 @@ def ratio_before(design: Design, step: float) -> float:
     ratios = []
     for scenario in design.problem.scenarios:
         silent = FiniteRecord(scenario.experiment.with_samples(1), 1, step)
-        score = least_ratio(scenario.requirements)
-        try:
-            ratios.append(score(silent.information(np.zeros((1, scenario.experiment.inputs)))))
-        except np.linalg.LinAlgError:
-            return np.inf
-    return max(ratios)
+        without = silent.information(np.zeros((1, 1, scenario.experiment.inputs)))
+        ratios += least_ratios(scenario.requirements)(without).tolist()
+    return np.inf if np.isnan(ratios).any() else max(ratios)
 
 
 def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
