@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import DOUBT, NOTE, UNDECIDED, Finding, FindingKind, finding
-from inputdesign_cli.identification import Estimate, Rival
 from inputdesign_cli.outcome.design import Rival as Entry
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
+
+if TYPE_CHECKING:
+    from inputdesign_cli.identification import Estimate, Rival
 
 # Parameters that are named: the few that differ most.
 _MOST_NAMES = 4

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,13 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification import BatchEstimate, Earlier, Estimate, Rival, fit_batch, identify
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.plant import Model
+
+if TYPE_CHECKING:
+    from inputdesign_cli.identification import BatchEstimate, Earlier, Estimate
 
 # Records of outputs that are simulated and identified in one pass.
 _OUTPUTS_AT_ONCE = 100
@@ -154,6 +157,8 @@ def _run(
     settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
     with an error of its own in each run. The search begins at the parameters of `model`.
     """
+    from inputdesign_cli.identification import fit_batch, identify  # only now: designs do without it
+
     system = true.model
     e = _noise(true, runs, rng)
     r = excitation.draw(runs, true.samples, rng)
@@ -204,7 +209,7 @@ def _again_where_lost(
             continue
         theta[run], noise[run], information[run] = other.theta, other.noise, other.information
         converged[run], steps[run] = other.search.converged, other.search.steps
-    return BatchEstimate(theta, noise, information, converged, steps)
+    return replace(found, theta=theta, noise=noise, information=information, converged=converged, steps=steps)
 
 
 def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
@@ -233,6 +238,8 @@ def searched_run(
     Raises:
         SpecError: see `identify`.
     """
+    from inputdesign_cli.identification import Rival, identify
+
     true, model = nominal.with_samples(len(record)), nominal.model
     (_, u), (_, y) = responses(true, record[None], _noise(true, 1, rng), step)
     found = identify(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.design.convex.limits import Goal, Weight
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.identification import Earlier
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
     Coloured,
@@ -45,6 +45,9 @@ from inputdesign_cli.specification.models.plant import (
     PolynomialPlant,
     StateSpacePlant,
 )
+
+if TYPE_CHECKING:
+    from inputdesign_cli.identification import Earlier
 
 # A pole this near to the unit circle is on it, but for rounding.
 _ROUNDING = 1e-9
@@ -412,6 +415,8 @@ def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
     information, values = stated_prior(spec, nominal.names) or (None, None)
     if information is None or values is None:
         return None
+    from inputdesign_cli.identification import Earlier
+
     theta = [values.get(name, value) for name, value in zip(nominal.names, nominal.theta, strict=True)]
     return Earlier(np.array(theta, dtype=float), information)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +27,14 @@ from inputdesign_cli.compute.time_limit import (
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, foreseen_rivals, not_foreseen
-from inputdesign_cli.identification import Earlier, Estimate, Rival
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.study import searched_run
 from inputdesign_cli.outcome.design import Foreseen as Entry
 from inputdesign_cli.outcome.simulation import Searched
 from inputdesign_cli.outcome.units import Units
+
+if TYPE_CHECKING:
+    from inputdesign_cli.identification import Earlier, Estimate, Rival
 
 _SEED = 0
 # Seconds of a search for each sample, channel, channel and parameter, measured; the longest that is begun.
@@ -88,6 +91,8 @@ def that_agrees(
     knowledge: Knowledge | None, estimate: Estimate, near: Callable[[Array], Estimate]
 ) -> tuple[Estimate, tuple[Rival, ...]]:
     """Return the likeliest minimum that agrees with the knowledge, and the minima that do not."""
+    from inputdesign_cli.identification import Rival
+
     minima = (Rival(estimate.theta, 0.0), *estimate.search.rivals)
     admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]
     if not admitted or len(admitted) == len(minima):
