@@ -11,7 +11,7 @@ def page(monkeypatch):
     """The figure that was drawn last, instead of its pixels."""
     kept = []
 
-    def keep(canvas, _):
+    def keep(canvas, _, **settings):
         canvas.draw()  # only then have ticks their texts, and panels their places
         kept.append(canvas.figure)
 
