@@ -132,13 +132,13 @@ solver: {any_spectrum: false}
 @pytest.mark.slow
 def test_a_long_shortest_record_takes_few_records_of_its_length():
     """The work is counted in samples of records that are made, in lengths of the one that is found."""
-    made, plain = [], SignalGenerator.values
+    made, plain = [], SignalGenerator.several
 
-    def values(self, rng):
-        made.append(self.samples)
-        return plain(self, rng)
+    def several(self, rngs):
+        made.extend(self.samples for _ in rngs)
+        return plain(self, rngs)
 
-    with patch.object(SignalGenerator, "values", values):
+    with patch.object(SignalGenerator, "several", several):
         found = solve(parse_spec(LONG + SHORTEST)).result["signal"]
     assert found["samples"] > 4000
     assert found["worst_ratio"] <= 1.0 + 1e-9
@@ -149,17 +149,17 @@ def test_a_long_shortest_record_takes_few_records_of_its_length():
 @pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
 def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):
     """No phases make up for a third less accuracy than asked."""
-    made, plain = [], SignalGenerator.values
+    made, plain = [], SignalGenerator.several
 
-    def values(self, rng):
-        made.append(self.samples)
-        return plain(self, rng)
+    def several(self, rngs):
+        made.extend(self.samples for _ in rngs)
+        return plain(self, rngs)
 
     short = f"experiment: {{samples: 1500}}\nobjective: best_accuracy\nsignal: {{type: {method}}}\n"
     task = build_task(parse_spec(LONG + short))
     design = task.designed().design
     design = replace(design, problem=replace(design.problem, goal="cost"))
-    with patch.object(SignalGenerator, "values", values):
+    with patch.object(SignalGenerator, "several", several):
         record = make_record(task.record, design, 1500)
     assert record is not None
     assert not record.met
