@@ -53,7 +53,7 @@ BIASED = doubt(
 def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
     """The frequency response was measured without a model. Even a right model misses 5 % of the discs."""
     entries = "" if of.entries == 1 else f", counted over {of.entries} entries of G"
-    outside, by = of.model_outside or 0.0, ", by the reference" if of.excitation == "r" else ""
+    outside, by = of.model_outside or 0.0, ", measured from the reference r" if of.excitation == "r" else ""
     fact = f"the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies{entries}{by}"
     found = kind.found(fact, where="frequency_response.csv", model_outside=outside)
     return [found, *BIASED.when(of.caveat, where="r")]

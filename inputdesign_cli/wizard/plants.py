@@ -201,7 +201,7 @@ def _integrating(plant: PlantAnswer) -> PlantAnswer:
     below = "[time_constant, 1, 0]" if "time_constant" in values else "[1, 0]"
     delay = ", delay: dead_time" if "dead_time" in values else ""
     settings = f"Kp: {short(1.0 / (values['slope'] * _SLOWER * late))}, Ti: {short(4.0 * _SLOWER * late)}"
-    written = f"{{numerator: [slope], denominator: {below}{delay}}}  # it is known to integrate"
+    written = f"{{numerator: [slope], denominator: {below}{delay}}}  # its pole at 0 is known"
     return replace(
         plant,
         lines=(
@@ -295,7 +295,7 @@ def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dic
     listed = ", ".join(f"{name}: {value!r}" for name, value in values.items())
     delay = ", delay: L" if late else ""
     written = f"{{numerator: [{rows[0]}], denominator: [{rows[1]}]{delay}}}"
-    return values, [f"  parameters: {{{listed}}}", f"  continuous: {written}  # it is known to integrate"]
+    return values, [f"  parameters: {{{listed}}}", f"  continuous: {written}  # its pole at 0 is known"]
 
 
 def unit_of_time(sheet: Sheet, name: str) -> str:

@@ -92,6 +92,18 @@ def test_commands_lead_from_a_refuted_spec_to_a_verdict_on_what_it_asks(run, tmp
     assert code_of(explore, run.parent / "log.csv", asked=wrong) == "data-wrong-unit"
 
 
+def test_a_damping_above_one_is_said_as_two_lags(tmp_path):
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.choice([-1.0, 1.0], 40), 15)
+    x = scipy.signal.lfilter([0, 0.1], [1, -0.9], scipy.signal.lfilter([0, 0.3], [1, -0.7], u))
+    rows = np.column_stack([np.arange(600), u, x + 0.02 * rng.standard_normal(600)])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time_s,u,y", comments="")
+    result = explore(tmp_path / "log.csv", structure="sopdt").results.result
+    (note,) = (one for one in result["notes"] if "two lags" in one)
+    lags = [float(number) for number in re.findall(r"[\d.]+", note.split("two lags")[1])[:2]]
+    assert lags == pytest.approx([-1 / np.log(0.9), -1 / np.log(0.7)], rel=0.15)
+
+
 def test_the_model_is_judged_on_other_data(run, tmp_path):
     other = lag_log(tmp_path / "other.csv", seed=1)
     command = ["explore", str(other), "--validate", str(run / "model.yaml"), "--no-output"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -22,7 +23,9 @@ from inputdesign_cli.outcome.estimate import (
     Structure,
     Validation,
 )
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.frequency_response.measure import silent_entry
 from inputdesign_cli.records import Record
 
@@ -94,6 +97,11 @@ def _structure(candidate: Candidate) -> Structure:
     )
 
 
+_IN_WORDS = {
+    "FOPDT": "a lag with dead time",
+    "SOPDT": "second order with dead time",
+    "TOPDT": "third order with dead time",
+}
 _DIRECT = "The direct method is used; the noise model must then be right"
 _LOOP = (
     "the data may come from a loop, or the input was logged late, or the columns are swapped. They are taken "
@@ -123,6 +131,11 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
                 f"{name} wanders as a random walk does, whatever the inputs do: the gain is that of the "
                 "steps, not of levels that lie far apart"
             )
+    for damping, slow, fast in _real_lags(found.model):
+        yield (
+            f"{damping:.3g} is a damping above 1: the plant has two lags, {slow:.4g} and {fast:.4g} "
+            f"{log.time_unit}"
+        )
     for j in found.still:
         yield f"u{j + 1} never moves in this record: the model has no part of it. An experiment must move it"
     for j, p in loops:
@@ -148,10 +161,21 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
         yield "an input rests in one part of the record: blocks in turn estimate and judge"
 
 
+def _real_lags(model: Model) -> Iterator[tuple[float, float, float]]:
+    """Yield the damping and the two lags of each plant of second order that does not swing."""
+    known = blocks_of(model)["plant"].get("parameters", {})
+    for name, damping in known.items():
+        time = known.get(name.replace("zeta", "T"))
+        if name.startswith("zeta") and time is not None and damping > 1.0:
+            apart = math.sqrt(damping**2 - 1.0)
+            yield damping, time * (damping + apart), time * (damping - apart)
+
+
 def _chosen(log: Record, found: Found, i: int) -> str:
     """Return the structure that was chosen for an output, beside the others."""
     chosen, taken, ranges = found.outputs[i], found.taken[i], found.ranges[i]
     orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
+    orders = "; ".join(filter(None, (_IN_WORDS.get(taken.orders.family), orders)))
     orders += f"; times in {log.time_unit}" if taken.orders.physical else ""
     delays = " and ".join(
         f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: "
