@@ -6,9 +6,6 @@ READY := .venv/.ready
 PYTHON = $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
 
-# Commands that tests start read modules that another has compiled.
-export PYTHONDONTWRITEBYTECODE =
-
 .DEFAULT_GOAL := help
 .PHONY: help setup run test browser slow fuzz lint golden bench docs papers clean
 

@@ -4,6 +4,7 @@ import gc
 import os
 import shutil
 import signal
+import sys
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -15,6 +16,8 @@ import typer.testing
 from inputdesign_cli.compute.executor import ONE_THREAD
 
 os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
+# Workers and the commands that they start read what another has compiled, and do not compile it again.
+os.environ["PYTHONDONTWRITEBYTECODE"], sys.dont_write_bytecode = "", False
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.questions.building.system import build_experiment
