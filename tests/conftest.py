@@ -26,7 +26,7 @@ from tests.support.commands import caller
 
 SPECS = Path(__file__).parent.parent / "specs"
 # New objects before the collector of cycles looks at them: by itself it does so every 700.
-_NEW_OBJECTS = 50_000
+gc.set_threshold(50_000, 10, 10)
 
 # The tree of commands is made once, not at every call: it depends on nothing.
 typer.main.get_command = typer.testing._get_command = cache(typer.main.get_command)
@@ -52,7 +52,6 @@ def pytest_collection_finish():
     """What was imported and collected stays, so that the collector need not look through it again."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(_NEW_OBJECTS, 10, 10)
 
 
 @pytest.fixture(autouse=True)
