@@ -19,11 +19,6 @@ os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before n
 # Workers and the commands that they start read what another has compiled, and do not compile it again.
 os.environ["PYTHONDONTWRITEBYTECODE"], sys.dont_write_bytecode = "", False
 
-from inputdesign_cli import load_spec
-from inputdesign_cli.questions.building.system import build_experiment
-from tests.support.campaigns import SPEC, applied
-from tests.support.commands import caller
-
 SPECS = Path(__file__).parent.parent / "specs"
 # New objects before the collector of cycles looks at them: by itself it does so every 700.
 gc.set_threshold(50_000, 10, 10)
@@ -60,21 +55,32 @@ def _time_for_hints(monkeypatch):
     monkeypatch.setattr("inputdesign_cli.compute.time_limit.HINT_SECONDS", 600.0)
 
 
+def built(name):
+    """Here the package is imported, which the process that only hands out tests does not need."""
+    from inputdesign_cli import load_spec
+    from inputdesign_cli.questions.building.system import build_experiment
+
+    return build_experiment(load_spec(SPECS / f"{name}.yaml"))
+
+
 @pytest.fixture
 def flexible():
     """The flexible transmission in its (reconstructed) loop, N = 500."""
-    return build_experiment(load_spec(SPECS / "flexible_transmission.yaml"))
+    return built("flexible_transmission")
 
 
 @pytest.fixture
 def first_order():
     """The first-order Box-Jenkins system, N = 500."""
-    return build_experiment(load_spec(SPECS / "first_order.yaml"))
+    return built("first_order")
 
 
 @pytest.fixture(scope="session")
 def campaigns(tmp_path_factory):
     """A folder with a campaign as it has `begun`, and as it is after `r1.csv`: `once`; and `r2.csv`."""
+    from tests.support.campaigns import SPEC, applied
+    from tests.support.commands import caller
+
     folder = tmp_path_factory.mktemp("campaigns")
     (folder / "s.yaml").write_text(SPEC)
     with pytest.MonkeyPatch.context() as patch:

@@ -97,13 +97,13 @@ def test_a_png_of_the_promised_size_has_labels_in_one_size_and_no_legend_hides_a
             assert legend.get_window_extent().x1 <= figure.bbox.x1
 
 
-# Pages are drawn for the test before.
-NARROW = [("bound beside white", "phone"), ("predicted signal", "column")]
-WIDTHS = dict.fromkeys([*NARROW, *((name, width) for width in ("page", "column", "phone") for name in CURVES)])
+# The test before has drawn the pages.
+LAID_OUT = [("bound beside white", "phone"), ("predicted signal", "column")]
+LAID_OUT += [(name, width) for width in ("page", "column", "phone") for name in CURVES]
 
 
 @pytest.mark.first(14)
-@pytest.mark.parametrize(("name", "width"), WIDTHS)
+@pytest.mark.parametrize(("name", "width"), dict.fromkeys(LAID_OUT))
 def test_no_text_leaves_the_page_or_lies_on_another(name, width):
     _, figure = drawn(name, width)
     renderer = figure.canvas.get_renderer()

@@ -12,7 +12,7 @@ from tests.support.plants import arrays, descending, known, lag_of
 from tests.support.refusals import refused
 
 T = 0.4
-LONG = 500
+LONG = 360
 STEP = 1e-6
 COVARIANCE = np.array([[1.0, 0.3], [0.3, 0.5]])
 

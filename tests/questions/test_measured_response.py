@@ -306,7 +306,7 @@ def judged(write, y, **more):
     return found.verdict, found.results.result["assessment"].get("causes", []), found.results
 
 
-@pytest.mark.first(3)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("height", "seed"), [(5.0, 1), (-20.0, 2), (200.0, 1)])
 def test_a_drift_is_no_nonlinearity_and_detrending_mends_it(write, height, seed):
     _, _, y = recorded(FAULTY, seed, 1.6)
