@@ -122,29 +122,18 @@ def test_a_record_that_is_no_step_response_is_refused(u, y, t, told, tmp_path):
     assert caught.value.diagnostics[0].key == "plant"
 
 
-def test_a_length_that_does_is_found_where_the_error_does_not_fall_with_its_root():
-    """Records that are shorter than the plant is slow contain far less, or cannot be designed."""
-    spec, tried = draft_of().spec(), []
-
-    def solve(changed):
-        tried.append(changed.experiment.samples)
-        if tried[-1] < 90:
-            raise SpecError.because("too-short", "too short")
-        return {"signal": {"worst_ratio": 20.0 / tried[-1], "samples": tried[-1]}, "samples": 0}
-
-    _, second = verdict(spec, {"samples": 720, "signal": {"worst_ratio": 0.02}}, solve)
-    assert tried == [50, 100]
-    assert f"{lasting(500.0)} would do" in second
-
-
-def test_no_record_of_few_samples_would_do():
-    """Its errors are larger than stated: 83 min were promised, and their verdict was undecided."""
+@pytest.mark.parametrize("refused", [True, False])
+def test_no_record_that_is_too_short_or_of_few_samples_would_do(refused):
+    """It contains far less than its length says, cannot be designed, or has larger errors than stated."""
     spec, tried = draft_of().spec(), []
 
     def solve(changed):
         tried.append(samples := changed.experiment.samples)
+        if refused and samples < 90:
+            raise SpecError.because("too-short", "too short")
         few = [{"code": "few-samples", "message": "few"}] if samples < 80 else []
-        return {"signal": {"worst_ratio": 0.8, "samples": samples}, "findings": few}
+        ratio = 20.0 / samples if refused else 0.8
+        return {"signal": {"worst_ratio": ratio, "samples": samples}, "samples": 0, "findings": few}
 
     _, second = verdict(spec, {"samples": 720, "signal": {"worst_ratio": 0.02}}, solve)
     assert tried == [50, 100]
