@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -91,7 +92,7 @@ def is_value(cell: str) -> bool:
 
 
 def _is_number(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell) is not None and bool(np.isfinite(float(cell)))
+    return _NUMBER.fullmatch(cell) is not None and math.isfinite(float(cell))
 
 
 def _is_comma(cell: str) -> bool:

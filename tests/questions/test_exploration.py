@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,7 +16,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import REFUTED, Finding
 from inputdesign_cli.questions import explore, identify, solve
 from inputdesign_cli.questions.exploration import explore as exploring
-from inputdesign_cli.questions.exploration.build import spec_text
+from inputdesign_cli.questions.exploration.build import Asked, spec_text
 from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
 from tests.support.logs import lag_log
@@ -67,29 +66,6 @@ def test_the_spec_that_is_written_solves_at_once(run):
     )
     played = results.tables["signal"].columns["u1 input"]
     assert low - 1e-9 <= np.min(played) < np.max(played) <= high + 1e-9
-
-
-def test_commands_lead_from_a_refuted_spec_to_a_verdict_on_what_it_asks(run, tmp_path, monkeypatch):
-    """The plant of the spec has no dead time; explore keeps the accuracy and the limits of the spec."""
-    monkeypatch.chdir(tmp_path)
-    asks = "accuracy: {model_error: {relative: 0.5}}\nlimits: {amplitude: 3}\nsignal: {offset: 40}\n"
-    plant = "plant: {continuous: {gain: 1, time_constant: 2}, sample: zoh}\nnoise: {variance: 0.01}\n"
-    Path("spec.yaml").write_text(
-        f"sample_time: 0.5\ntime_unit: min\n{plant}{asks}experiment: {{samples: 200}}\n"
-    )
-    command = f"assess --remove-means --no-figures spec.yaml {run.parent / 'log.csv'}"
-    codes = []
-    for begin in ("next: idesign ", "Then: idesign ", ""):
-        done = CliRunner().invoke(app, shlex.split(command))
-        codes.append(done.exit_code)
-        assert done.stdout, done.stderr
-        command = done.stdout.splitlines()[-1].removeprefix(begin)
-    assert codes[:2] == [5, 0]
-    assert codes[2] in (0, 1)
-    spec = load_spec(tmp_path / "runs" / "log_explored" / "spec.yaml")
-    assert (spec.limits.amplitude.input, spec.accuracy.model_error.relative) == (3, 0.5)
-    wrong = spec.with_(time_unit="s")
-    assert code_of(explore, run.parent / "log.csv", asked=wrong) == "data-wrong-unit"
 
 
 def test_a_damping_above_one_is_said_as_two_lags(tmp_path):
@@ -329,14 +305,41 @@ def test_references_of_some_inputs_only_are_refused(rows, tmp_path):
     assert (told.code, "--columns r2=NAME" in told.hint) == ("data-missing-column", True)
 
 
+LOG = SimpleNamespace(
+    u=np.array([[1e5], [1e5 + 2.0], [1e5 + 1.0]]),
+    y=np.zeros((3, 1)),
+    step=1e-5,
+    time_unit="s",
+    names={"u1": "a: #\nb", "y1": "y"},
+)
+FOUND = SimpleNamespace(
+    model=stated("plant: {B: [0, 1], F: [1, -0.5]}"),
+    taken=(SimpleNamespace(orders=SimpleNamespace(physical=False, family="OE")),),
+    integrates=(),
+)
+
+
+def test_what_another_spec_asks_for_is_kept():
+    """But for information on its own parameters, and only in the unit of its times."""
+    wishes = "accuracy: {loop: {max_sensitivity_db: 6}}\nlimits: {amplitude: 3, duration: 4e-3}\n"
+    held = (
+        "experiment: {controller: {numerator: [1], denominator: [1]}, prior: {information: [[1, 0], [0, 1]]}}"
+    )
+    spec = parse_spec(
+        f"sample_time: 1e-5\nplant: {{B: [0, 2], F: [1, -0.7]}}\nnoise: {{variance: 1}}\n{wishes}{held}"
+    )
+    found = parse_spec(spec_text(LOG, FOUND, [Path("a.csv")], asked=Asked.of(spec)))
+    for name in ("accuracy", "limits", "objective"):
+        assert getattr(found, name) == getattr(spec, name)
+    assert (found.experiment.prior, found.plant.B) == (None, (0, 1))
+    assert found.experiment.controller == spec.experiment.controller
+    assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"
+
+
 @pytest.mark.parametrize("loop", [False, True])
 @pytest.mark.parametrize("reasons", [(), ("the record\nis too short: see #3", "y wanders " * 30)])
 def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
-    u = np.array([[1e5], [1e5 + 2.0], [1e5 + 1.0]])
-    log = SimpleNamespace(u=u, y=u, step=1e-5, time_unit="s", names={"u1": "a: #\nb", "y1": "y"})
-    taken = (SimpleNamespace(orders=SimpleNamespace(physical=False, family="OE")),)
-    found = SimpleNamespace(model=stated("plant: {B: [0, 1], F: [1, -0.5]}"), taken=taken, integrates=())
-    text = spec_text(log, found, [Path('title: "odd".csv')], reasons, loop=loop)
+    text = spec_text(LOG, FOUND, [Path('title: "odd".csv')], reasons, loop=loop)
     spec = parse_spec(text)
     doubted = "On a model that deserves no trust: " if reasons else ""
     assert spec.title == f'{doubted}The next experiment after title: "odd".csv'
