@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -60,6 +61,7 @@ _NEXT = {
 """The command after each finding that leaves a verdict open; an earlier one silences the later ones."""
 _DETREND = _AGAIN + "--detrend linear"
 _ORDER = list(_NEXT)
+_MAY_LEAK = "A plant that integrates may leak: the next command lets it."
 _LEAK = 1e-3  # a sample, to begin with
 # A shift of level that takes more than this share of a record is a drift.
 _WIDE = 0.1
@@ -92,7 +94,8 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     if estimate is not None and drifts and (own or first.code == "plant-structure"):
         # Past inputs explain what a leak takes away, as they explain a missing lag.
         if leaks := _leaking(estimate, data.time):
-            alike, command = drifts, leaks
+            alike = [replace(one, message=f"{one.message.split('. ')[0]}. {_MAY_LEAK}") for one in drifts]
+            command = leaks
         elif own and _drifts(estimate):
             command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))

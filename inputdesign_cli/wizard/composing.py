@@ -324,12 +324,16 @@ class Conversation:
             heard = Heard({key: text})
         elif not (heard := in_sentence(text, least=1)).answers:
             raise not_understood(text)
-        more = dict(heard.answers)
-        if key == asked.key:
-            more = {one: ", ".join(filter(None, (earlier.get(one), said))) for one, said in more.items()}
-        self.unclear[:1] = heard.unclear
-        error = self._added(more if self.unclear else earlier | more)
-        if error is not None and error.diagnostics[0].key in more:
+        said = dict(heard.answers)
+        joined = {one: ", ".join(filter(None, (earlier.get(one), text))) for one, text in said.items()}
+        error = None
+        # The answer adds to what is known, or else stands in its place.
+        for more in (said,) if key != asked.key else (joined, said):
+            self.answers, self.unclear, self._refused = dict(kept), [*heard.unclear, *parts[1:]], refused
+            error = self._added(more if self.unclear else earlier | more)
+            if error is None or error.diagnostics[0].key not in more:
+                break
+        else:
             self.answers, self.unclear, self._refused = kept, parts, refused
             return error
         self.remarks += heard.remarks

@@ -306,7 +306,7 @@ def beyond_models(text: str) -> list[str]:
         for group in ("what", "leak")
     )
     why = "no linear model has it, and the design leaves it out. Move so far that it matters little; assess"
-    found = [f"{rough}: {why} tests it"] if rough else []
+    found = [f"{rough}: {why} tests whether the plant is linear"] if rough else []
     if leaks:
         found.append(f"{leaks}: the model of a plant that integrates has no leak; assess tests for one")
     return found

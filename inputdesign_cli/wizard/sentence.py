@@ -89,7 +89,7 @@ def _expanded(pattern: str) -> str:
 @cache
 def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
     """Return the patterns of times behind a gain, of times that are named, and of a dead time."""
-    time = r"(?:<ABOUT>\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|and\b))"
+    time = r"(?:<ABOUT>\s*)?(?:<NUMBER>\s*(?:to|-|–)\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|and\b))"
     joined = r"[,;]?\s+(?:(?:and|after|within|in|with)\s+)*"
     gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
     times = rf"(?:{gain}){joined}(?P<lag>{time})(?:[,;]\s+(?P<late>{time}))?"
@@ -110,7 +110,9 @@ def _with_names(text: str) -> tuple[str, list[str]]:
         names["late"] = "dead time"
     for group in reversed(names):
         text = f"{text[: found.start(group)]}{names[group]} {text[found.start(group) :]}"
-    return text, [f"{found[group]}, behind the gain, is taken as the {name}" for group, name in names.items()]
+    return in_figures(text), [
+        f"{found[group]}, behind the gain, is taken as the {name}" for group, name in names.items()
+    ]
 
 
 def in_sentence(text: str, least: int = 2) -> Heard:
@@ -135,7 +137,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         return Heard({})
     parts = [part.strip() for clause in _ENDS.split(left) for part in clause.split("|") if unread(part)]
     unclear = [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
-    beside = [_BARE.sub("", part) for part in parts if part not in unclear]
+    beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
     remarks = [
         *named,

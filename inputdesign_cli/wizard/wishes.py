@@ -75,7 +75,6 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
         rf"\bbetween\s+{number}\s*and\s+{number}"
     )
     about = None if ends else said.take(rf"(?<![-+±\w.]){number}\s*{PLUS_MINUS}\s*{number}")
-    rests = said.take(at) if ends else None
     if found := ends or about:
         sizes = [(found[1], found[2]), (found[3], found[4])]
     else:
@@ -88,6 +87,7 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
         if by is None:
             raise bad_answer("range", f'"{text}" is no range')
         sizes = [(around[1], around[2]) if around else ("0", ""), (by[1], by[2])]
+    points = list(iter(lambda: said.take(at), None))  # it may be said twice
     said.take(MOVES)
     said.take(BOTH_WAYS)
     said.finish("move stands sits rests runs run operate keep from allowed possible permitted only")
@@ -97,10 +97,11 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
     middle, side = (one, other) if ends is None else (0.5 * (one + other), 0.5 * (other - one))
     if ends is not None and not one < other:
         raise bad_answer("range", f"{one:g} is not below {other:g}")
-    rest = middle if rests is None else said.sized(float(rests[1]), rests[2].strip() or unit)
-    if abs(rest - middle) > _MIDDLE * side:
-        why = f"the input is at {rest:g}, and the middle of {one:g} to {other:g} is {middle:g}"
-        raise bad_answer("range", f'{why}: write "{rest:g} +- .."')
+    for point in points:
+        rest, low, high = said.sized(float(point[1]), point[2].strip() or unit), middle - side, middle + side
+        if abs(rest - middle) > _MIDDLE * side:
+            why = f"the input is at {rest:g}, and the middle of {low:g} to {high:g} is {middle:g}"
+            raise bad_answer("range", f'{why}: write "{rest:g} +- .."')
     name = named[1].strip() if named and named[1].lower() not in ("input", "actuator") else ""
     return Range(needed(side, "range", "the amplitude"), middle, name, ours or unit)
 

@@ -13,6 +13,7 @@ from inputdesign_cli.wizard.plants import plant_of_words
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
 from inputdesign_cli.wizard.sentence import in_sentence, not_understood, spread
 from inputdesign_cli.wizard.wishes import input_range
+from tests.support.refusals import code_of
 from tests.support.wishes import ENGINEER
 
 EXCHANGER = (
@@ -152,6 +153,14 @@ WRITTEN = {
         "amplitude": 8,
         "max_sensitivity_db": 6.0206,
         "duration": 28800,
+    },
+    "PI speed loop with gain margin 2 for a 24 V drive with dry friction, around 9 V, about 20 rad/s per V "
+    "and 0.3 to 0.4 s, noise 0.5 rad/s (white), voltage may move +-3 V around 9 V, experiment up to 20 s": {
+        "gain": 20,
+        "time_constant": 0.35,
+        "offset": 9,
+        "amplitude": 3,
+        "duration": 20,
     },
     "K=1.7, T = 262 s, L=31 s, noise 0.1 degC, valve stands at 45 % and may move 8 % up and down, PI, 8 h": {
         "gain": 1.7,
@@ -404,12 +413,24 @@ def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
     assert talk.unclear[0] == "some minutes or so"
     assert talk.answer("time constant 262 s, dead time 31 s") is None
     assert talk.answer("range=45 +- 8 %") is None
-    assert talk.answer("leave it out") is None
+    assert talk.answer("valve 45 % +- 8 %") is None  # again, in place of the first
     while talk.question is not None:
         assert (talk.question.always, talk.answer("no")) == (True, None)
     assert "gain: 1.72, time_constant: 262, dead_time: 31" in talk.draft.text
     assert (talk.draft.spec().limits.amplitude.input, talk.draft.spec().signal.offset) == (8, 45)
-    assert any("left out: 8 up" in note for note in talk.draft.notes)
+
+
+def test_what_is_left_out_is_said_back(tmp_path):
+    talk = Conversation({}, "x", tmp_path)
+    assert talk.answer(f"{EXCHANGER} Serial number 77.") is None
+    assert talk.answer("leave it out") is None
+    assert talk.remarks[-1] == "left out: Serial number 77"
+    assert talk.unclear == []
+
+
+def test_an_operating_point_that_is_said_twice_is_one():
+    assert input_range("+-3 V around 9 V, at 9 V") == input_range("9 V +- 3 V")
+    assert code_of(input_range, "+-3 V around 9 V, at 10 V") == "bad-answer"
 
 
 def test_a_plant_that_lacks_a_quantity_is_completed(tmp_path):
