@@ -65,9 +65,9 @@ def _lag_more(stated: Mapping[str, Plain]) -> str:
         late, values["L"] = ", delay: L", stated["dead_time"]
     listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items())
     return (
-        f"write plant.parameters: {{{listed}}} (starting values) and plant.continuous: {{numerator: [K], "
-        f"denominator: [{poles}, [T2, 1]]{late}}} in place of {kept}; uncertainty, if there is one, needs "
-        "the new names"
+        f"write plant.parameters: {{{listed}}} and plant.continuous: {{numerator: [K], denominator: "
+        f"[{poles}, [T2, 1]]{late}}} in place of {kept}. The values are starts of a search, no estimates. "
+        "Uncertainty, if there is one, needs the new names"
     )
 
 
