@@ -144,15 +144,11 @@ def make_record(
             return others[0]
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
-    def score(informations: Array) -> float:
-        return max(_at_each(scores, numbers, informations))
-
-    def bound(informations: Array) -> Array:
-        return np.max(_at_each(bounding, numbers, informations), axis=0)
-
-    cost, alone = design_cost(design, request.cost), len(plants) == 1
-    bounds_of = bounding[0] if alone else bound
-    target = Target(scores[0] if alone else score, meets, request.cost, cost, bounds_of if meets else None)
+    score, bound = scores[0], bounding[0]
+    if len(plants) > 1:
+        score, bound = partial(_largest, scores, numbers), partial(_largest_of_each, bounding, numbers)
+    cost = design_cost(design, request.cost)
+    target = Target(score, meets, request.cost, cost, bound if meets else None)
     while True:
         at, limits = together(numbers), together(limiting)
         record = best_record(generator, at, target, bounds, first=first, limiting=limits)
@@ -169,6 +165,20 @@ def make_record(
             return record if _few_moves(bounds, record) else replace(record, met=False)
         numbers += [*missed, *beyond]
         limiting += higher
+
+
+def _largest(
+    of: Sequence[Callable[[Array], float]], numbers: Sequence[int], informations: NDArray[np.float64]
+) -> float:
+    """Return the largest value at the plants of these numbers, from their information (plants, k, k)."""
+    return max(_at_each(of, numbers, informations))
+
+
+def _largest_of_each(
+    of: Sequence[Callable[[Array], Array]], numbers: Sequence[int], informations: NDArray[np.float64]
+) -> Array:
+    """Return the largest values (runs,) at these plants, from their information (plants, runs, k, k)."""
+    return np.asarray(np.max(_at_each(of, numbers, informations), axis=0))
 
 
 def _at_each(

@@ -35,6 +35,14 @@ _LOOP = (
 )
 
 
+_USUAL = {
+    "accuracy": [
+        "D: the most informative experiment within the limits. For an accuracy at the least cost write",
+        "  accuracy: {model_error: {relative: 0.05, confidence: 0.95}}",
+    ],
+    "limits": ["As in the record: mean squares about the mean, and amplitudes that keep to its range."],
+    "spectrum": ["The family of spectra to search, and the signal to apply about the middle of the range."],
+}
 # Sections of a spec that ask for a design, whatever the plant.
 _WISHES = (
     *("experiment", "cost", "accuracy", "objective", "limits"),
@@ -88,8 +96,7 @@ def spec_text(
     kind = f"plants in s, times in {log.time_unit}, inputs held between samples"
     if not any(c.orders.physical for c in found.taken):
         kind = "A y = (B/F) u + (C/D) e, polynomials in q^-1"
-    blocks, (power, level, width) = blocks_of(found.model), _usual(log)
-    named = _channels(log)
+    blocks, named = blocks_of(found.model), _channels(log)
     others = [
         f"{x} is {' '.join(name.split())}" for x, name in log.names.items() if x != "time" and x not in named
     ]
@@ -105,36 +112,38 @@ def spec_text(
         "noise": [
             f"Roots of {one} on the circle were drawn into it by one in {len(log.y)}." for one in drawn
         ],
-        "accuracy": [
-            "D: the most informative experiment within the limits. For an accuracy at the least cost write",
-            "  accuracy: {model_error: {relative: 0.05, confidence: 0.95}}",
-        ],
-        "limits": ["As in the record: mean squares about the mean, and amplitudes that keep to its range."],
-        "spectrum": [
-            "The family of spectra to search, and the signal to apply about the middle of the range."
-        ],
+        **_USUAL,
     }
+    if asked is None:
+        asked = _as_in_the_record(log, integrates=bool(found.integrates))
+    else:
+        comments = {key: comments[key] for key in ("title", "plant", "noise")}
+        comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
     sections = {
         "title": f"{_DOUBTED * bool(reasons)}The next experiment after {source}",
         "sample_time": log.step,
         "time_unit": log.time_unit,
         **({"channels": named} if named else {}),
         **blocks,
+        **asked.sections,
+    }
+    return _commented(sections, comments)
+
+
+def _as_in_the_record(log: Record, *, integrates: bool) -> Asked:
+    """Return the question of the most informative input of the power and the range of a record."""
+    power, level, width = _usual(log)
+    spectrum, signal = {"type": "fir", "order": 20}, {"type": "filtered_noise", "seed": 1, "offset": level}
+    if integrates:  # power at frequency zero determines the gain of an integrator without end
+        spectrum, signal = {"type": "multisine", "lines": 100}, signal | {"type": "multisine"}
+    sections = {
         "experiment": {"samples": min(len(log.y), _MOST_SAMPLES)},
         "accuracy": {"criterion": "D"},
         "limits": {"input_power": power, "amplitude": width},
-        "spectrum": {"type": "fir", "order": 20},
-        "signal": {"type": "filtered_noise", "seed": 1, "offset": level},
+        "spectrum": spectrum,
+        "signal": signal,
     }
-    if found.integrates:  # power at frequency zero determines the gain of an integrator without end
-        sections["spectrum"] = {"type": "multisine", "lines": 100}
-        sections["signal"] = {"type": "multisine", "seed": 1, "offset": level}
-    if asked:
-        kept = {key: part for key, part in sections.items() if key not in _WISHES}
-        sections, first = {**kept, **asked.sections}, next(iter(asked.sections))
-        comments = {key: comments[key] for key in ("title", "plant", "noise")}
-        comments[first] = ["From here on as in the spec that explore was given."]
-    return _commented(sections, comments)
+    return Asked(log.time_unit, sections)
 
 
 def _channels(log: Record) -> dict[str, dict[str, str]]:

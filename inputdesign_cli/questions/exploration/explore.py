@@ -118,10 +118,9 @@ def explore(
     findings += () if lines is None else response_note(lines)
     findings += silent_lines_answer(silent)
     text = spec_text(log, found, paths, reasons, loop=looped and not asked, asked=asked)
-    results = replace(results, resolved_spec=text)
     fit = fit_to_log(cast(FitCurves, results.curves["fit"]), whole_log, data)
     curves = {**structure_curves(found), **curves, "fit": fit}
-    results = adding(results, outcome, findings, tables, curves)
+    results = adding(replace(results, resolved_spec=text), outcome, findings, tables, curves)
     against = [*shifted_levels(found.estimate, data, log.time_unit)]
     against += refutations(found.model, found.estimate)
     levels = "--detrend linear" if np.any(found.slopes) else "--remove-means"
