@@ -45,7 +45,7 @@ _SECTIONS = dict(
 )
 _ALL = f"the questions are {', '.join(KEYS)}"
 UNCLEAR = "unclear"
-"""The key of what is asked about a part of a sentence; no answer can name it."""
+"""The key of the question about a part of a sentence. No answer can name it."""
 AS_LOGGED = ("as the log", "as in the log", "as in this log")
 _COLUMNS = re.compile(r'--columns "([^"]*)"')
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
