@@ -38,6 +38,8 @@ def explore(
     as well is taken. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and report.html;
     prints a summary. Exits with 1, and says why, where no model deserves trust.
     """
+    if spec is not None and validate is not None:
+        raise typer.BadParameter("a model that is judged needs no further spec", param_hint="--spec")
     ending = "explored" if validate is None else "validated"
     sources = [*filter(None, [spec, validate]), *data]
     place = Place(into, f"{data[0].stem}_{ending}", sources)

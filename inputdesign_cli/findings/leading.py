@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -14,9 +13,8 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
 from inputdesign_cli.finding import Finding, undecided
 from inputdesign_cli.findings.places import Record
-from inputdesign_cli.findings.refuted_structure import DRIFT
+from inputdesign_cli.findings.refuted_structure import DRIFT, leaking
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.plant.model import SampledPlant
 
@@ -61,7 +59,6 @@ _NEXT = {
 """The command after each finding that leaves a verdict open; an earlier one silences the later ones."""
 _DETREND = _AGAIN + "--detrend linear"
 _ORDER = list(_NEXT)
-_MAY_LEAK = "A plant that integrates may leak: the next command lets it."
 _LEAK = 1e-3  # a sample, to begin with
 # A shift of level that takes more than this share of a record is a drift.
 _WIDE = 0.1
@@ -94,8 +91,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     if estimate is not None and drifts and (own or first.code == "plant-structure"):
         # Past inputs explain what a leak takes away, as they explain a missing lag.
         if leaks := _leaking(estimate, data.time):
-            alike = [replace(one, message=f"{one.message.split('. ')[0]}. {_MAY_LEAK}") for one in drifts]
-            command = leaks
+            alike, command = drifts, leaks
         elif own and _drifts(estimate):
             command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
@@ -120,24 +116,14 @@ def _integrates(estimate: Estimate) -> bool:
 
 
 def _leaking(estimate: Estimate, time: Array) -> str:
-    """Return the command that lets a plant leak which is known to integrate; empty for another plant.
-
-    A tank whose outflow grows with its level looks as if its noise drifted.
-    """
-    model = estimate.search.records.kind.model
-    plant = blocks_of(model)["plant"]
-    stated = plant.get("continuous", {})
-    match plant, stated:
-        case {"parameters": known}, {"denominator": [*others, 0 | "0"]} if "leak" not in known and not any(
-            isinstance(one, list) for one in others
-        ):
-            listed = ", ".join(f"{one}" for one in others)
-            rate = _LEAK / float(np.median(np.diff(time)))
-            return (
-                f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
-                f'--set "plant.continuous.denominator=[{listed}, leak]"  # it may leak'
-            )
-    return ""
+    """Return the command that lets a plant leak which is known to integrate; empty for another plant."""
+    if not (denominator := leaking(estimate.search.records.kind.model)):
+        return ""
+    rate = _LEAK / float(np.median(np.diff(time)))
+    return (
+        f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
+        f'--set "plant.continuous.denominator={denominator}"  # it may leak'
+    )
 
 
 def _drifts(estimate: Estimate) -> bool:

@@ -64,11 +64,25 @@ def _lag_more(stated: Mapping[str, Plain]) -> str:
     if stated.get("dead_time"):
         late, values["L"] = ", delay: L", stated["dead_time"]
     listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items())
+    written = f"{{numerator: [K], denominator: [{poles}, [T2, 1]]{late}}}"
     return (
-        f"write plant.parameters: {{{listed}}} and plant.continuous: {{numerator: [K], denominator: "
-        f"[{poles}, [T2, 1]]{late}}} in place of {kept}. The values are starts of a search, no estimates. "
-        "Uncertainty, if there is one, needs the new names"
+        f"write, to begin a search from, plant.parameters: {{{listed}}} and plant.continuous: {written} in "
+        f"place of {kept} (uncertainty, if there is one, needs the new names)"
     )
+
+
+def leaking(model: Model) -> str:
+    """Return the denominator with a leak of a plant that is known to integrate; empty for another plant.
+
+    A tank whose outflow grows with its level looks as if its noise drifted.
+    """
+    plant = blocks_of(model)["plant"]
+    match plant, plant.get("continuous", {}):
+        case {"parameters": known}, {"denominator": [*others, 0 | "0"]} if "leak" not in known and not any(
+            isinstance(one, list) for one in others
+        ):
+            return f"[{', '.join(f'{one}' for one in others)}, leak]"
+    return ""
 
 
 def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[str, str]:
@@ -80,6 +94,9 @@ def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[s
     polynomials = "" if "continuous" in plant or "state_space" in plant else " (or A)"
     drifts = "drift" in noise
     drift = "raise the order of D under noise" if drifts else "let the noise drift (noise: {drift: true})"
+    drift += ", remove the trend from the record, or use a part of it without drift"
+    if leaks := leaking(model):
+        drift = f"let the plant leak (plant.continuous.denominator: {leaks}, and leak in plant.parameters)"
     return {"noise": f"raise the orders of C and D under noise{first}{polynomials}", "drift": drift}
 
 
@@ -120,11 +137,7 @@ NONLINEAR = refuted(
 # Drift makes other tests fail; an error of G makes tests of the noise fail.
 OF_MANY = {"drift": DRIFT, "plant": PLANT, "noise": NOISE}
 OF_ONE = {"plant": MISSING, "noise": MISSING, "change": CHANGED, "nonlinear": NONLINEAR}
-_FURTHER = {
-    "drift": ", remove the trend from the record, or use a part of it without drift",
-    "plant": ", or compare with a long FIR model (B: [0, 1, 1, ..])",
-    "noise": "",
-}
+_LONG = ", or compare with a long FIR model (B: [0, 1, 1, ..])"
 
 
 def refutations(model: Model, estimate: Estimate) -> list[Finding]:
@@ -137,7 +150,7 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
         if test is not None:
             lag = "" if fault == "drift" else f", most at lag {test.lag}"
             fact = f"probability {chance(test.probability)} by chance{lag}{_where(model, test)}"
-            remedy = f"{remedies[fault][:1].upper()}{remedies[fault][1:]}{_FURTHER[fault]}."
+            remedy = f"{remedies[fault][:1].upper()}{remedies[fault][1:]}{_LONG * (fault == 'plant')}."
             p = test.probability
             found.append(kind.found(fact, where=test.name, remedy=remedy, probability=p, lag=test.lag))
     for test in failing:

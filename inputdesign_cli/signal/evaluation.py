@@ -124,8 +124,8 @@ class Target:
         cost: weights of the powers (of all channels together, or one weight a channel), to rank records
             that meet the target.
         designed: the cost of the design in the same weights; its power when not given.
-        least_ratios: maps informations of several records, stacked before all other axes but that of the
-            plants, to lower bounds of `worst_ratio` (runs,), in a shorter time; NaN where none is known.
+        least_ratios: maps the informations of several records, (runs, k, k) or (plants, runs, k, k), to
+            lower bounds (runs,) of their worst ratios, in a shorter time; NaN where none is known.
     """
 
     worst_ratio: Callable[[Array], float]

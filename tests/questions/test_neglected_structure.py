@@ -173,6 +173,17 @@ def test_a_lag_more_is_written_as_it_is_said(order, late):
     assert np.all(np.diff(np.abs(low)) < 0.0)
 
 
+@pytest.mark.parametrize(
+    ("known", "below", "leaks"),
+    [("K: 0.02", "[1, 0]", True), ("K: 0.02, T: 60", "[T, 1, 0]", True), ("K: 2, T: 60", "[T, 1]", False)],
+)
+def test_a_plant_that_integrates_is_to_leak_where_it_drifts(known, below, leaks):
+    """A tank whose outflow grows with its level is not to be detrended, and its noise does not drift."""
+    of_s = f"{{numerator: [K], denominator: {below}}}"
+    drift = remedies(f"{{parameters: {{{known}}}, continuous: {of_s}, sample: zoh}}")[1]["drift"]
+    assert ("leak" in drift, "trend" in drift) == (leaks, not leaks)
+
+
 def test_a_noise_that_drifts_is_not_told_to_drift():
     _, found = remedies(NAMED, "noise.drift=true", "noise.C=[1, -0.8]")
     assert "raise the order of D under noise" in found["drift"]

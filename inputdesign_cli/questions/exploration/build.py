@@ -114,7 +114,7 @@ def spec_text(
         ],
         **_USUAL,
     }
-    if asked is None:
+    if asked is None or not asked.sections:
         asked = _as_in_the_record(log, integrates=bool(found.integrates))
     else:
         comments = {key: comments[key] for key in ("title", "plant", "noise")}
