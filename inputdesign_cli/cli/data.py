@@ -33,10 +33,10 @@ def explore(
 ) -> None:
     """Find a model in a log, and write a spec for the next experiment.
 
-    Needs no spec; of one that is given, the next keeps what it asks for. Delays, orders and the family of
-    the model are estimated on one part of the record and judged on the other; the simplest that explains it
-    as well is taken. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and report.html;
-    prints a summary. Exits with 1, and says why, where no model deserves trust.
+    Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
+    judged on the other; the simplest that explains it as well is taken. Writes model.yaml, a commented
+    spec.yaml for `idesign solve`, figures and report.html; prints a summary. With --spec the spec that is
+    written keeps what that one asks for. Exits with 1, and says why, where no model deserves trust.
     """
     if spec is not None and validate is not None:
         raise typer.BadParameter("a model that is judged needs no further spec", param_hint="--spec")

@@ -131,7 +131,7 @@ def spec_text(
 
 
 def _as_in_the_record(log: Record, *, integrates: bool) -> Asked:
-    """Return the question of the most informative input of the power and the range of a record."""
+    """Ask for the most informative input that has the power and the range of a record."""
     power, level, width = _usual(log)
     spectrum, signal = {"type": "fir", "order": 20}, {"type": "filtered_noise", "seed": 1, "offset": level}
     if integrates:  # power at frequency zero determines the gain of an integrator without end
