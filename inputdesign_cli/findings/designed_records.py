@@ -159,6 +159,22 @@ def start_matters(kind: FindingKind, growth: float) -> Finding:
     return kind.found(f"otherwise errors are {growth:.3g} times as large", where="signal", growth=growth)
 
 
+@finding(
+    NOTE, "noise-moves-input", "Leave that room in `limits.amplitude`, or let the actuator reach its ends."
+)
+def noise_moves_input(kind: FindingKind, deviations: Array, peaks: Sequence[float]) -> list[Finding]:
+    """The controller passes noise on to the input. Limits on single samples do not count it.
+
+    Args:
+        deviations: (r,) of the inputs by the noise alone.
+        peaks: (r,) of the inputs without noise.
+    """
+    beside = list(enumerate(zip(deviations.tolist(), peaks, strict=True), start=1))
+    fact = ", ".join(f"u{j} {size:.3g} (standard deviation) beside {peak:.3g}" for j, (size, peak) in beside)
+    seen = any(size > _SEEN * peak for _, (size, peak) in beside)
+    return kind.when(seen, fact, where="limits.amplitude", deviations=deviations.tolist())
+
+
 @finding(NOTE, "level-rounded", "State `signal.offset` at a value of the converter, or give it more bits.")
 def level_rounded(kind: FindingKind, quantisers: Sequence[Quantiser], peak: float) -> list[Finding]:
     """The record moves about another level than signal.offset. A converter has only values of its own.

@@ -102,10 +102,8 @@ def columns_by_unit(kind: FindingKind, taken: Mapping[str, str]) -> list[Finding
     Args:
         taken: by channel, the column.
     """
-    return [
-        kind.found(f"{column} as {channel}", where=channel, column=column)
-        for channel, column in taken.items()
-    ]
+    fact = ", ".join(f"{column} as {channel}" for channel, column in taken.items())
+    return [kind.found(fact, where=", ".join(taken), columns=[*taken.values()])] if taken else []
 
 
 def columns_against_spec(

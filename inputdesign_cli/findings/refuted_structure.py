@@ -102,7 +102,8 @@ def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[s
 
 PLANT = refuted(
     "plant-structure",
-    "Past inputs explain residuals. By a score test, the plant has more structure than the model.",
+    "The residuals still depend on past inputs. By a score test, the plant has more structure than the "
+    "model.",
     "Raise the orders of the plant or change its delay; the message names the keys.",
 )
 NOISE = refuted(

@@ -98,6 +98,17 @@ class Loop:
             x = x @ next_state + found[..., t, :] @ onward + by_noise[..., t, :]
         return found[..., : self.model.outputs], found[..., self.model.outputs :]
 
+    def input_deviation(self, colouring: Array, samples: int) -> Array:
+        """Return the standard deviations (r,) of the inputs by noise alone, `samples` after rest.
+
+        Args:
+            colouring: (p, p), a root of the covariance of e.
+        """
+        e = np.zeros((len(colouring), samples, len(colouring)))
+        e[:, 0] = colouring.T
+        _, u = self.signals(np.zeros((*e.shape[:2], self.model.inputs)), e)
+        return np.asarray(np.sqrt(np.sum(u**2, axis=(0, 1))))
+
     @cached_property
     def singularities(self) -> ComplexArray:
         """Return the poles of all responses to excitation and noise, as points of the frequency plane."""

@@ -49,11 +49,17 @@ _ALIKE: tuple[dict[str, float], ...] = (
 )
 # "a minute", "half an hour", "two shifts": words in place of numbers.
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
-            "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30}  # fmt: skip
+            "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30,
+            "a couple of": 2}  # fmt: skip
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+_FEW = re.compile(
+    rf"(?P<what>\b(?:dead time|delay|time constant|lag)\s+(?:(?:of|is)\s+)*)?"
+    rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})",
+    re.I,
+)
 _SYMBOLS = {"k": "gain", "t": "time constant", "tau": "time constant", "l": "dead time", "theta": "dead time"}
 _SYMBOL = re.compile(rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta)\s+)(?=(?:{ABOUT}\s*)?[-+.\d])", re.I)
 _FALLS = re.compile(
@@ -85,7 +91,7 @@ _BASE = (
 )
 # What stands behind the number of each kind.
 _BEHIND = {
-    "time": rf"(?:\s*{_TIME})?",
+    "time": rf"(?:\s*{_TIME}|(?![\d.]|\s*(?:%|°|[a-z]+\s*/|[a-z]+ per\b)))",
     "frequency": rf"(?:\s*(?P<unit>{'|'.join(_FREQUENCIES)})\b)?",
     "rate": _RATE,
     "slope": rf"{_RATE}(?:{_BASE})?",
@@ -279,9 +285,20 @@ def in_figures(text: str) -> str:
     """
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
+    figures = _FEW.sub(lambda found: (found["what"] or "") + _number_of_few(found), figures)
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
     figures = _BETWEEN.sub(_middle, figures)
     return _FALLS.sub(r"rises by \g<about>-", figures)
+
+
+def few(text: str) -> list[str]:
+    """Return how "a few minutes" is taken, for each time in a text that is said so."""
+    return [f'"a few {one["unit"]}" is taken as {_number_of_few(one)}' for one in _FEW.finditer(text)]
+
+
+def _number_of_few(found: re.Match[str]) -> str:
+    """Return a time of the plant as a range, and any other as one number."""
+    return f"{'2 to 5' if found['what'] else '3'} {found['unit']}"
 
 
 def _middle(found: re.Match[str]) -> str:

@@ -11,7 +11,15 @@ from functools import cache
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard import grammar, plants, wishes
-from inputdesign_cli.wizard.grammar import BEYOND, beyond_models, check_numbers, in_figures, orders, unread
+from inputdesign_cli.wizard.grammar import (
+    BEYOND,
+    beyond_models,
+    check_numbers,
+    few,
+    in_figures,
+    orders,
+    unread,
+)
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
 _TURNS = (
@@ -141,6 +149,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
     remarks = [
         *named,
+        *few(text),
         *beyond_models(text),
         *([f"nothing follows from: {', '.join(beside)}"] if beside else []),
     ]

@@ -12,7 +12,17 @@ from dataclasses import dataclass
 
 from inputdesign_cli.findings.prepared_records import name_and_unit
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
-from inputdesign_cli.wizard.grammar import ALONE, DRIVE, NUMBER, PLUS_MINUS, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import (
+    ALONE,
+    DRIVE,
+    NUMBER,
+    PLUS_MINUS,
+    SIGNAL,
+    UNIT,
+    Phrase,
+    needed,
+    short,
+)
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 
@@ -112,17 +122,23 @@ def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dic
     named = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
     named |= {channel: name_and_unit(header) for channel, header in plant.called.items()}
     parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
-    if len(parts) == plant.channels == 1 and parts[0][2]:  # "level in cm": the other is as said
-        name, _, unit = parts[0]
-        own = "u1" if name.lower() == span.name.lower() else "y1"
-        Phrase(said["names"], "names", unit=named[own][1]).sized(1.0, unit)
-        named[own] = (name, named[own][1] or unit)
+    owners = ["u1" if _drives(name, span) else "y1" for name, *_ in parts]
+    if plant.channels == 1 and all(unit for *_, unit in parts) and len({*owners}) == len(parts):
+        for own, (name, _, unit) in zip(owners, parts, strict=True):  # "level in cm": the other is as said
+            Phrase(said["names"], "names", unit=named[own][1]).sized(1.0, unit)
+            named[own] = (name, named[own][1] or unit)
     elif said["names"].lower() != "as said":
         if len(parts) != len(names) or not all(name for name, _, _ in parts):
             raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
         named = {name: (called, unit.strip()) for name, (called, _, unit) in zip(names, parts, strict=True)}
     rows = {name: {"name": called, "unit": unit} for name, (called, unit) in named.items()}
     return {name: kept for name, row in rows.items() if (kept := {k: v for k, v in row.items() if v})}
+
+
+def _drives(name: str, span: Range) -> bool:
+    """Return whether a name is that of an input: what moves, or a valve and no measurement."""
+    called = name.lower() == span.name.lower() or re.fullmatch(ACTUATOR, name, re.I) is not None
+    return called and re.fullmatch(SIGNAL, name, re.I) is None
 
 
 def limited(text: str, plant: PlantAnswer) -> tuple[float | None, float | None]:
@@ -161,6 +177,9 @@ def quantisation(text: str, span: Range) -> str | None:
     if bits is None and most is None:
         step = said.after("steps?|resolution")
         step = said.number(rf"{NUMBER}({UNIT})") if step is None else step
+        if (step or 0.0) > span.amplitude:
+            why = f"steps of {step:g} are larger than the {span.amplitude:g} that the input may move"
+            raise bad_answer("converter", f"{why}: name the finest step of the actuator, or no")
         reach = abs(span.offset) + span.amplitude
         bits = max(math.ceil(math.log2(reach / needed(step, "converter", "its step") + 1.0)) + 1, _LEAST_BITS)
         most = (step or 0.0) * 2.0 ** (bits - 1)
@@ -197,6 +216,8 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
     if kind is None:
         raise bad_answer("wish", f'"{text}" is none of these')
     if kind == "parameters":
+        while (more := said.share()) is not None and said.take(_WITHIN[kind]):
+            part = min(part, more)
         said.finish("physical")
         if not plant.values:
             why = "this plant has no parameters with names; ask for a prediction or a Bode plot"
@@ -261,7 +282,7 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
             speed = plant.slow / _FASTER if speed is None else needed(speed, "wish", "tau_c")
             rule = f"{{simc: {{tau_c: {short(speed)}}}}}"
         return [
-            "accuracy:  # the controller follows from the plant; all that the data leave keep the margin",
+            "accuracy:  # the controller follows from the plant; what the data allow keeps the margin",
             f"  loop: {{tuning: {rule}, {margin}}}  # tuned by the rule of {named}",
         ]
     if controlled:

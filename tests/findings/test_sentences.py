@@ -94,6 +94,7 @@ FOUND = {
     "record-longer": records.length_of_record(MADE, 20, 1, {"rate": 0.99}),
     "record-too-few-values": records.too_short(6, 16),
     "bound-of-power-only": records.short_windows(12, 1000.0, 0.6),
+    "noise-moves-input": records.noise_moves_input(np.array([0.2]), [3.0]),
     "record-less-accurate": records.less_accurate(1.2, 1.0),
     "record-misses-requirement": records.requirement_missed(["model_error"], 1.1),
     "start-from-rest": [records.start_matters(2.0), records.start_matters(np.inf)],

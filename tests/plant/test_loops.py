@@ -175,6 +175,17 @@ def test_signals_are_those_of_the_equations_sample_by_sample(case):
     check_signals(case[0].loop, case[1])
 
 
+def test_noise_at_the_inputs_has_the_deviation_of_simulated_impulses(case):
+    experiment, simulated = case
+    model, inputs = experiment.model, experiment.model.inputs
+    first = (np.arange(LONG) == 0)[:, None]
+    root = np.linalg.cholesky(model.covariance)
+    runs = [simulated(model, np.zeros((LONG, inputs)), root[:, i] * first) for i in range(len(root))]
+    expected = np.sqrt(sum(np.sum(u**2, axis=0) for _, u in runs))
+    found = experiment.loop.input_deviation(experiment.noise_colouring, LONG)
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
 def test_responses_are_those_of_matrix_algebra(case):
     w, (experiment, _) = np.array([0.3, 1.0, 2.5]), case
     y_r, u_r = experiment.loop.excited(w)

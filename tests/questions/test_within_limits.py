@@ -229,6 +229,23 @@ spectrum: {type: multisine, lines: 10}
 """
 
 
+def test_the_noise_that_a_controller_passes_on_to_the_input_is_named():
+    """With u = -0.3 y and y a sample later, its deviation is that of a geometric series."""
+    text = """
+plant: {B: [0, 1.0]}
+noise: {variance: 0.2}
+experiment: {samples: 100, controller: {numerator: [0.3], denominator: [1]}}
+accuracy: {model_error: {relative: 0.2}}
+objective: best_accuracy
+limits: {amplitude: {input: 2}}
+spectrum: {type: multisine, lines: 10}
+"""
+    findings = solve(parse_spec(text)).outcome.findings
+    (found,) = [one for one in findings if one.code == "noise-moves-input"]
+    deviation = 0.3 * np.sqrt(0.2 / (1 - 0.3**2))
+    assert found.figures["deviations"] == pytest.approx([deviation], rel=1e-9)
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("text", "power", "level", "relative"),

@@ -89,7 +89,8 @@ HOSTILE = {
     "signals": "square",
     "converter": """
         12 bits | 0 bits up to 100 | 99 bits up to 100 | 1e9 bits up to 100 | 12 bits up to 0 |
-        12 bits up to 10 | 2 bits up to 100 | steps of 0 | steps of 1e-12 | steps | steps of 0.1 up to 100
+        12 bits up to 10 | 2 bits up to 100 | steps of 0 | steps of 1e-12 | steps of 6 | steps |
+        steps of 0.1 up to 100
     """,
     "hold": "soon | -5 s | 0 s | 60 parsecs | 1e30 s",
     "return": "perhaps",

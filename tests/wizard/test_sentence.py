@@ -338,11 +338,18 @@ def test_limits_are_understood_as_they_are_said(part, where, value, tmp_path):
     assert float(np.max(there)) == pytest.approx(value)
 
 
-@pytest.mark.parametrize("said", ["3 to 6 min", "between 3 and 6 min", "3-6 min", "of 3 to 6 min"])
-def test_a_time_between_two_ends_is_an_interval(said):
+@pytest.mark.parametrize(
+    ("said", "ends"),
+    [
+        *dict.fromkeys(["3 to 6 min", "between 3 and 6 min", "3-6 min", "of 3 to 6 min"], (180, 360)).items(),
+        ("of only a few minutes", (120, 300)),
+    ],
+)
+def test_a_time_between_two_ends_is_an_interval(said, ends):
     found = plant_of_words(f"gain 2, time constant 40 min, dead time {said}")
-    assert found.values["dead_time"] == pytest.approx(270.0)
-    assert found.intervals["dead_time"] == pytest.approx((180.0, 360.0), rel=1e-3)
+    assert found.intervals["dead_time"] == pytest.approx(ends, rel=1e-3)
+    remarks = in_sentence(f"gain 2, time constant 40 min, dead time {said}, valve 45 +- 8 %").remarks
+    assert remarks == (('"a few minutes" is taken as 2 to 5 minutes',) if "few" in said else ())
 
 
 @pytest.mark.parametrize(
@@ -400,6 +407,19 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         asked.append(talk.question.key)
         assert talk.answer({"range": "40 +- 5"}.get(asked[-1], "no")) is None
     assert asked == ["range", "hold", "converter", "return"]
+
+
+@pytest.mark.parametrize(
+    ("part", "question", "answer"),
+    [
+        ("dead time: about 2 degC/%, 3 minutes", "plant", "gain about 2 degC/%, time constant 3 minutes"),
+        ("9 V nominal, +- 3 V", "range", "at 9 V, +- 3 V"),
+        ("to know the gain within 3 %", "wish", "parameters within 3 %"),
+        ("1 min test", "time", "1 min"),
+    ],
+)
+def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
+    assert in_sentence(f"{part}; noise 0.1, white").answers[question] == answer
 
 
 def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
@@ -511,6 +531,7 @@ def test_a_plant_that_integrates_is_held_by_a_stable_loop(tmp_path):
         ("plus/minus 5 around 40", (5, 40, "", "")),
         ("plus/minus 5", (5, 0, "", "")),
         ("35 to 45", (5, 40, "", "")),
+        ("run at 40 V, +- 5 V", (5, 40, "", "V")),
     ],
 )
 def test_a_range_says_what_moves_and_in_which_unit(text, found):
@@ -524,6 +545,11 @@ def test_a_range_says_what_moves_and_in_which_unit(text, found):
         ({"plant": "gain 2 degC/%, time constant 180 s"}, {"u1": {"unit": "%"}, "y1": {"unit": "degC"}}),
         ({"names": "valve in %, outlet temperature in degC"},
          {"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "outlet temperature", "unit": "degC"}}),
+        ({"names": "level in cm, inlet valve in %"},
+         {"u1": {"name": "inlet valve", "unit": "%"}, "y1": {"name": "level", "unit": "cm"}}),
+        ({"names": "valve in %, flow in l/min"},
+         {"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "flow", "unit": "l/min"}}),
+        ({"names": "flow in l/min"}, {"y1": {"name": "flow", "unit": "l/min"}}),
         ({}, {}),
     ],
 )  # fmt: skip

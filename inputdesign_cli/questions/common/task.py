@@ -14,7 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.designed_records import level_rounded, start_matters
+from inputdesign_cli.findings.designed_records import level_rounded, noise_moves_input, start_matters
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.outcome import Signal
@@ -32,6 +32,7 @@ from inputdesign_cli.signal.selection import Record
 _MATTERS = 0.2
 # An upper bound this small shows that without knowing them. A start is forgotten at e^-8 of itself.
 _SURELY, _FORGOTTEN = 0.19, 8.0
+_LONG = 10_000  # samples in which a loop shows what noise does to its input
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +84,10 @@ class SpectrumTask(ABC):
         """
         samples, quantisers = record.samples, self.record.bounds.quantisers
         found = [*findings, *level_rounded(quantisers, float(np.abs(samples).max()))]
+        if experiment.loop is not None and "amplitude.input" in (signal.of_limits or {}):
+            within = min(len(samples), _LONG)
+            noise = experiment.loop.input_deviation(experiment.noise_colouring, within)
+            found += noise_moves_input(noise, signal.input_peak or ())
         if np.isfinite(record.worst_ratio):
             growth = growth_by_start(experiment, samples, self.record.step, requirements)
             if growth > 1.0 + _MATTERS:
