@@ -55,20 +55,34 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+_TIMED = r"(?:dead time|delay|time constant|lag)"
 _FEW = re.compile(
-    rf"(?P<what>\b(?:dead time|delay|time constant|lag)\s+(?:(?:of|is)\s+)*)?"
-    rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})",
+    rf"(?P<what>\b{_TIMED}\s+(?:(?:of|is)\s+)*)?(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
+    rf"(?P<late>\s+(?:of\s+)?{_TIMED}\b)?",
     re.I,
 )
-_SYMBOLS = {"k": "gain", "t": "time constant", "tau": "time constant", "l": "dead time", "theta": "dead time"}
-_SYMBOL = re.compile(rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta)\s+)(?=(?:{ABOUT}\s*)?[-+.\d])", re.I)
+_SETTLES = re.compile(
+    rf"\b(?:settles|is settled)\s+(?:in|within|after)\s+(?P<about>{ABOUT}\s*)?(?P<number>{_DIGITS})\s*"
+    rf"(?P<unit>{UNIT_OF_TIME})",
+    re.I,
+)
+_SETTLED = 4.0  # time constants: 98 % of the way
+_OR_SO = re.compile(rf"({_DIGITS}\s*{UNIT_OF_TIME})\s+or\s+so\b", re.I)
+_SYMBOLS = {
+    "k": "gain",
+    **dict.fromkeys(("t", "tau", "t63"), "time constant"),
+    **dict.fromkeys(("l", "theta"), "dead time"),
+}
+_SYMBOL = re.compile(
+    rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta|t63)\s+)(?=(?:{ABOUT}\s*)?[-+.\d])", re.I
+)
 _FALLS = re.compile(
     rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
     re.I,
 )
 _BETWEEN = re.compile(
-    r"\b(?P<what>dead time|delay|time constant|lag)\s+(?:(?:of|is|between|from)\s+)*"
+    rf"\b(?P<what>{_TIMED})\s+(?:(?:of|is|between|from|somewhere|{ABOUT})\s+)*"
     rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
     re.I,
 )
@@ -85,9 +99,11 @@ DRIVE = (
     "|input|actuator)"
 )
 # "per minute", and of a gain "per 10 % of valve".
-_RATE = rf"(?:\s*(?P<size>(?!(?:per|and)\b)[^\s\d,;|/]+))?(?:\s*(?:per|/)\s*{_TIME})?"
+_SIZE = r"(?P<size>(?!(?:per|and)\b)(?:[^\s\d,;|/.:]|[.:](?=[^\s|]))+)"
+_RATE = rf"(?:\s*{_SIZE})?(?:\s*(?:per|/)\s*{_TIME})?"
 _BASE = (
-    rf"\s*(?:/|\bper\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)(?:\s+of\s+(?:the\s+)?{DRIVE})?"
+    rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
+    rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?"
 )
 # What stands behind the number of each kind.
 _BEHIND = {
@@ -95,7 +111,7 @@ _BEHIND = {
     "frequency": rf"(?:\s*(?P<unit>{'|'.join(_FREQUENCIES)})\b)?",
     "rate": _RATE,
     "slope": rf"{_RATE}(?:{_BASE})?",
-    "speed": rf"(?:\s*(?P<size>(?!(?:per|and)\b)[^\s\d,;|/]+))?\s*(?:per|/)\s*{_TIME}(?:{_BASE})?",
+    "speed": rf"(?:\s*{_SIZE})?\s*(?:per|/)\s*{_TIME}(?:{_BASE})?",
     "gain": rf"(?:\s*(?!plus/)(?P<size>(?:[^\s\d,;|+±][^\s,;|+±]*)?){_BASE})?",
     "any": rf"(?P<size>{UNIT})",
     "none": "",
@@ -113,7 +129,8 @@ _NONLINEAR = (
     r"|non-?linear\w*"
 )
 _GROWS = (
-    r"(?:\s+(?:that|which|and))?\s+(?:grows?|rises?|increases?|depends?)\s+(?:with|on)\s+(?:the|its)\s+\w+"
+    r"(?:\s+(?:that|which|and))?\s+(?:grows?|rises?|increases?|depends?)(?:\s+slowly)?\s+(?:with|on)"
+    r"\s+(?:(?:the|its)\s+)?\w+"
 )
 _LEAKS = rf"(?:leak\w*(?:{_GROWS}|\s+slowly)?|(?:outflow|outlet|losses|drain)(?:\s+flow)?{_GROWS})"
 BEYOND = re.compile(
@@ -285,20 +302,37 @@ def in_figures(text: str) -> str:
     """
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
-    figures = _FEW.sub(lambda found: (found["what"] or "") + _number_of_few(found), figures)
+    figures = _FEW.sub(
+        lambda found: f"{found['what'] or found['late'] or ''} {_number_of_few(found)}", figures
+    )
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
+    figures = _OR_SO.sub(r"about \1", figures)
+    figures = _SETTLES.sub(
+        lambda found: f"time constant {found['about'] or ''}{_time_constant(found)}", figures
+    )
     figures = _BETWEEN.sub(_middle, figures)
     return _FALLS.sub(r"rises by \g<about>-", figures)
 
 
-def few(text: str) -> list[str]:
-    """Return how "a few minutes" is taken, for each time in a text that is said so."""
-    return [f'"a few {one["unit"]}" is taken as {_number_of_few(one)}' for one in _FEW.finditer(text)]
+def vague_times(text: str) -> list[str]:
+    """Return how "a few minutes" and "settles in 2 s" are taken, for each time in a text that is said so."""
+    return [
+        *(f'"a few {one["unit"]}" is taken as {_number_of_few(one)}' for one in _FEW.finditer(text)),
+        *(
+            f'"{one[0]}" is taken as a time constant of {_time_constant(one)}'
+            for one in _SETTLES.finditer(text)
+        ),
+    ]
 
 
 def _number_of_few(found: re.Match[str]) -> str:
     """Return a time of the plant as a range, and any other as one number."""
-    return f"{'2 to 5' if found['what'] else '3'} {found['unit']}"
+    return f"{'2 to 5' if found['what'] or found['late'] else '3'} {found['unit']}"
+
+
+def _time_constant(found: re.Match[str]) -> str:
+    """Return the time constant of a settling time."""
+    return f"{float(found['number']) / _SETTLED:g} {found['unit']}"
 
 
 def _middle(found: re.Match[str]) -> str:

@@ -32,7 +32,7 @@ _NONE: Mapping[str, float] = MappingProxyType({})
 _WHAT = rf"(?:(?:the )?(?:{SIGNAL}|room|tank|water))"
 RISES = (
     rf"(?:{_WHAT} )?(?:rises|grows|increases|climbs|goes up|warms|heats|raises"
-    rf"|(?:reacts|responds|changes)(?= by))(?: {_WHAT})?(?: by| with)?"
+    rf"|(?:reacts|responds|changes)(?= (?:by|with)\b|\s*{ABOUT}))(?: {_WHAT})?(?: by| with)?"
 )
 # Names of what is said of a plant -> words, and the kind of unit. What rises in a time integrates.
 QUANTITIES = {

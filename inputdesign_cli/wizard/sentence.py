@@ -15,10 +15,10 @@ from inputdesign_cli.wizard.grammar import (
     BEYOND,
     beyond_models,
     check_numbers,
-    few,
     in_figures,
     orders,
     unread,
+    vague_times,
 )
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
@@ -38,7 +38,7 @@ _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|t
 _MATTERS = re.compile(
     r"\d|n't\b|\b(?:not?|never|without|except|unless|neither|nor|but|"
     r"dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
-    r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month)s?|half|twice|doubled?|peak\S*)\b",
+    r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month|morning|afternoon|evening)s?|half|twice|doubled?|peak\S*)\b",
     re.I,
 )
 # The size of a device says nothing of its dynamics.
@@ -97,10 +97,10 @@ def _expanded(pattern: str) -> str:
 @cache
 def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
     """Return the patterns of times behind a gain, of times that are named, and of a dead time."""
-    time = r"(?:<ABOUT>\s*)?(?:<NUMBER>\s*(?:to|-|–)\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|and\b))"
-    joined = r"[,;]?\s+(?:(?:and|after|within|in|with)\s+)*"
+    time = r"(?:<ABOUT>\s*)?(?:<NUMBER>\s*(?:to|-|–)\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|(?:and|after|with|but)\b))"
+    joined = r"(?:\s+more(?:\s+<DRIVE>)?)?[,;]?\s+(?:(?:and|after|within|in|with|it|takes|slowly,?)\s+)*"
     gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
-    times = rf"(?:{gain}){joined}(?P<lag>{time})(?:[,;]\s+(?P<late>{time}))?"
+    times = rf"(?:{gain}){joined}(?P<lag>{time})(?:[,;]\s+(?:(?:and|after|with|but)\s+)*(?P<late>{time}))?"
     named = "|".join(_QUANTITIES[name] for name in ("rise", "slope", "time_constant"))
     late = f"{_QUANTITIES['dead_time']}|<NO_DELAY>"
     one, two, three = (re.compile(_expanded(pattern), re.I) for pattern in (times, named, late))
@@ -143,13 +143,15 @@ def in_sentence(text: str, least: int = 2) -> Heard:
                 left = left[: piece.start()] + _taken(piece) + left[piece.end() :]
     if len(found) < least:
         return Heard({})
+    if "wish" in found and any(wishes.PRECISE.search(said) for _, said in found["wish"]):  # "of a flow loop"
+        found["wish"] = [one for one in found["wish"] if not wishes.NAMES_A_LOOP.fullmatch(one[1])]
     parts = [part.strip() for clause in _ENDS.split(left) for part in clause.split("|") if unread(part)]
     unclear = [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
     remarks = [
         *named,
-        *few(text),
+        *vague_times(text),
         *beyond_models(text),
         *([f"nothing follows from: {', '.join(beside)}"] if beside else []),
     ]

@@ -40,13 +40,17 @@ _WITHIN = {
 }
 
 
+PRECISE = re.compile("|".join(_WITHIN.values()), re.I)
+"""A wish for numbers, beside which a loop is the name of a plant."""
+NAMES_A_LOOP = re.compile(rf"(?:{SIGNAL} )?{LOOP}", re.I)
+
 # The share of the amplitude by which an operating point may differ from the middle of the range.
 _MIDDLE = 0.05
 
 IN_UNIT = r"(?:\s*(?:\bin\s+|\()(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
 """The unit behind what moves, as in "valve in %" and "valve (%)"."""
 STANDS = (
-    r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|now|normally|usually|currently|nominally)\s+)*"
+    r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating|now|normally|usually|currently|nominally)\s+)*"
     r"(?:(?:held|kept)\s+)?(?:around|about|at|near)"
 )
 MOVES = (
@@ -304,7 +308,7 @@ def unbounded(text: str) -> bool:
 def _margin(said: Phrase) -> str:
     """Return the margin of a loop as an entry of the spec; a number says how safe a safe margin is."""
     safe = said.take(r"\b(?:safe|usual|good)\b(?:\s*margins?\b)?") is not None
-    factor = said.take(rf"\bgain margin\b\s*(?:of\s*)?{ALONE}{NUMBER}(\s*dB\b)?")
+    factor = said.take(rf"\bgain margin\b\s*(?:(?:of|at least|above)\s+)*{ALONE}{NUMBER}(\s*dB\b)?")
     if factor is not None:
         size = 10.0 ** (float(factor[1]) / 20.0) if factor[2] else float(factor[1])
         if not 1.0 < size < math.inf:

@@ -183,6 +183,47 @@ WRITTEN = {
         "duration": 57600,
         "variance": 0.04**2 + 0.01**2 / 12,
     },
+    "I've got a heat exchanger on steam. Steam valve sits at 35 %, I can swing it ±5 %. Outlet temperature "
+    "responds about 0.8 °C per %, in roughly 4 minutes, after 20 seconds or so. Sensor noise ±0.1 °C. I need "
+    "a PI controller with a good margin, and I've got about 3 hours.": {
+        "gain": 0.8,
+        "time_constant": 240,
+        "dead_time": 20,
+        "offset": 35,
+        "amplitude": 5,
+        "standard_deviation": 0.1,
+        "duration": 10800,
+    },
+    "Level tank, inlet valve at 50 %, +/-10 % allowed, level goes up 0.5 cm/min for each % of valve, 20 s "
+    "dead time, measurement noise 0.15 cm, outflow increases slowly with level, two hours available, PI "
+    "level controller": {
+        "slope": 0.00833333,
+        "dead_time": 20,
+        "offset": 50,
+        "amplitude": 10,
+        "duration": 7200,
+    },
+    "Room heating: valve around 40 % (25 to 55 %), temperature rises approximately 1.5 K for 10 % more "
+    "valve, takes about an hour, a few minutes of delay; sensor noise 0.04 K, lasts 5 min; two days; PI": {
+        "gain": 0.15,
+        "time_constant": 3600,
+        "dead_time": 210,
+        "offset": 40,
+        "amplitude": 15,
+        "duration": 172800,
+    },
+    "Servo: 12 rpm per V, settles in 2 s, no dead time, 5 V +- 2 V, noise 3 rpm, 1 minute, PI": {
+        "time_constant": 0.5,
+        "duration": 60,
+    },
+    "Please design a test for a flow loop: running around 40 %, steps of 10 % are fine, gain 0.9 l/s per %, "
+    "time constant between 3 and 4 s, dead time 1 s, noise rms 0.2 l/s white, 5 min, parameters within 3 %": {
+        "time_constant": 3.5,
+        "offset": 40,
+        "amplitude": 10,
+        "L": None,
+        "duration": 300,
+    },
 }
 
 
