@@ -31,7 +31,7 @@ def instructions(results: Results, spec: str) -> list[str]:
     logged = ["time", *(applied if in_loop else []), *inputs, *outputs]
     step = f"{signal.sample_time:g} {results.time_unit}"
     where = "" if around is None else " at the operating point"
-    how = " as r in u = r - C y (C y counted from rest; r is no position of the actuator)" if in_loop else ""
+    how = " as r in u = r - C y (y counted from rest)" if in_loop else ""
     said = [
         f"Bring the plant to rest{where}, log {', '.join(logged[:-1])} and {logged[-1]} every {step}, "
         f"and apply signal.csv{how}."
@@ -40,13 +40,13 @@ def instructions(results: Results, spec: str) -> list[str]:
     if in_loop:
         has = f"has the level {levels} of the input in it" if levels else "has no level"
         said.append(
-            f"r in signal.csv {has}: while y rests, u = r. Log u as it is, level included, and r as applied: "
-            "its level does not matter to assess."
+            f"r is what the controller adds its part to, and may go further than the actuator. In signal.csv "
+            f"it {has}: while y rests, u = r. Log u as it is, level included, and r as applied."
         )
     judge = f"Then: idesign assess {shlex.quote(spec)} log.csv"
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-        rest = f"the mean of {' and '.join(outputs)} in rows before it begins"
-        judge += f" --operating-point {point}   (REST: {rest})"
+        rest = f"write for REST the value of {' and '.join(outputs)} at rest, before signal.csv begins"
+        judge += f" --operating-point {point}   ({rest})"
     return [*said, judge]

@@ -28,6 +28,7 @@ def explore(
     spec: Path | None = None,
     validate: Path | None = None,
     structure: Literal["any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"] = "any",
+    operating_point: str = "",
     into: Into,
     shown: Shown,
 ) -> None:
@@ -38,6 +39,7 @@ def explore(
     spec.yaml for `idesign solve`, figures and report.html; prints a summary. With --spec the spec that is
     written keeps what that one asks for. Exits with 1, and says why, where no model deserves trust.
     """
+    point = ["--operating-point", operating_point] if levels(operating_point) else []
     if spec is not None and validate is not None:
         raise typer.BadParameter("a model that is judged needs no further spec", param_hint="--spec")
     ending = "explored" if validate is None else "validated"
@@ -59,7 +61,8 @@ def explore(
         if spec is None:
             then = f"idesign solve {shlex.quote(found_spec)}   (say in it how accurate the model must be)"
         else:
-            options = [*typed(rows), *(found.levels.split() if rows.detrend == "none" else [])]
+            removed = found.levels.split() if rows.detrend == "none" else []
+            options = [*typed(rows), *(point if point and "--detrend" not in removed else removed)]
             again = ["-o", f"{place.directory}_assessed"]  # the usual place holds the run of the other spec
             then = shlex.join(["idesign", "assess", found_spec, *options, *again, *map(str, data)])
         typer.echo(f"Then: {then}")
@@ -134,6 +137,7 @@ def assess(
             preparation=rows.of(data),
         )
     again, explores = typed(changes, levels, rows), ["idesign", "explore", "--spec", str(spec)]
+    explores += typed(replace(levels, remove_means=False))  # what explore estimates itself
     begins = {
         "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
         # The longer beginning comes first: columns that the command has are not named twice.

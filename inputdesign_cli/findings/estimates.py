@@ -92,7 +92,7 @@ def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Find
         return []
     remedy = kind.remedy
     if levels:
-        remedy = "The record does not begin at rest, or the levels of --operating-point are not exact."
+        remedy = "The record does not begin at rest, levels of --operating-point are not exact, or it drifts."
     if not estimate.start.rest_refuted:
         return [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))

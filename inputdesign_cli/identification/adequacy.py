@@ -112,7 +112,7 @@ def score_tests(
     `robust` is the estimate with whitened residuals, for all regressors but past residuals.
     """
     of_inputs = past_inputs(records, theta, feedback=feedback)
-    every = [*of_inputs, *past_residuals(records, white), _trend(records, theta)]
+    every = [*of_inputs, *past_residuals(records, white), *_drifts(records, theta)]
     found = (tested(white if one.of_residuals else robust or white, one) for one in every)
     return tuple(test for test in found if test is not None)
 
@@ -190,7 +190,7 @@ def with_linear_faults(
     A lag or a drift that a model lacks looks like a plant that is not linear, or that changes.
     """
     named = {test.name for test in failed(tests)}
-    tried = [*past_inputs(records, theta, feedback=feedback), _trend(records, theta)]
+    tried = [*past_inputs(records, theta, feedback=feedback), *_drifts(records, theta)]
     columns = [one.white(white) for one in tried if one.name in named]
     return white.without(np.column_stack(columns)) if columns else white
 
@@ -245,6 +245,13 @@ def _trend(records: Records, theta: Array) -> Regressors:
     slow = [time**power for power in range(_TRENDS)]
     slow += [np.cos(0.5 * np.pi * k * (1.0 + time)) for k in range(1, _WAVES + 1)]
     return Regressors("trend", "drift", records.whitened(theta, np.stack(slow, axis=1)))
+
+
+def _drifts(records: Records, theta: Array) -> list[Regressors]:
+    """Return the regressors of a drift and, of a plant that is known to integrate, of a leak."""
+    leaks = np.concatenate([records.kind.leaks(theta, *part) for part in records.parts], axis=1)
+    leak = Regressors("leak", "drift", leaks.transpose(2, 1, 0))
+    return [_trend(records, theta), *([leak] if len(leaks) else [])]
 
 
 def _runs(first: int, last: int, *, growth: float = 1.0) -> list[tuple[int, int]]:

@@ -85,11 +85,23 @@ class Derived(Kind):
         here = None if self.by is None else self.by.at(theta)
         if here is not None and here.undefined is not None:
             return np.full(y.shape, np.nan), np.full((theta.size, *y.shape), np.nan)
+        errors, psi = self._by_coefficients(theta, u, y)
+        return errors, psi if here is None else np.tensordot(here.jacobian, psi, axes=(0, 0))
+
+    def _by_coefficients(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
+        """Return prediction errors (N, p) from rest, and psi (K, N, p) by the coefficients."""
         errors, psi = self.plant.errors_and_gradient(self._of_plant(theta), u, y)
         noise = self._noise(theta)
-        if noise is not None:
-            errors, psi = _coloured(noise, errors, psi)
-        return errors, psi if here is None else np.tensordot(here.jacobian, psi, axes=(0, 0))
+        return (errors, psi) if noise is None else _coloured(noise, errors, psi)
+
+    def leaks(self, theta: Array, u: Array, y: Array) -> Array:
+        """Return psi (m, N, p) by the coefficients that are known to be zero because the plant integrates."""
+        if self.by is None:
+            return super().leaks(theta, u, y)
+        held = ~np.any(self.by.moves[: self._first], axis=1) & (self._of_plant(theta) == 0.0)
+        last = [name.partition("[")[0] == "a0" for name in self.plant.model.names]  # of plants in s
+        leaks = np.flatnonzero(held & last)
+        return self._by_coefficients(theta, u, y)[1][leaks] if leaks.size else super().leaks(theta, u, y)
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the starts of the plant, and the effect of noise before the record through C/D."""

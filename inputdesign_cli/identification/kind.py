@@ -146,6 +146,10 @@ class Kind(ABC):
             known: the mask (k,) of parameters that need not be looked for; None for none.
         """
 
+    def leaks(self, theta: Array, u: Array, y: Array) -> Array:
+        """Return psi (m, N, p) by leaks of integrators, which a model does without if it knows its pole."""
+        return np.zeros((0, *y.shape))
+
     def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:
         """Return the extensions of the structure at theta (k,) by one parameter.
 

@@ -55,10 +55,11 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
-_TIMED = r"(?:dead time|delay|time constant|lag)"
+_TIMED = r"(?:dead time|delay|time constant|lag|(?:reacts?|responds?|begins?|starts?)(?: only)? after)"
+_SOME = rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
 _FEW = re.compile(
-    rf"(?P<what>\b{_TIMED}\s+(?:(?:of|is)\s+)*)?(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
-    rf"(?P<late>\s+(?:of\s+)?{_TIMED}\b)?",
+    rf"(?P<what>\b{_TIMED}\s+(?:(?:of|is)\s+)*){_SOME}"
+    rf"|{_SOME.replace('?P<unit>', '?P<of>')}(?P<late>\s+(?:of\s+)?{_TIMED}\b)",
     re.I,
 )
 _SETTLES = re.compile(
@@ -79,6 +80,12 @@ _SYMBOL = re.compile(
 _FALLS = re.compile(
     rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
+    re.I,
+)
+_BECOMES = re.compile(
+    rf"\b(?:makes?|gets?|becomes?)\s+(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){{0,2}}?(?P<about>{ABOUT}\s*)?"
+    rf"(?P<size>{_DIGITS}\s*[^\s\d,;|]+)\s+"
+    r"(?:(?:warm|hott|high|fast|larg|great)er|(?P<down>(?:cold|cool|low|slow|small)er))\b",
     re.I,
 )
 _BETWEEN = re.compile(
@@ -129,7 +136,7 @@ _NONLINEAR = (
     r"|non-?linear\w*"
 )
 _GROWS = (
-    r"(?:\s+(?:that|which|and))?\s+(?:grows?|rises?|increases?|depends?)(?:\s+slowly)?\s+(?:with|on)"
+    r"(?:\s+(?:that|which|and))?(?:\s+slowly)?\s+(?:grows?|rises?|increases?|depends?)(?:\s+slowly)?\s+(?:with|on)"
     r"\s+(?:(?:the|its)\s+)?\w+"
 )
 _LEAKS = rf"(?:leak\w*(?:{_GROWS}|\s+slowly)?|(?:outflow|outlet|losses|drain)(?:\s+flow)?{_GROWS})"
@@ -302,9 +309,8 @@ def in_figures(text: str) -> str:
     """
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
-    figures = _FEW.sub(
-        lambda found: f"{found['what'] or found['late'] or ''} {_number_of_few(found)}", figures
-    )
+    figures = _FEW.sub(lambda found: f"{found['what'] or found['late']} {_few(found)}", figures)
+    figures = _BECOMES.sub(_rises, figures)
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
     figures = _OR_SO.sub(r"about \1", figures)
     figures = _SETTLES.sub(
@@ -317,7 +323,7 @@ def in_figures(text: str) -> str:
 def vague_times(text: str) -> list[str]:
     """Return how "a few minutes" and "settles in 2 s" are taken, for each time in a text that is said so."""
     return [
-        *(f'"a few {one["unit"]}" is taken as {_number_of_few(one)}' for one in _FEW.finditer(text)),
+        *(f'"a few {one["unit"] or one["of"]}" is taken as {_few(one)}' for one in _FEW.finditer(text)),
         *(
             f'"{one[0]}" is taken as a time constant of {_time_constant(one)}'
             for one in _SETTLES.finditer(text)
@@ -325,9 +331,13 @@ def vague_times(text: str) -> list[str]:
     ]
 
 
-def _number_of_few(found: re.Match[str]) -> str:
-    """Return a time of the plant as a range, and any other as one number."""
-    return f"{'2 to 5' if found['what'] or found['late'] else '3'} {found['unit']}"
+def _few(found: re.Match[str]) -> str:
+    return f"2 to 5 {found['unit'] or found['of']}"
+
+
+def _rises(found: re.Match[str]) -> str:
+    """Return a change of an output as a rise, as in "makes the room 1.5 degC warmer"."""
+    return f"rises by {found['about'] or ''}{'-' if found['down'] else ''}{found['size']}"
 
 
 def _time_constant(found: re.Match[str]) -> str:

@@ -40,7 +40,7 @@ QUANTITIES = {
     "slope": (r"integrat\w+(?: (?:with|gain|slope|by))*", "slope"),
     "gain": (rf"gain|{RISES}", "gain"),
     "time_constant": (r"time constant|lag|(?:reacts?|responds?)(?: with)?in", "time"),
-    "dead_time": ("dead time|delay", "time"),
+    "dead_time": (r"dead time|delay|(?:reacts?|responds?|begins?|starts?)(?: only)? after", "time"),
 }
 BARE_GAIN = (
     r"<ABOUT>?\s*<ALONE><NUMBER>(?:\s*[^\s\d,;|+±%][^\s,;|+±%]*)?\s*(?:/|\bper\b)\s*"

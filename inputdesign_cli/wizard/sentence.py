@@ -44,6 +44,7 @@ _MATTERS = re.compile(
 # The size of a device says nothing of its dynamics.
 _RATED = re.compile(
     r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
+    r"(?:(?:DC|AC|brush(?:ed|less)|electric|three-phase|servo)\s+)*"
     r"(?:motor|drive|heater|pump|fan|supply|tank|boiler|radiator)\b",
     re.I,
 )
@@ -149,6 +150,10 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     unclear = [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
+    for word in [part for part in beside if re.fullmatch(grammar.ABOUT, part, re.I)]:
+        beside.remove(word)
+        if "plant" in answers:  # "gain 2, time constant 3 min, roughly"
+            answers["plant"] += f", {word}"
     remarks = [
         *named,
         *vague_times(text),

@@ -33,7 +33,7 @@ def words(applied, caused, point=None):
         # A reference is no position of the actuator.
         (words(["r1"], ["u1", "y1"], [40.0]),
          ("has the level 40 of the input in it: while y rests, u = r",
-          "u = r - C y", "no position of the actuator", "log time, r1, u1 and y1 ",
+          "u = r - C y", "may go further than the actuator", "log time, r1, u1 and y1 ",
           "--operating-point u1=40,y1=REST")),
     ],
 )  # fmt: skip

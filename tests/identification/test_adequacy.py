@@ -11,7 +11,7 @@ from inputdesign_cli.identification.white import White, Whitening
 from inputdesign_cli.levels import RATE, SHARES, level
 from inputdesign_cli.plant import PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.plants import lag_of
+from tests.support.plants import known, lag_of
 from tests.support.records import arx_regressors, shifted
 
 
@@ -39,6 +39,32 @@ def test_of_arx_it_is_the_auxiliary_regression():
         assert test.statistic == pytest.approx(300 * (least - less) / least, rel=1e-6)
         assert test.freedom == len(further)
         assert test.probability == pytest.approx(scipy.stats.chi2.sf(test.statistic, test.freedom))
+
+
+def test_a_leak_is_tested_by_what_it_would_take_away():
+    """The derivative of a simulated tank by its leak, in a plain regression of the residuals."""
+    rng, step, n = np.random.default_rng(5), 2.0, 400
+    tank = known(SampledModel(lag_of([0.4], [1, 0]), step), "a0")
+    u = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10)
+    y = filled(u, 0.4, 1e-3, step) + rng.standard_normal(n)
+    found = identify(tank, u[:, None], y[:, None], rest=True)
+    (slope,) = found.theta
+    residual = y - filled(u, slope, 0.0, step)
+    leak = (filled(u, slope, 1e-6, step) - filled(u, slope, -1e-6, step)) / 2e-6
+    own = filled(u, 1.0, 0.0, step)
+    left = leak - own * (own @ leak) / (own @ own)
+    variance = residual @ residual / n
+    test = by_name(found)["leak"]
+    assert (test.fault, test.freedom) == ("drift", 1)
+    assert test.statistic == pytest.approx((left @ residual) ** 2 / (left @ left) / variance, rel=1e-3)
+    assert "leak" not in by_name(identify(SYSTEMS["arx"], *(x[0] for x in data("arx", 300, rng)), rest=True))
+
+
+def filled(u, slope, leak, step):
+    """The level of a tank behind a hold: dx/dt = slope u - leak x."""
+    pole = np.exp(-leak * step)
+    gain = slope * (step if leak == 0.0 else (1.0 - pole) / leak)
+    return scipy.signal.lfilter([0.0, gain], [1.0, -pole], u)
 
 
 def test_the_level_is_shared_by_all_tests():

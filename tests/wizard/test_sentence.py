@@ -384,6 +384,7 @@ def test_limits_are_understood_as_they_are_said(part, where, value, tmp_path):
     [
         *dict.fromkeys(["3 to 6 min", "between 3 and 6 min", "3-6 min", "of 3 to 6 min"], (180, 360)).items(),
         ("of only a few minutes", (120, 300)),
+        ("of between 2 and 5 minutes", (120, 300)),
     ],
 )
 def test_a_time_between_two_ends_is_an_interval(said, ends):
@@ -455,6 +456,10 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     [
         ("dead time: about 2 degC/%, 3 minutes", "plant", "gain about 2 degC/%, time constant 3 minutes"),
         ("9 V nominal, +- 3 V", "range", "at 9 V, +- 3 V"),
+        ("gain 2, time constant 40 s, roughly", "plant", "gain 2, time constant 40 s, roughly"),
+        ("gain 2, reacts after a few s", "plant", "gain 2, reacts after 3.5 s within 42.9 %"),
+        ("10 % more makes the room about 1.5 degC warmer", "plant", "rises by about 1.5 degC per 10 %"),
+        ("10 % more gets the water 1.5 degC colder", "plant", "rises by -1.5 degC per 10 %"),
         ("to know the gain within 3 %", "wish", "parameters within 3 %"),
         ("1 min test", "time", "1 min"),
     ],

@@ -99,7 +99,7 @@ def _structure(candidate: Candidate) -> Structure:
 
 _IN_WORDS = {
     "FOPDT": "a lag with dead time",
-    "SOPDT": "second order with dead time",
+    "SOPDT": "second order of damping zeta, with dead time",
     "TOPDT": "third order with dead time",
 }
 _DIRECT = "The direct method is used; the noise model must then be right"
@@ -175,7 +175,8 @@ def _chosen(log: Record, found: Found, i: int) -> str:
     """Return the structure that was chosen for an output, beside the others."""
     chosen, taken, ranges = found.outputs[i], found.taken[i], found.ranges[i]
     orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
-    orders = "; ".join(filter(None, (_IN_WORDS.get(taken.orders.family), orders)))
+    family, known = taken.orders.family, _IN_WORDS.get(taken.orders.family)
+    orders = "; ".join(filter(None, (family if known else "", orders)))
     orders += f"; times in {log.time_unit}" if taken.orders.physical else ""
     delays = " and ".join(
         f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: "
@@ -188,7 +189,7 @@ def _chosen(log: Record, found: Found, i: int) -> str:
     tried = f"chosen of {len(chosen.candidates)} structures, of which "
     tried += beside if better > 0.0 else f"it simulates {judge} best"
     return (
-        f"{signal_name('y', i, found.model.outputs)}: {taken.orders.family} ({orders}), delay in samples "
+        f"{signal_name('y', i, found.model.outputs)}: {known or family} ({orders}), delay in samples "
         f"{delays}; {tried if len(chosen.candidates) > 1 else 'no other structure was compared'}"
     )
 
