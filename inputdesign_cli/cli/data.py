@@ -52,7 +52,10 @@ def explore(
         place = place.checked(model)
         only = None if structure == "any" else structure
         asked = None if spec is None else read_spec(spec, Changes())
-        found = questions.explore(data, rows.of(data), model=model, structure=only, asked=asked)
+        taken = rows.of(data)
+        if asked is not None:
+            taken = replace(taken, operating_point=levels(operating_point))
+        found = questions.explore(data, taken, model=model, structure=only, asked=asked)
     keep(found.results, place, shown, page=validate is None)
     if found.reasons:
         raise typer.Exit(EXIT_MISSED)

@@ -86,8 +86,11 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     yield from _lines(facts(outcome, part="estimate"))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(outcome, time_unit) or _NONE).rows:
-        where = f" at {frequency} rad/{time_unit}" if frequency else ""
-        verdicts.append(f"{name} {found}: the error that these data give is {ratio} of the admissible{where}")
+        where = f", most at {frequency} rad/{time_unit}" if frequency else ""
+        where = ", most towards frequency zero" if frequency == "0" else where
+        verdicts.append(
+            f"{name} {found}: the error with these data is {ratio} of the admissible error{where}"
+        )
     yield from _named("assessed", verdicts)
     yield from _named("verdict", said("verdict", outcome))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from contextlib import suppress
 from dataclasses import replace
@@ -75,6 +76,8 @@ def wizard(
     if not quiet:
         done = f"{output}: written; every line says why it stands there, and may be changed"
         typer.echo("\n".join([*draft.notes, done]))
+    if solve is None and not (terminal or quiet):
+        typer.echo(f"Then: idesign solve {shlex.quote(str(output))}")
     if solve or (solve is None and terminal and typer.confirm("Design the experiment now?", default=True)):
         _solve(output, draft.there, trade=trade, overwrite=overwrite, quiet=quiet)
 

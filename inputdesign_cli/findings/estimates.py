@@ -94,7 +94,7 @@ def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Find
     if levels:
         remedy = "The record does not begin at rest, levels of --operating-point are not exact, or it drifts."
     if not estimate.start.rest_refuted:
-        return [kind.found("whether it begins at rest was not asked")]
+        return [] if levels else [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))

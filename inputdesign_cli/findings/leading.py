@@ -88,10 +88,12 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
         command = _DETREND
     drifts, own = [one for one in against if one.code == DRIFT.code], command == _NEXT[DRIFT.code]
-    if estimate is not None and drifts and (own or first.code == "plant-structure"):
-        # Past inputs explain what a leak takes away, as they explain a missing lag.
+    shifts = first.code == "level-shift" and _may_drift(first, data)
+    if estimate is not None and ((drifts and (own or first.code == "plant-structure")) or shifts):
+        # Past inputs, or a shift of most of a record, explain what a leak takes away.
         if leaks := _leaking(estimate, data.time):
-            alike, command = drifts, leaks
+            leak = f"Let the plant leak (plant.continuous.denominator: {_denominator(estimate)})."
+            alike, command = drifts or [DRIFT.found("most of a record shifts", remedy=leak, where="y")], leaks
         elif own and _drifts(estimate):
             command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
@@ -117,13 +119,17 @@ def _integrates(estimate: Estimate) -> bool:
 
 def _leaking(estimate: Estimate, time: Array) -> str:
     """Return the command that lets a plant leak which is known to integrate; empty for another plant."""
-    if not (denominator := leaking(estimate.search.records.kind.model)):
+    if not (denominator := _denominator(estimate)):
         return ""
     rate = _LEAK / float(np.median(np.diff(time)))
     return (
         f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
         f'--set "plant.continuous.denominator={denominator}"  # it may leak'
     )
+
+
+def _denominator(estimate: Estimate) -> str:
+    return leaking(estimate.search.records.kind.model)
 
 
 def _drifts(estimate: Estimate) -> bool:

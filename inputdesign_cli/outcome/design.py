@@ -351,7 +351,7 @@ OBJECTIVES = {
     ),
     "accuracy_factor": ObjectiveWords(
         "factor",
-        "the smallest multiple of the admissible error that the limits allow",
+        "the least model error within the limits, as a multiple of the admissible error (below 1: enough)",
         label="factor on the admissible error",
     ),
     "D": ObjectiveWords("log det M", f"{_MOST}log det M", maximised=True),

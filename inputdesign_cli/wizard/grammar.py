@@ -26,7 +26,8 @@ ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly
 OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
 WITHIN = (
     rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS})"
-    rf"(?:(?P<per_cent>{_PER_CENT})|(?=\s*(?:[,;.:|)]|$|(?:and|with)\b))))?"
+    rf"(?:(?P<per_cent>{_PER_CENT})|(?:\s*(?P<share_unit>ms|s|sec|min|h)\b)?"
+    r"(?=\s*(?:[,;.:|)]|$|(?:and|with)\b))))?"
 )
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
 VAGUE = 0.2
@@ -63,11 +64,13 @@ _FEW = re.compile(
     re.I,
 )
 _SETTLES = re.compile(
-    rf"\b(?:settles|is settled)\s+(?:in|within|after)\s+(?P<about>{ABOUT}\s*)?(?P<number>{_DIGITS})\s*"
-    rf"(?P<unit>{UNIT_OF_TIME})",
+    r"\b(?P<how>(?:settles|is settled)\s+(?:in|within|after)|settling time|rise time|"
+    r"(?:reaches\s+)?63\s*%(?:\s+of (?:it|the way|its final value))?\s+(?:is reached\s+)?(?:in|within|after))"
+    rf"{OF}\s*(?P<about>{ABOUT}\s*)?(?P<number>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
     re.I,
 )
-_SETTLED = 4.0  # time constants: 98 % of the way
+# Time constants in what is said of a lag: 98 % of the way, from 10 to 90 %, and 63 %.
+_LASTS = {"s": 4.0, "i": 4.0, "r": 2.2, "6": 1.0}
 _OR_SO = re.compile(rf"({_DIGITS}\s*{UNIT_OF_TIME})\s+or\s+so\b", re.I)
 _SYMBOLS = {
     "k": "gain",
@@ -77,8 +80,16 @@ _SYMBOLS = {
 _SYMBOL = re.compile(
     rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta|t63)\s+)(?=(?:{ABOUT}\s*)?[-+.\d])", re.I
 )
+_MINUS = re.compile(
+    r"(?<!plus/)(?<!plus or )(?<!plus and )(?<!plus )\b"
+    r"(?:(?P<gain>negative gain)(?: of)?|minus|negative(?: of)?)\s+(?=[\d.])",
+    re.I,
+)
+_HOURS_AND_MINUTES = re.compile(
+    r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s+(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
+)
 _FALLS = re.compile(
-    rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
+    rf"\b(?:falls?|drops?|decreases?|sinks?|cools(?: down)?|goes? down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
     re.I,
 )
@@ -110,13 +121,13 @@ _SIZE = r"(?P<size>(?!(?:per|and)\b)(?:[^\s\d,;|/.:]|[.:](?=[^\s|]))+)"
 _RATE = rf"(?:\s*{_SIZE})?(?:\s*(?:per|/)\s*{_TIME})?"
 _BASE = (
     rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
-    rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?"
+    rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
 )
 # What stands behind the number of each kind.
 _BEHIND = {
-    "time": rf"(?:\s*{_TIME}|(?![\d.]|\s*(?:%|°|[a-z]+\s*/|[a-z]+ per\b)))",
+    "time": rf"(?:\s*{_TIME}|(?![\d.]|\s*(?:%|°|[a-z]+\s*/|[a-z]+ per\b|(?:[mk]?hz|ks|samples?|rad)\b)))",
     "frequency": rf"(?:\s*(?P<unit>{'|'.join(_FREQUENCIES)})\b)?",
-    "rate": _RATE,
+    "rate": rf"{_RATE}(?!\s*[^\s,;]*\s*(?:\bper\b|/)\s*[a-z])",
     "slope": rf"{_RATE}(?:{_BASE})?",
     "speed": rf"(?:\s*{_SIZE})?\s*(?:per|/)\s*{_TIME}(?:{_BASE})?",
     "gain": rf"(?:\s*(?!plus/)(?P<size>(?:[^\s\d,;|+±][^\s,;|+±]*)?){_BASE})?",
@@ -207,11 +218,15 @@ class Phrase:
         value = self._scaled(float(said["number"]), said.get("unit", ""), kind)
         if kind in ("any", "rate"):
             value = self.sized(value, said["size"], unit)
+        value = -value if said.get("less") else value  # "rises by 2 degC per 5 % less"
         if said.get("many"):
             value /= needed(float(said["many"]), self.key, "what the gain is per")
         share = float(said["share"]) / 100.0 if said["share"] else None
         if said["share"] and not said.get("per_cent", "%"):  # of the same unit as the number
-            share = float(said["share"]) / max(abs(float(said["number"])), SMALLEST)
+            apart = self._scaled(float(said["share"]), said.get("share_unit") or said.get("unit", ""), kind)
+            share = apart / max(
+                abs(self._scaled(float(said["number"]), said.get("unit", ""), kind)), SMALLEST
+            )
         about = re.search(ABOUT, said["words"], re.I) is not None
         return Quantity(value, share, about, said.get("size", "").strip("()"), said.get("base", ""))
 
@@ -308,6 +323,8 @@ def in_figures(text: str) -> str:
     "T = 3 s" becomes "time constant 3 s".
     """
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
+    figures = _MINUS.sub(lambda found: "gain -" if found["gain"] else "-", figures)
+    figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
     figures = _FEW.sub(lambda found: f"{found['what'] or found['late']} {_few(found)}", figures)
     figures = _BECOMES.sub(_rises, figures)
@@ -342,7 +359,9 @@ def _rises(found: re.Match[str]) -> str:
 
 def _time_constant(found: re.Match[str]) -> str:
     """Return the time constant of a settling time."""
-    return f"{float(found['number']) / _SETTLED:g} {found['unit']}"
+    how = found["how"].lower()
+    constants = 1.0 if "63" in how else _LASTS[how[0]]
+    return f"{float(found['number']) / constants:.4g} {found['unit']}"
 
 
 def _middle(found: re.Match[str]) -> str:

@@ -82,7 +82,11 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
             f"  standard_deviation: {short(level.deviation)}  # {why}",
             f"  correlation_time: {short(fades)}  # {colour}",
         ]
-    lines = ["noise:", f"  variance: {short(variance)}  # {why}", *_drift(drifts)]
+    lines = [
+        "noise:",
+        f"  variance: {short(variance)}  # {why}",
+        *_drift(drifts, "the output drifts, as you said"),
+    ]
     lines += [f"  C: [1, {short(-drifting(pole))}]"] * drifts
     return lines + [f"  D: [1, {short(-pole)}]  # {colour if fades else why}"] * bool(pole)
 
@@ -132,8 +136,8 @@ def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
     return rows if isinstance(rows[0], Sequence) else [rows] * outputs
 
 
-def _drift(drift: Any) -> list[str]:
-    return [f"  drift: {json.dumps(drift)}  # an integrator in the noise"] * bool(np.any(drift))
+def _drift(drift: Any, why: str = "the log shows it") -> list[str]:
+    return [f"  drift: {json.dumps(drift)}  # an integrator in the noise: {why}"] * bool(np.any(drift))
 
 
 def _stated(text: str, folder: Path, plant: PlantAnswer) -> _Level:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _NONE: Mapping[str, float] = MappingProxyType({})
 _WHAT = rf"(?:(?:the )?(?:{SIGNAL}|room|tank|water))"
 RISES = (
-    rf"(?:{_WHAT} )?(?:rises|grows|increases|climbs|goes up|warms|heats|raises"
+    rf"(?:{_WHAT} )?(?:rises?|grows?|increases?|climbs?|goes? up|warms|heats|raises?"
     rf"|(?:reacts|responds|changes)(?= (?:by|with)\b|\s*{ABOUT}))(?: {_WHAT})?(?: by| with)?"
 )
 # Names of what is said of a plant -> words, and the kind of unit. What rises in a time integrates.

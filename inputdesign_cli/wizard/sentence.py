@@ -23,7 +23,7 @@ from inputdesign_cli.wizard.grammar import (
 from inputdesign_cli.wizard.questions import Answers, bad_answer, question
 
 _TURNS = (
-    *("loop", "wish", "drift", "noise", "plant", "hold"),
+    *("loop", "wish", "drift", "noise", "plant", "hold", "signals"),
     *("converter", "return", "limits", "range", "names", "time"),
 )
 """The questions that a sentence may answer, in the order in which their pieces are taken out of it."""
@@ -36,19 +36,25 @@ _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 # What is left is asked for again if it has a number or a negation, or words whose number is missing.
 _MATTERS = re.compile(
-    r"\d|n't\b|\b(?:not?|never|without|except|unless|neither|nor|but|"
+    r"\d|n't\b|\b(?:not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
+    r"invers\w*|clos(?:e|es|ed|ing)|shut\w*|reduc\w*|less(?! is)|unstable|off|manual|slower|faster|times|"
+    r"factor|accura\w*|uncertain\w*|guess\w*|total|overall|upwards?|downwards?|PRBS|binary|weekend|overnight|"
     r"dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
-    r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month|morning|afternoon|evening)s?|half|twice|doubled?|peak\S*)\b",
+    r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month|morning|afternoon|evening)s?|half|twice|doubled?|"
+    r"peak\S*)\b",
     re.I,
 )
 # The size of a device says nothing of its dynamics.
 _RATED = re.compile(
     r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
     r"(?:(?:DC|AC|brush(?:ed|less)|electric|three-phase|servo)\s+)*"
-    r"(?:motor|drive|heater|pump|fan|supply|tank|boiler|radiator)\b",
+    r"(?:motor|drive|heater|pump|fan|supply|tank|boiler|radiator)\b"
+    r"|\b(?:motor|drive|heater|pump|fan|tank|boiler|radiator)\s+(?:has|is|of|with)\s+\d+(?:\.\d+)?\s*"
+    r"(?:k?W|k?VA?|A|hp|l|m3|litres?)\b",
     re.I,
 )
-_OTHER_LAWS = re.compile(r"\b(?:PD|P|I|LQG?|MPC)[- ](?:loop|controller|control|regulator)\b")
+_LESS = re.compile(r"\b(?:clos(?:e|es|ed|ing)|shut\w*|reduc\w*|lower\w*|less)\b", re.I)
+_OTHER_LAWS = re.compile(r"\b(?:PD|P|I|LQG?|MPC)(?:[- ]only)?[- ](?:loop|controller|control|regulator)\b")
 _JOINS = r"(?:for|of|in|with|after|within|a|an|the|my|our|i|we|have|is|and|to)"
 _BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.I)
 
@@ -99,7 +105,7 @@ def _expanded(pattern: str) -> str:
 def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
     """Return the patterns of times behind a gain, of times that are named, and of a dead time."""
     time = r"(?:<ABOUT>\s*)?(?:<NUMBER>\s*(?:to|-|–)\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|(?:and|after|with|but)\b))"
-    joined = r"(?:\s+more(?:\s+<DRIVE>)?)?[,;]?\s+(?:(?:and|after|within|in|with|it|takes|slowly,?)\s+)*"
+    joined = r"(?:\s+more(?:\s+<DRIVE>)?)?[,;.]?\s+(?:(?:and|after|within|in|with|it|takes|slowly,?)\s+)*"
     gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
     times = rf"(?:{gain}){joined}(?P<lag>{time})(?:[,;]\s+(?:(?:and|after|with|but)\s+)*(?P<late>{time}))?"
     named = "|".join(_QUANTITIES[name] for name in ("rise", "slope", "time_constant"))
@@ -140,8 +146,14 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):
                 says = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
+                rest = _taken(piece)
+                if key == "plant" and " per " in says and _LESS.search(piece[0]):  # "when the valve closes"
+                    says, rest = (
+                        f"{says.removesuffix(' less')} less",
+                        _LESS.sub("", rest).ljust(len(rest), "|"),
+                    )
                 found.setdefault(key, []).append((piece.start(), says.strip(" ,.")))
-                left = left[: piece.start()] + _taken(piece) + left[piece.end() :]
+                left = left[: piece.start()] + rest + left[piece.end() :]
     if len(found) < least:
         return Heard({})
     if "wish" in found and any(wishes.PRECISE.search(said) for _, said in found["wish"]):  # "of a flow loop"
@@ -160,10 +172,21 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         *beyond_models(text),
         *([f"nothing follows from: {', '.join(beside)}"] if beside else []),
     ]
+    remarks += _of_the_wish(answers.get("wish", ""), text)
     if "wish" in answers and wishes.unbounded(answers["wish"]):
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")
     return Heard(answers, tuple(remarks), tuple(unclear))
+
+
+def _of_the_wish(wish: str, text: str) -> list[str]:
+    """Return remarks on how a wish is taken where the text says less than that."""
+    found = []
+    if wish.count("parameters within") > len(re.findall(r"\bparameters\b", text, re.I)):
+        found.append("the smallest of these shares is asked of every parameter")
+    if re.search(r"\bKp\b", wish, re.I) and not re.search(r"\bown\b|\bmy\b", text, re.I):
+        found.append("the margin is asked of the loop with the Kp that was named, as it is")
+    return found
 
 
 def _taken(piece: re.Match[str]) -> str:

@@ -100,6 +100,8 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
         )
         if by is None:
             raise bad_answer("range", f'"{text}" is no range')
+        if by[1].startswith(("+", "-")):
+            raise bad_answer("range", f'"{by[0]}" goes one way: say how far it may move to either side')
         sizes = [(around[1], around[2]) if around else ("0", ""), (by[1], by[2])]
     points = list(iter(lambda: said.take(at), None))  # it may be said twice
     said.take(MOVES)

@@ -238,7 +238,9 @@ experiment: {samples: 100, controller: {numerator: [0.3], denominator: [1]}}
 accuracy: {model_error: {relative: 0.2}}
 objective: best_accuracy
 limits: {amplitude: {input: 2}}
-spectrum: {type: multisine, lines: 10}
+spectrum: {type: multisine, lines: 5}
+solver: {any_spectrum: false}
+signal: {type: multisine, candidates: 1}
 """
     findings = solve(parse_spec(text)).outcome.findings
     (found,) = [one for one in findings if one.code == "noise-moves-input"]

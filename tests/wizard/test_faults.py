@@ -74,7 +74,7 @@ HOSTILE = {
         plus/minus nan | plus/minus 0 | plus/minus -5 | 45 to 35 | 5 to 5 | plus/minus 1e99 |
         plus/minus 5 around nan | plus/minus 5 around text | plus/minus 1e-99 | 0 to 1e99
     """,
-    "time": "0 s | 1e99 h | 5 parsecs | 1e-9 s | 1 h 30 min | 2 h around 5 | 10 s",
+    "time": "0 s | 1e99 h | 5 parsecs | 1e-9 s | 2 h around 5 | 10 s",
     "limits": "rate nan | rate 0 | rate -1 | rate 1e-99 | output 0 | rate 0.5 output | rate | output 1e99",
     "noise": """
         standard deviation nan | standard deviation 0 | standard deviation 1e99 | resolution 0 | rest |

@@ -456,6 +456,8 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     [
         ("dead time: about 2 degC/%, 3 minutes", "plant", "gain about 2 degC/%, time constant 3 minutes"),
         ("9 V nominal, +- 3 V", "range", "at 9 V, +- 3 V"),
+        ("it may go 15 % to either side of 40 %", "range", "by 15 % around 40 %"),
+        ("gain 2 K/%. It takes about an hour", "plant", "gain 2 K/%, time constant about 1 hour"),
         ("gain 2, time constant 40 s, roughly", "plant", "gain 2, time constant 40 s, roughly"),
         ("gain 2, reacts after a few s", "plant", "gain 2, reacts after 3.5 s within 42.9 %"),
         ("10 % more makes the room about 1.5 degC warmer", "plant", "rises by about 1.5 degC per 10 %"),
@@ -466,6 +468,61 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
 )
 def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
     assert in_sentence(f"{part}; noise 0.1, white").answers[question] == answer
+
+
+PLAIN = (
+    "gain 2 degC/%, time constant 200 s, dead time 20 s; valve 40 +- 5 %; noise 0.1 degC; 2 h; PI with 6 dB"
+)
+
+
+@pytest.mark.parametrize(
+    "gain",
+    ["minus 2 degC/%", "of negative 2 degC/%", "the temperature rises by 10 degC when the valve closes 5 %",
+     "when the valve closes by 5 % the temperature rises by 10 degC",
+     "closing the valve by 5 % raises the temperature by 10 degC", "10 % more valve gives 20 degC less",
+     "opening the valve by 10 % makes the temperature fall by 20 degC"],
+)  # fmt: skip
+def test_a_gain_that_is_negative_is(gain, tmp_path):
+    words = gain if "valve" in gain else f"gain {gain}"
+    spec = heard(PLAIN.replace("gain 2 degC/%", words), tmp_path, *["no"] * 3).spec()
+    assert spec.plant.continuous.gain == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize(
+    "part",
+    ["reverse acting", "the gain is negative", "time constant 2 ks", "dead time 3 samples", "sampling 0.5 Hz",
+     "rate 2 % per sample", "four times faster than the plant", "it may move by 5 % in total", "unstable",
+     "upwards only", "known to a factor of two", "all accurate to ten percent", "noise slower than the plant",
+     "PRBS please", "the valve is open or closed", "overnight", "not white", "not PID",
+     "the loop is switched off"],
+)  # fmt: skip
+def test_words_that_matter_are_asked_for(part):
+    assert in_sentence(f"{part}; {PLAIN}").unclear
+
+
+@pytest.mark.parametrize(
+    ("part", "question", "answer"),
+    [
+        ("with 6 dB gain margin", "wish", "gain margin 6 dB"),
+        ("our loop now has Kp 1.2, Ti 90 s", "loop", "Kp 1.2, Ti 90 s"),
+        ("no drift", "drift", "no"),
+        ("a binary signal", "signals", "two levels"),
+        ("without return", "return", "no"),
+        ("slow noise of 0.1 degC", "noise", "slow"),
+        ("rise time 440 s", "plant", "time constant 200 s"),
+        ("all values approximate", "plant", "roughly"),
+        ("Ms of 2 dB", "wish", "2 dB"),
+        ("1 h 30 min", "time", "90 min"),
+    ],
+)
+def test_a_part_says_what_it_says(part, question, answer):
+    assert in_sentence(f"{part}; {PLAIN}").answers[question].startswith(answer)
+
+
+@pytest.mark.parametrize("apart", ["0.5 min", "30 s", "16.6667 %"])
+def test_a_tolerance_has_a_unit_of_its_own(apart):
+    found = plant_of_words(f"gain 2, time constant 40 min, dead time 3 min +- {apart}")
+    assert found.intervals["dead_time"] == pytest.approx((150.0, 210.0), rel=1e-5)
 
 
 def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):

@@ -56,6 +56,7 @@ class Asked:
 
     time_unit: str
     sections: Mapping[str, Any]
+    drifts: bool = False  # whether its noise does
 
     @classmethod
     def of(cls, spec: Spec) -> Asked:
@@ -64,7 +65,7 @@ class Asked:
         match sections:
             case {"experiment": {"prior": _, **rest}}:  # it is of other parameters
                 sections["experiment"] = rest
-        return cls(spec.time_unit, sections)
+        return cls(spec.time_unit, sections, bool(np.any(spec.noise.drift)))
 
     def check_unit(self, time_unit: str) -> None:
         """Raise `SpecError` (`data-wrong-unit`) unless a log counts times in the same unit."""
@@ -118,6 +119,8 @@ def spec_text(
         asked = _as_in_the_record(log, integrates=bool(found.integrates))
     else:
         comments = {key: comments[key] for key in ("title", "plant", "noise")}
+        if asked.drifts and "drift" not in blocks["noise"]:
+            comments["noise"].append("In this record it does not drift, as the given spec lets it.")
         comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
     sections = {
         "title": f"{_DOUBTED * bool(reasons)}The next experiment after {source}",

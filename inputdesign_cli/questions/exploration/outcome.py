@@ -185,9 +185,9 @@ def _chosen(log: Record, found: Found, i: int) -> str:
     )
     judge = "the record" if found.split == "none" else "the part that judges"
     better = max(c.validation for c in chosen.candidates) - taken.validation
-    beside = f"the best simulates {judge} by {better:.2g} points better"
+    beside = f"the best explains {better:.2g} % more of {judge}"
     tried = f"chosen of {len(chosen.candidates)} structures, of which "
-    tried += beside if better > 0.0 else f"it simulates {judge} best"
+    tried += beside if better > 0.0 else f"it explains most of {judge}"
     return (
         f"{signal_name('y', i, found.model.outputs)}: {known or family} ({orders}), delay in samples "
         f"{delays}; {tried if len(chosen.candidates) > 1 else 'no other structure was compared'}"
