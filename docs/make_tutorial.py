@@ -199,7 +199,7 @@ def tutorial(folder: Path, images: Path) -> str:
     found["first"], said = terminal.run(
         *("assess", "design/spec.yaml", "first.csv", *REST, "-o", "first_assessed"), kept=shown, code=1
     )
-    (found["ratio"],) = re.findall(r"that these data give is ([\d.]+) of", said)
+    (found["ratio"],) = re.findall(r"error with these data is ([\d.]+) of", said)
     (found["needed"],) = re.findall(r"signal +(\d+) samples", said)
     found["reserve"], said = terminal.run(
         *("assess", "design/spec.yaml", "first.csv", *REST, "--set", RESERVE, "-o", "reserve"),

@@ -173,7 +173,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     ]
     taken = f'"about" is taken as within {100 * VAGUE:g} %: {", ".join(ends)}'
     heard = [f"{taken}; the design holds for all of these"] if vague else []
-    if reacts := re.search(r"\b(?:reacts?|responds?)\b(?! by)", text, re.I):
+    if reacts := re.search(r"\b(?:reacts?|responds?)\b(?! (?:by|with|after|only)\b)", text, re.I):
         heard.append(f'"{reacts[0]}" is taken as the time constant, in which it gets 63 % of the way')
     plant = PlantAnswer(
         (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds"),

@@ -107,7 +107,9 @@ def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]
     time = r"(?:<ABOUT>\s*)?(?:<NUMBER>\s*(?:to|-|–)\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|(?:and|after|with|but)\b))"
     joined = r"(?:\s+more(?:\s+<DRIVE>)?)?[,;.]?\s+(?:(?:and|after|within|in|with|it|takes|slowly,?)\s+)*"
     gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
-    times = rf"(?:{gain}){joined}(?P<lag>{time})(?:[,;]\s+(?:(?:and|after|with|but)\s+)*(?P<late>{time}))?"
+    times = (
+        rf"(?:{gain})<UNIT>{joined}(?P<lag>{time})(?:[,;]\s+(?:(?:and|after|with|but)\s+)*(?P<late>{time}))?"
+    )
     named = "|".join(_QUANTITIES[name] for name in ("rise", "slope", "time_constant"))
     late = f"{_QUANTITIES['dead_time']}|<NO_DELAY>"
     one, two, three = (re.compile(_expanded(pattern), re.I) for pattern in (times, named, late))

@@ -47,7 +47,7 @@ NAMES_A_LOOP = re.compile(rf"(?:{SIGNAL} )?{LOOP}", re.I)
 # The share of the amplitude by which an operating point may differ from the middle of the range.
 _MIDDLE = 0.05
 
-IN_UNIT = r"(?:\s*(?:\bin\s+|\()(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
+IN_UNIT = r"(?:\s*(?:\bin\s+|\(\s*(?:in\s+)?)(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
 """The unit behind what moves, as in "valve in %" and "valve (%)"."""
 STANDS = (
     r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating|now|normally|usually|currently|nominally)\s+)*"

@@ -458,6 +458,12 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("9 V nominal, +- 3 V", "range", "at 9 V, +- 3 V"),
         ("it may go 15 % to either side of 40 %", "range", "by 15 % around 40 %"),
         ("gain 2 K/%. It takes about an hour", "plant", "gain 2 K/%, time constant about 1 hour"),
+        (
+            "For 10 % more valve y rises by 2 K. It takes an hour",
+            "plant",
+            "rises by 2 K per 10 %, time constant 1 hour",
+        ),
+        ("the valve (in %) sits at 40 %, +- 5 %", "range", "the valve (in %) sits at 40 %, +- 5 %"),
         ("gain 2, time constant 40 s, roughly", "plant", "gain 2, time constant 40 s, roughly"),
         ("gain 2, reacts after a few s", "plant", "gain 2, reacts after 3.5 s within 42.9 %"),
         ("10 % more makes the room about 1.5 degC warmer", "plant", "rises by about 1.5 degC per 10 %"),
