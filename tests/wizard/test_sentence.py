@@ -683,6 +683,14 @@ def test_the_loop_of_a_lag_without_a_dead_time_keeps_the_default_margin(tmp_path
         compose(answers | {"wish": "PID loop with 6 dB"}, "x", tmp_path)
 
 
+@pytest.mark.parametrize(("lag", "late"), [(200, 20), (100, 5), (30, 30)])
+def test_the_loop_of_a_pid_is_sampled_fast_enough_for_its_derivative(lag, late, tmp_path):
+    plant = f"gain 2 degC/%, time constant {lag} s, dead time {late} s"
+    draft = heard(f"{plant}; valve 40 +- 5 %; noise 0.1 degC; 2 h; PID with 6 dB", tmp_path, *["no"] * 3)
+    draft.validate()
+    assert draft.spec().sample_time <= late / 10
+
+
 def test_a_size_in_a_unit_that_the_gain_does_not_have_is_refused(tmp_path):
     plant = {"plant": "gain 2 degC/%, time constant 180 s"}
     for key, text in (("range", "40 +- 5 mA"), ("noise", "0.1 furlongs"), ("range", "40 +- 5 stone")):
