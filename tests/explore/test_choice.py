@@ -298,7 +298,7 @@ def test_a_bump_up_and_down_tells_gain_and_time_constant(seed):
     assert np.abs(found.model.plant_at(w)[:, 0, 0] / truth - 1.0).max() < 0.05
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [3.0, 1.0, 0.3])
 def test_a_tank_that_leaks_has_a_time_constant_and_no_drift(share):
     """Its time constant is `share` of the record. Gain over time constant is known far better than each."""
