@@ -121,8 +121,7 @@ def compose(
         DataError: a file cannot be used.
     """
     said = asking.complete(answers)
-    plant = plant or understand_plant(said["plant"], stem, folder)
-    plant = plant.under_pid() if re.search(r"\bPID\b", said["wish"], re.I) else plant
+    plant = (plant or understand_plant(said["plant"], stem, folder)).sampled_for(said["wish"])
     span, there = input_range(said["range"], plant), Phrase(said["time"], "time", plant.clock).lasting()
     step, why = plant.sample_time, _reason_of_sampling(plant, there)
     hold, control = dwell(said["hold"], plant), controller(said["loop"], plant)

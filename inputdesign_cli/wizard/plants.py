@@ -98,10 +98,10 @@ class PlantAnswer:
         """Return the seconds in the unit of time."""
         return SECONDS[self.time_unit]
 
-    def under_pid(self) -> PlantAnswer:
+    def sampled_for(self, wish: str) -> PlantAnswer:
         """Return the plant sampled as fast as the derivative of a PID needs, if nothing else is known."""
         late = self.values.get("dead_time", 0.0)
-        if self.sampling is not None or not late:
+        if self.sampling is not None or not late or not re.search(r"\bPID\b", wish, re.I):
             return self
         step = min(_round_step(late / 10.0), self.sample_time)
         return replace(self, sampling=step, why_sampling="a tenth of the dead time, or less, for a PID")
