@@ -49,7 +49,8 @@ _NEXT = {
     "plant-changed": _AGAIN + "--range {half}",
     "no-accuracy-here": _EXPLORE,
     "neglected-parameter": _EXPLORE,
-    "other-minimum": "idesign solve SPEC --set signal.seed=2  # then assess both records",
+    "other-minimum": "idesign solve SPEC --set signal.seed=2 --set spectrum=null"
+    "  # a smooth spectrum, of more frequencies; then assess both records",
     # Of a frequency response without a model.
     "spiked-periods": _AGAIN + "--without ROWS",
     "drifting-periods": _AGAIN + "--detrend linear",

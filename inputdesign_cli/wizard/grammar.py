@@ -139,7 +139,7 @@ _FILLING = (
     "a an the of and with in at each all about is for by i want we it its this that there has have am are "
     "be been to my our me us on as so then please need needs would like should must may can will do does "
     "measured also tune design level temperature speed pressure flow position concentration "
-    "sensor measurement takes"
+    "sensor measurement take takes experiment"
 )
 # What no linear model has: a design for one says nothing of it.
 _NONLINEAR = (

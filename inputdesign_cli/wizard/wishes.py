@@ -54,7 +54,7 @@ STANDS = (
     r"(?:(?:held|kept)\s+)?(?:around|about|at|near)"
 )
 MOVES = (
-    r"(?:(?:i|we|it|and|which|that|may|can|could|might|should|is allowed to|be)\s+)*"
+    r"(?:(?:i|we|it|and|which|that|may|can|could|might|should|(?:is )?allowed to|be)\s+)*"
     r"(?:moved?|moves|go|goes|swings?|vary|varied|varies|changed?|changes|stepped|deviates?)"
     r"(?:\s+(?:it|by|over))*"
 )

@@ -456,6 +456,14 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     [
         ("dead time: about 2 degC/%, 3 minutes", "plant", "gain about 2 degC/%, time constant 3 minutes"),
         ("9 V nominal, +- 3 V", "range", "at 9 V, +- 3 V"),
+        ("a drive, which runs around 9 V, +- 3 V", "range", "which runs around 9 V, +- 3 V"),
+        (
+            "working around 50 % and allowed to move +-10 %",
+            "range",
+            "working around 50 %, and allowed to move +-10 %",
+        ),
+        ("weather disturbs slowly", "drift", "yes"),
+        ("the experiment may take 20 s", "time", "20 s"),
         ("it may go 15 % to either side of 40 %", "range", "by 15 % around 40 %"),
         ("gain 2 K/%. It takes about an hour", "plant", "gain 2 K/%, time constant about 1 hour"),
         (
