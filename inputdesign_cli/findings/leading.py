@@ -21,7 +21,7 @@ from inputdesign_cli.plant.model import SampledPlant
 # SPEC and options of the command that was typed are filled in where they are known, on the command line.
 _ASSESS = "idesign assess SPEC "
 _AGAIN = _ASSESS + "{logs} "
-_ALONE = _ASSESS + "{first} --output {alone}"  # where the run of all records does not stand
+_ALONE = _ASSESS + "{last} --output {alone}"  # where the run of all records does not stand
 _EXPLORE = "idesign explore {columns}{logs}"
 _NEXT = {
     # Samples that are wrong or of another system upset every test.
@@ -104,8 +104,8 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     figures = {
         "columns": data.columns_option,
         "logs": shlex.join(files),
-        "first": shlex.quote(files[0]),
-        "alone": shlex.quote(f"runs/{Path(files[0]).stem}_alone"),
+        "last": shlex.quote(files[-1]),
+        "alone": shlex.quote(f"runs/{Path(files[-1]).stem}_alone"),
         "rows": option,
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }
