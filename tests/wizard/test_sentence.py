@@ -204,7 +204,7 @@ WRITTEN = {
         "duration": 7200,
     },
     "Room heating: valve around 40 % (25 to 55 %), temperature rises approximately 1.5 K for 10 % more "
-    "valve, takes about an hour, a few minutes of delay; sensor noise 0.04 K, lasts 5 min; two days; PI": {
+    "valve, takes about an hour, delay of a few minutes; sensor noise 0.04 K, lasts 5 min; two days; PI": {
         "gain": 0.15,
         "time_constant": 3600,
         "dead_time": 210,
