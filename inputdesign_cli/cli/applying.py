@@ -40,7 +40,7 @@ def instructions(results: Results, spec: str) -> list[str]:
     if in_loop:
         has = f"has the level {levels} of the input in it" if levels else "has no level"
         said.append(
-            f"r is what the controller adds its part to, and may go further than the actuator. In signal.csv "
+            "r is what the controller adds its part to, and may go further than the actuator. In signal.csv "
             f"it {has}: while y rests, u = r. Log u as it is, level included, and r as applied."
         )
     judge = f"Then: idesign assess {shlex.quote(spec)} log.csv"

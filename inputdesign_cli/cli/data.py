@@ -40,6 +40,10 @@ def explore(
     written keeps what that one asks for. Exits with 1, and says why, where no model deserves trust.
     """
     point = ["--operating-point", operating_point] if levels(operating_point) else []
+    if point and spec is None:
+        raise typer.BadParameter(
+            "explore estimates levels itself; they are for the command that --spec names"
+        )
     if spec is not None and validate is not None:
         raise typer.BadParameter("a model that is judged needs no further spec", param_hint="--spec")
     ending = "explored" if validate is None else "validated"
@@ -52,9 +56,7 @@ def explore(
         place = place.checked(model)
         only = None if structure == "any" else structure
         asked = None if spec is None else read_spec(spec, Changes())
-        taken = rows.of(data)
-        if asked is not None:
-            taken = replace(taken, operating_point=levels(operating_point))
+        taken = replace(rows.of(data), operating_point=levels(operating_point))
         found = questions.explore(data, taken, model=model, structure=only, asked=asked)
     keep(found.results, place, shown, page=validate is None)
     if found.reasons:

@@ -86,8 +86,8 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     yield from _lines(facts(outcome, part="estimate"))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(outcome, time_unit) or _NONE).rows:
-        where = f", most at {frequency} rad/{time_unit}" if frequency else ""
-        where = ", most towards frequency zero" if frequency == "0" else where
+        places = {"": "", "0": ", most towards frequency zero"}
+        where = places.get(frequency, f", most at {frequency} rad/{time_unit}")
         verdicts.append(
             f"{name} {found}: the error with these data is {ratio} of the admissible error{where}"
         )

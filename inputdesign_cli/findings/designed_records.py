@@ -127,7 +127,7 @@ def short_windows(kind: FindingKind, seen: int, remembered: float, distance: flo
         distance: of the record from the bound, as a share.
     """
     helps = int(np.ceil(0.1 * remembered)) if np.isfinite(remembered) else None
-    fact = f"its windows hold {seen} samples, and the slowest time constant of the plant is {remembered:.3g}"
+    fact = f"the slowest time constant is {remembered:.3g} samples, and a window of the bound has {seen}"
     fact += f". A `signal.hold` of about {helps} would see it all" if helps else ""
     far = distance is not None and distance > _FAR and remembered > seen
     return kind.when(far, fact, where="signal.hold", seen=seen, hold=helps, distance=distance)

@@ -56,7 +56,9 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
-_TIMED = r"(?:dead time|delay|time constant|lag|(?:reacts?|responds?|begins?|starts?)(?: only)? after)"
+LATE = r"dead time|delay|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
+"""What is said of a dead time."""
+_TIMED = rf"(?:time constant|lag|{LATE})"
 _SOME = rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
 _FEW = re.compile(
     rf"(?P<what>\b{_TIMED}\s+(?:(?:of|is)\s+)*){_SOME}"
@@ -64,13 +66,13 @@ _FEW = re.compile(
     re.I,
 )
 _SETTLES = re.compile(
-    r"\b(?P<how>(?:settles|is settled)\s+(?:in|within|after)|settling time|rise time|"
+    r"\b(?:(?P<settled>(?:settles|is settled)\s+(?:in|within|after)|settling time)|(?P<risen>rise time)|"
     r"(?:reaches\s+)?63\s*%(?:\s+of (?:it|the way|its final value))?\s+(?:is reached\s+)?(?:in|within|after))"
     rf"{OF}\s*(?P<about>{ABOUT}\s*)?(?P<number>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
     re.I,
 )
-# Time constants in what is said of a lag: 98 % of the way, from 10 to 90 %, and 63 %.
-_LASTS = {"s": 4.0, "i": 4.0, "r": 2.2, "6": 1.0}
+# Time constants of a lag until 98 % of the way, and from 10 to 90 %.
+_SETTLED, _RISEN = 4.0, 2.2
 _OR_SO = re.compile(rf"({_DIGITS}\s*{UNIT_OF_TIME})\s+or\s+so\b", re.I)
 _SYMBOLS = {
     "k": "gain",
@@ -89,14 +91,21 @@ _HOURS_AND_MINUTES = re.compile(
     r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s+(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
 )
 _FALLS = re.compile(
-    rf"\b(?:falls?|drops?|decreases?|sinks?|cools(?: down)?|goes? down)(?: by)?\s+"
+    rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
+    re.I,
+)
+# "makes the level rise": as "the level rises" beside it.
+_LETS = re.compile(
+    r"\b((?:makes|lets|causes)\s+(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){0,2}?"
+    r"(?:rise|grow|increase|climb|go(?=es? up| up| down)|fall|drop|decrease|sink))(?=\s)",
     re.I,
 )
 _BECOMES = re.compile(
     rf"\b(?:makes?|gets?|becomes?)\s+(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){{0,2}}?(?P<about>{ABOUT}\s*)?"
     rf"(?P<size>{_DIGITS}\s*[^\s\d,;|]+)\s+"
-    r"(?:(?:warm|hott|high|fast|larg|great)er|(?P<down>(?:cold|cool|low|slow|small)er))\b",
+    r"(?:(?:warm|hott|high|larg|great)er|(?<!% )faster"
+    r"|(?P<down>(?:cold|cool|low|small)er|(?<!% )slower))\b",
     re.I,
 )
 _BETWEEN = re.compile(
@@ -215,7 +224,7 @@ class Phrase:
         if found is None:
             return None
         said = {name: (text or "").strip() for name, text in found.groupdict().items()}
-        value = self._scaled(float(said["number"]), said.get("unit", ""), kind)
+        scaled = value = self._scaled(float(said["number"]), said.get("unit", ""), kind)
         if kind in ("any", "rate"):
             value = self.sized(value, said["size"], unit)
         value = -value if said.get("less") else value  # "rises by 2 degC per 5 % less"
@@ -224,9 +233,7 @@ class Phrase:
         share = float(said["share"]) / 100.0 if said["share"] else None
         if said["share"] and not said.get("per_cent", "%"):  # of the same unit as the number
             apart = self._scaled(float(said["share"]), said.get("share_unit") or said.get("unit", ""), kind)
-            share = apart / max(
-                abs(self._scaled(float(said["number"]), said.get("unit", ""), kind)), SMALLEST
-            )
+            share = apart / max(abs(scaled), SMALLEST)
         about = re.search(ABOUT, said["words"], re.I) is not None
         return Quantity(value, share, about, said.get("size", "").strip("()"), said.get("base", ""))
 
@@ -327,6 +334,7 @@ def in_figures(text: str) -> str:
     figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
     figures = _FEW.sub(lambda found: f"{found['what'] or found['late']} {_few(found)}", figures)
+    figures = _LETS.sub(lambda found: f"{found[1]}{'es' if found[1].endswith('go') else 's'}", figures)
     figures = _BECOMES.sub(_rises, figures)
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
     figures = _OR_SO.sub(r"about \1", figures)
@@ -359,8 +367,7 @@ def _rises(found: re.Match[str]) -> str:
 
 def _time_constant(found: re.Match[str]) -> str:
     """Return the time constant of a settling time."""
-    how = found["how"].lower()
-    constants = 1.0 if "63" in how else _LASTS[how[0]]
+    constants = _SETTLED if found["settled"] else _RISEN if found["risen"] else 1.0
     return f"{float(found['number']) / constants:.4g} {found['unit']}"
 
 

@@ -28,6 +28,7 @@ _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
 _STRONGEST = 0.98  # correlation from one sample to the next
+_SAID = "the output drifts, as you said"
 _STEADY = 1e-3  # D(1) below it is that of an integrator
 _LONG = 100_000  # samples after which no pole of a log remembers anything
 
@@ -82,11 +83,7 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
             f"  standard_deviation: {short(level.deviation)}  # {why}",
             f"  correlation_time: {short(fades)}  # {colour}",
         ]
-    lines = [
-        "noise:",
-        f"  variance: {short(variance)}  # {why}",
-        *_drift(drifts, "the output drifts, as you said"),
-    ]
+    lines = ["noise:", f"  variance: {short(variance)}  # {why}", *_drift(drifts, _SAID)]
     lines += [f"  C: [1, {short(-drifting(pole))}]"] * drifts
     return lines + [f"  D: [1, {short(-pole)}]  # {colour if fades else why}"] * bool(pole)
 
@@ -122,7 +119,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
     C = [np.convolve(row, new).tolist() for row in C]
     named = [(name, rows) for name, rows in (("C", C), ("D", D)) if any(len(row) > 1 for row in rows)]
     shape = [f"  {name}: {json.dumps(rows if len(rows) > 1 else rows[0])}" for name, rows in named]
-    return [*lines, *_drift(drift), *shape]
+    return [*lines, *_drift(drift, "the log shows it" if moves else _SAID), *shape]
 
 
 def _moves(noise: Noise) -> bool:
@@ -136,7 +133,7 @@ def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
     return rows if isinstance(rows[0], Sequence) else [rows] * outputs
 
 
-def _drift(drift: Any, why: str = "the log shows it") -> list[str]:
+def _drift(drift: Any, why: str) -> list[str]:
     return [f"  drift: {json.dumps(drift)}  # an integrator in the noise: {why}"] * bool(np.any(drift))
 
 

@@ -50,7 +50,8 @@ _MIDDLE = 0.05
 IN_UNIT = r"(?:\s*(?:\bin\s+|\(\s*(?:in\s+)?)(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
 """The unit behind what moves, as in "valve in %" and "valve (%)"."""
 STANDS = (
-    r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating|now|normally|usually|currently|nominally)\s+)*"
+    r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating"
+    r"|now|normally|usually|currently|nominally)\s+)*"
     r"(?:(?:held|kept)\s+)?(?:around|about|at|near)"
 )
 MOVES = (

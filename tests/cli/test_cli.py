@@ -249,6 +249,7 @@ def test_a_sweep_reads_standard_input(monkeypatch, tmp_path):
         (["watch", "-"], ["standard input"]),
         (["explore", "-"], ["standard input"]),
         (["explore", "data.csv", "--spec", "s.yaml", "--validate", "m.yaml"], ["--spec"]),
+        (["explore", "data.csv", "--operating-point", "u1=4"], ["--spec"]),
         (["identify", "data.csv"], ["--spec", "idesign explore DATA"]),
     ],
 )

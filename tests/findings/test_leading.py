@@ -101,6 +101,7 @@ def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys)
     (folder / "a record.csv").write_text(renamed)
     (folder / "heat exchanger.yaml").write_text(f"plant: {IN_Q}{SPEC}")
     options = ["--columns", "u=valve,y=outlet", "--set", "title=a trial"]
+    options += ["--operating-point", "u1=0,y1=0"] if fault == "delay" else []
     code, out, _ = idesign("assess", folder / "heat exchanger.yaml", folder / "a record.csv", *options)
     assert code == EXIT_UNDECIDED
     printed = out.splitlines()[-1].removeprefix("next: ")
@@ -109,6 +110,7 @@ def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys)
     assert code == EXIT_DONE
     if fault == "delay":  # explore keeps what the spec asks for, and names the command that judges it
         then = out.splitlines()[-1].removeprefix("Then: ")
+        assert "--operating-point u1=0,y1=0" in then
         assert idesign(*shlex.split(then)[1:])[0] in (EXIT_DONE, EXIT_MISSED)
 
 
@@ -168,7 +170,9 @@ def led(plant, noise, *codes):
     )
     line = np.linspace(0.0, 9.0, 200)[:, None] + np.random.default_rng(0).standard_normal((200, 1))
     data = Record(np.sin(np.arange(200.0))[:, None], line, None, np.arange(200.0), (200,), (("a.csv", 200),))
-    return leading([Finding(code, REFUTED, code) for code in ("drift", *codes)], estimate, data).command
+    found = {one: {"rows": [[10, 160]]} if one == "level-shift" else {} for one in codes or ("drift",)}
+    kinds_ = [Finding(one, REFUTED, one, "", figures) for one, figures in found.items()]
+    return leading(kinds_, estimate, data).command
 
 
 LAG = "{continuous: {gain: 1, time_constant: 60}, sample: zoh}"
@@ -182,6 +186,8 @@ def test_no_command_asks_for_what_the_model_has_already():
     assert "noise.drift=true" in led(TANK, noise)
     assert led(TANK, noise.replace("}", ", drift: true}")).startswith("idesign explore")
     named = TANK.replace("{cont", "{parameters: {slope: 0.02}, cont").replace("[0.02]", "[slope]")
-    for more in ((), ("plant-structure",), ("plant-structure", "noise-structure")):
+    of_structure = ("drift", "plant-structure")
+    for more in ((), of_structure, (*of_structure, "noise-structure"), ("level-shift",)):
         assert '"plant.continuous.denominator=[1, leak]"' in led(named, noise, *more)
-    assert "leak" not in led(LAG, "{variance: 1}", "plant-structure")
+    assert "leak" not in led(LAG, "{variance: 1}", *of_structure)
+    assert "leak" not in led(LAG, "{variance: 1}", "level-shift")

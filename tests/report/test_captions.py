@@ -174,6 +174,24 @@ def test_numbers_have_their_deviations():
     assert ("std", "b1 0.1, f1 0.02", "") in facts(typed({"information": information}), "s")
 
 
+@pytest.mark.parametrize(
+    ("tests", "failed", "severity", "signs"),
+    [
+        (["trend", "delay", "u^2"], [], "note", 3),
+        (["trend", "delay", "u^2"], ["delay"], "note", 0),
+        (["trend", "delay", "u^2"], [], "refuted", 0),
+        (["recent_residuals"], [], "note", 0),
+    ],
+)
+def test_what_was_looked_for_is_said_where_nothing_speaks_against_the_model(tests, failed, severity, signs):
+    test = {"statistic": 1.0, "degrees_of_freedom": 1, "probability": 0.3}
+    found = {"theta": {"gain": 2.0}, "tests": dict.fromkeys(tests, test), "failed": failed}
+    finding = {"code": "x", "severity": severity, "message": "A finding."}
+    shown = facts(typed({"identification": found, "findings": [finding]}), part="estimate")
+    looked = [one.value.split(",") for one in shown if one.name == "tested"]
+    assert [len(one) for one in looked] == [signs] * bool(signs)
+
+
 def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command():
     found = {"verdict": "undecided", "met": False, "undecided": ["Past inputs explain residuals."]}
     found |= {"causes": ["contradicted"], "next": "idesign explore a.csv"}

@@ -84,10 +84,12 @@ class SpectrumTask(ABC):
         """
         samples, quantisers = record.samples, self.record.bounds.quantisers
         found = [*findings, *level_rounded(quantisers, float(np.abs(samples).max()))]
-        if experiment.loop is not None and "amplitude.input" in (signal.of_limits or {}):
+        peaks = signal.input_peak if "amplitude.input" in (signal.of_limits or {}) else None
+        if experiment.loop is not None and peaks is not None:
             within = min(len(samples), _LONG)
-            noise = experiment.loop.input_deviation(experiment.noise_colouring, within)
-            found += noise_moves_input(noise, signal.input_peak or ())
+            found += noise_moves_input(
+                experiment.loop.input_deviation(experiment.noise_colouring, within), peaks
+            )
         if np.isfinite(record.worst_ratio):
             growth = growth_by_start(experiment, samples, self.record.step, requirements)
             if growth > 1.0 + _MATTERS:
