@@ -41,9 +41,8 @@ def explore(
     """
     point = ["--operating-point", operating_point] if levels(operating_point) else []
     if point and spec is None:
-        raise typer.BadParameter(
-            "explore estimates levels itself; they are for the command that --spec names"
-        )
+        message = "it goes with --spec, whose next command takes it: explore estimates levels itself"
+        raise typer.BadParameter(message, param_hint="--operating-point")
     if spec is not None and validate is not None:
         raise typer.BadParameter("a model that is judged needs no further spec", param_hint="--spec")
     ending = "explored" if validate is None else "validated"

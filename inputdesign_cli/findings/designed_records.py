@@ -170,7 +170,10 @@ def noise_moves_input(kind: FindingKind, deviations: Array, peaks: Sequence[floa
         peaks: (r,) of the inputs without noise.
     """
     beside = list(enumerate(zip(deviations.tolist(), peaks, strict=True), start=1))
-    fact = ", ".join(f"u{j} {size:.3g} (standard deviation) beside {peak:.3g}" for j, (size, peak) in beside)
+    fact = " and ".join(
+        f"{size:.3g} to u{j}, whose peak is {peak:.3g} without it" for j, (size, peak) in beside
+    )
+    fact = f"it adds a standard deviation of {fact}"
     seen = any(size > _SEEN * peak for _, (size, peak) in beside)
     return kind.when(seen, fact, where="limits.amplitude", deviations=deviations.tolist())
 

@@ -13,7 +13,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
 from inputdesign_cli.finding import Finding, undecided
 from inputdesign_cli.findings.places import Record
-from inputdesign_cli.findings.refuted_structure import DRIFT, leaking, remedies_of
+from inputdesign_cli.findings.refuted_structure import DRIFT, drifting, leaking
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.plant.model import SampledPlant
@@ -93,7 +93,8 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     if estimate is not None and ((drifts and (own or first.code == "plant-structure")) or shifts):
         # Past inputs, or a shift of most of a record, explain what a leak takes away.
         if leaks := _leaking(estimate, data.time):
-            alike, command = drifts or [_drift_of(estimate)], leaks
+            model = estimate.search.records.kind.model
+            alike, command = drifts or [drifting(model, "its level shifts for most of the record")], leaks
         elif own and _drifts(estimate):
             command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
@@ -126,12 +127,6 @@ def _leaking(estimate: Estimate, time: Array) -> str:
         f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
         f'--set "plant.continuous.denominator={denominator}"  # it may leak'
     )
-
-
-def _drift_of(estimate: Estimate) -> Finding:
-    """Return the finding of a drift where a shift of most of a record stands for one."""
-    remedy = remedies_of(estimate.search.records.kind.model)["drift"]
-    return DRIFT.found("most of a record shifts", remedy=f"{remedy[:1].upper()}{remedy[1:]}.", where="y")
 
 
 def _drifts(estimate: Estimate) -> bool:

@@ -151,7 +151,7 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
         if test is not None:
             lag = "" if fault == "drift" else f", most at lag {test.lag}"
             fact = f"probability {chance(test.probability)} by chance{lag}{_where(model, test)}"
-            remedy = f"{remedies[fault][:1].upper()}{remedies[fault][1:]}{_LONG * (fault == 'plant')}."
+            remedy = _sentence(f"{remedies[fault]}{_LONG * (fault == 'plant')}")
             p = test.probability
             found.append(kind.found(fact, where=test.name, remedy=remedy, probability=p, lag=test.lag))
     for test in failing:
@@ -161,6 +161,15 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
             fact += f"; nearly the same on these data: {', '.join(others)}" if others else ""
             found.append(OF_ONE[test.fault].found(fact, where=test.name, probability=test.probability))
     return found
+
+
+def drifting(model: Model, fact: str) -> Finding:
+    """Return the finding that an output drifts, with the remedy for this model."""
+    return DRIFT.found(fact, where="y", remedy=_sentence(remedies_of(model)["drift"]))
+
+
+def _sentence(advice: str) -> str:
+    return f"{advice[:1].upper()}{advice[1:]}."
 
 
 def _where(model: Model, test: ScoreTest) -> str:

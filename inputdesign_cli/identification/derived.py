@@ -89,13 +89,13 @@ class Derived(Kind):
         return errors, psi if here is None else np.tensordot(here.jacobian, psi, axes=(0, 0))
 
     def _by_coefficients(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array]:
-        """Return prediction errors (N, p) from rest, and psi (K, N, p) by the coefficients."""
+        """Return errors (N, p) from rest, and minus their derivatives (K, N, p) by the coefficients."""
         errors, psi = self.plant.errors_and_gradient(self._of_plant(theta), u, y)
         noise = self._noise(theta)
         return (errors, psi) if noise is None else _coloured(noise, errors, psi)
 
     def leaks(self, theta: Array, u: Array, y: Array) -> Array:
-        """Return psi (m, N, p) by the coefficients that are known to be zero because the plant integrates."""
+        """Return the derivatives by the constant terms of denominators that are known to be zero."""
         if self.by is None:
             return super().leaks(theta, u, y)
         held = ~np.any(self.by.moves[: self._first], axis=1) & (self._of_plant(theta) == 0.0)

@@ -147,7 +147,10 @@ class Kind(ABC):
         """
 
     def leaks(self, theta: Array, u: Array, y: Array) -> Array:
-        """Return psi (m, N, p) by leaks of integrators, which a model does without if it knows its pole."""
+        """Return minus the derivatives (m, N, p) of the errors by the leaks of integrators, from rest.
+
+        They belong to poles that are known to be zero, so that no parameter of the model is a leak.
+        """
         return np.zeros((0, *y.shape))
 
     def extensions(self, theta: Array, *, feedback: bool) -> list[Extension]:

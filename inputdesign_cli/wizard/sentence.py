@@ -190,9 +190,9 @@ def _of_the_wish(wish: str, text: str) -> list[str]:
     """Return remarks on how a wish is taken where the text says less than that."""
     found = []
     if wish.count("parameters within") > len(re.findall(r"\bparameters\b", text, re.I)):
-        found.append("the smallest of these shares is asked of every parameter")
+        found.append("every parameter is to be known within the smallest per cent that was named")
     if re.search(r"\bKp\b", wish, re.I) and not re.search(r"\bown\b|\bmy\b", text, re.I):
-        found.append("the margin is asked of the loop with the Kp that was named, as it is")
+        found.append("the loop that is to keep the margin has the Kp that was named; no rule tunes it")
     return found
 
 

@@ -143,7 +143,7 @@ def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dic
 
 
 def _drives(name: str, span: Range) -> bool:
-    """Return whether a name is that of an input: what moves, or a valve and no measurement."""
+    """Return whether a name is that of an input: of what the range names, or of a drive such as a valve."""
     called = name.lower() == span.name.lower() or re.fullmatch(ACTUATOR, name, re.I) is not None
     return called and re.fullmatch(SIGNAL, name, re.I) is None
 
