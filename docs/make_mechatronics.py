@@ -81,7 +81,7 @@ Met: exit code 0. The controller settings follow from the gain and time constant
 
 ![what the model explains of the record](images/mechatronics_fit.png)
 
-For a flexible axis see [wizard.md](wizard.md#a-flexible-axis-and-its-controller).
+For a flexible axis see [wizard.md](wizard.md#limits).
 """
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 _ANNOUNCED = defaultdict[str, set[str]](set)
 # The kinds of this package, in the form of entry points.
@@ -33,15 +33,10 @@ def own(group: str) -> dict[str, EntryPoint]:
     return {name: EntryPoint(name, value, group) for name, value in _OWN[group].items()}
 
 
+@cache
 def points(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group in all packages that are installed, by name."""
-    return {point.name: point for point in installed().select(group=group)}
-
-
-@cache
-def installed() -> EntryPoints:
-    """Return all entry points: to look through the packages takes as long for one group as for all."""
-    return entry_points()
+    return {point.name: point for point in entry_points(group=group)}
 
 
 def names(group: str) -> set[str]:

@@ -189,10 +189,10 @@ def schroeder_chirp(tmp_path, monkeypatch):
     named = f"schroeder_chirp = {module}:KIND\nlost_chirp = {module}:LOST\n"
     (about / "entry_points.txt").write_text(f"[idesign.signals]\n{named}")
     monkeypatch.syspath_prepend(tmp_path)
-    plugins.installed.cache_clear()
+    plugins.points.cache_clear()
     yield
     monkeypatch.undo()
-    plugins.installed.cache_clear()
+    plugins.points.cache_clear()
 
 
 def chirp_spec():

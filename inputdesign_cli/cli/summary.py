@@ -82,11 +82,13 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     """Yield the estimate with its standard deviations, and each requirement with what the data reach."""
     estimate = estimate_table(outcome)
     if estimate:
-        yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
+        rivals = outcome.identification is not None and outcome.identification.rivals
+        listed = ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
+        yield "estimate", listed + "   (or other parameters, below)" * bool(rivals)
     yield from _lines(facts(outcome, part="estimate"))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(outcome, time_unit) or _NONE).rows:
-        places = {"": "", "0": ", most towards frequency zero"}
+        places = {"": "", "0": ", most at the lowest frequencies"}
         where = places.get(frequency, f", most at {frequency} rad/{time_unit}")
         verdicts.append(
             f"{name} {found}: the error with these data is {ratio} of the admissible error{where}"

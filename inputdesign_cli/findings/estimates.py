@@ -92,7 +92,7 @@ def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Find
         return []
     remedy = kind.remedy
     if levels:
-        remedy = "The record does not begin at rest, levels of --operating-point are not exact, or it drifts."
+        remedy = "The record does not begin at rest, or levels of --operating-point are not exact."
     if not estimate.start.rest_refuted:
         return [] if levels else [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
@@ -132,7 +132,7 @@ def near_zero(kind: FindingKind, model: Model, estimate: Estimate) -> list[Findi
     delays = model.dead_times[vague]
     for physical, remedy in (
         (True, "The data hardly determine it. Take more of them, or list what is known in plant.known."),
-        (False, "An order may be too high."),
+        (False, "Nothing need be done: a polynomial of one order less may do as well."),
     ):
         listed = ", ".join(estimate.names[k] for k in vague[~delays] if quantity[k] == physical)
         found += kind.when(listed, listed, where=listed, remedy=remedy)

@@ -170,7 +170,8 @@ def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
         why = f"a twentieth of the time constant of {short(plant.slow)} {unit}, or a little less"
     if there < LEAST * plant.sample_time:
         few = f"{short(there)} {unit} are less than {LEAST} samples, one every {step} {unit}"
-        raise bad_answer("time", f"{few} ({why})")
+        least = short(LEAST * plant.sample_time)
+        raise bad_answer("time", f"{few} ({why}); {least} {unit} are needed at least")
     return why
 
 
@@ -291,10 +292,12 @@ class Conversation:
         try:
             if asked.key == asking.UNCLEAR:
                 return self._in_other_words(text, key, asked)
-            heard = in_sentence(text) if key == "plant" else Heard({})
+            heard = in_sentence(text, least=1) if key == "plant" else Heard({})
+            if len(heard.answers) == 1 and key not in heard.answers:
+                heard = Heard({})  # the answer to another question
         except IdesignError as refusal:
             return refusal
-        self._brief = self._brief or bool(heard.answers)
+        self._brief = self._brief or bool(heard.answers.keys() - {"plant"})
         self.remarks += heard.remarks
         self.unclear += heard.unclear
         before = self._refused.get(key)

@@ -108,12 +108,18 @@ _BECOMES = re.compile(
     r"|(?P<down>(?:cold|cool|low|small)er|(?<!% )slower))\b",
     re.I,
 )
-_BETWEEN = re.compile(
-    rf"\b(?P<what>{_TIMED})\s+(?:(?:of|is|between|from|somewhere|{ABOUT})\s+)*"
-    rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
-    re.I,
+_ENDS = rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})"
+# "dead time 3 to 6 min", and "3 to 6 min of dead time".
+_BETWEEN = tuple(
+    re.compile(pattern, re.I)
+    for pattern in (
+        rf"\b(?P<what>{_TIMED})\s+(?:(?:of|is|between|from|somewhere|{ABOUT})\s+)*{_ENDS}",
+        rf"{ALONE}{_ENDS}\s+(?:of\s+)?(?P<what>{_TIMED})\b",
+    )
 )
-_SPOKEN = re.compile(rf"\b({'|'.join(_COUNTED)})\s+(?={UNIT_OF_TIME})", re.I)
+_SPOKEN = re.compile(
+    rf"\b({'|'.join(_COUNTED)})\s+(?=(?:{UNIT_OF_TIME}|(?:more\s+)?(?:volts?|per ?cent)\b))", re.I
+)
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
 _SETTING = rf"{OF}{NUMBER}(?:\s*(?:ms|s|sec|min|h)\b)?"
@@ -131,6 +137,14 @@ _RATE = rf"(?:\s*{_SIZE})?(?:\s*(?:per|/)\s*{_TIME})?"
 _BASE = (
     rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
     rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
+)
+# "10 % more valve gives about 1.5 degC": a gain.
+_GIVES = re.compile(
+    rf"{ALONE}(?:(?P<many>{_DIGITS})\s+more\s+(?P<unit>[^\s\d,;|]+)|(?P<per>{_DIGITS}\s*(?!{UNIT_OF_TIME}){_UNIT}+))"
+    rf"(?:\s+(?:more|of|the|{DRIVE})\b)*\s+(?:gives?|makes?|brings?|causes?|means?)\s+"
+    rf"(?P<about>(?:{ABOUT}\s*)?)(?P<size>{_DIGITS}\s*[^\s\d,;|]+)"
+    rf"(?P<rate>\s+per\s+{UNIT_OF_TIME})?(?:\s+(?:more|(?P<less>less))\b)?",
+    re.I,
 )
 # What stands behind the number of each kind.
 _BEHIND = {
@@ -341,7 +355,9 @@ def in_figures(text: str) -> str:
     figures = _SETTLES.sub(
         lambda found: f"time constant {found['about'] or ''}{_time_constant(found)}", figures
     )
-    figures = _BETWEEN.sub(_middle, figures)
+    for between in _BETWEEN:
+        figures = between.sub(_middle, figures)
+    figures = _GIVES.sub(_gain, figures)
     return _FALLS.sub(r"rises by \g<about>-", figures)
 
 
@@ -363,6 +379,14 @@ def _few(found: re.Match[str]) -> str:
 def _rises(found: re.Match[str]) -> str:
     """Return a change of an output as a rise, as in "makes the room 1.5 degC warmer"."""
     return f"rises by {found['about'] or ''}{'-' if found['down'] else ''}{found['size']}"
+
+
+def _gain(found: re.Match[str]) -> str:
+    """Return what a move of the input gives as a gain, or as a slope."""
+    per = found["per"] or f"{found['many']} {found['unit']}"
+    what = "rises by" if found["rate"] else "gain"
+    size = f"{found['about']}{'-' if found['less'] else ''}{found['size']}"
+    return f"{what} {size}{found['rate'] or ''} per {per}"
 
 
 def _time_constant(found: re.Match[str]) -> str:

@@ -36,7 +36,7 @@ _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 # What is left is asked for again if it has a number or a negation, or words whose number is missing.
 _MATTERS = re.compile(
-    r"\d|n't\b|\b(?:not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
+    r"\d|^one\b|n't\b|\b(?:two|three|four|five|six|eight|ten|twelve|twenty|thirty|not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
     r"invers\w*|clos(?:e|es|ed|ing)|shut\w*|reduc\w*|less(?! is)|unstable|off|manual|slower|faster|times|"
     r"factor|accura\w*|uncertain\w*|guess\w*|total|overall|upwards?|downwards?|PRBS|binary|weekend|overnight|"
     r"dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
@@ -112,7 +112,9 @@ def _expanded(pattern: str) -> str:
 def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
     """Return the patterns of times behind a gain, of times that are named, and of a dead time."""
     time = r"(?:<ABOUT>\s*)?(?:<NUMBER>\s*(?:to|-|–)\s*)?<AMOUNT>(?=\s*(?:[,;.]|$|(?:and|after|with|but)\b))"
-    joined = r"(?:\s+more(?:\s+<DRIVE>)?)?[,;.]?\s+(?:(?:and|after|within|in|with|it|takes|slowly,?)\s+)*"
+    joined = (
+        r"(?:\s+more(?:\s+<DRIVE>)?)?[,;.]?\s+(?:(?:and|after|within|in|with|it|that|takes|slowly,?)\s+)*"
+    )
     gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
     times = (
         rf"(?:{gain})<UNIT>{joined}(?P<lag>{time})(?:[,;]\s+(?:(?:and|after|with|but)\s+)*(?P<late>{time}))?"
@@ -209,7 +211,9 @@ def not_understood(part: str) -> SpecError:
 
 
 def spread(answers: Answers, sentence: str | None = None) -> bool:
-    """Add what a sentence says to answers, of which none is replaced; return whether it says anything.
+    """Add what a sentence says to answers, of which none is replaced.
+
+    Return whether it says more than what the plant is.
 
     Without a sentence the answer on the plant may be one.
 
@@ -218,7 +222,7 @@ def spread(answers: Answers, sentence: str | None = None) -> bool:
     """
     known = sentence is not None and "plant" in answers.texts
     with answers.located():
-        heard = in_sentence(sentence or answers.texts.get("plant", ""), least=1 if known else 2)
+        heard = in_sentence(sentence or answers.texts.get("plant", ""), least=1)
     if sentence is not None and not heard.answers:
         if known:
             raise bad_answer("wish", f'"{sentence}" is not understood')
@@ -231,4 +235,4 @@ def spread(answers: Answers, sentence: str | None = None) -> bool:
     for key, text in heard.answers.items():
         if answers.texts.setdefault(key, text) is text and "plant" in answers.places:
             answers.places[key] = answers.places["plant"]
-    return bool(heard.answers)
+    return bool(heard.answers.keys() - {"plant"})

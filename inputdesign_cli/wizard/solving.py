@@ -5,7 +5,8 @@ Every number is that of a design that was computed. `templates/verdict.txt` has 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -22,6 +23,7 @@ _LIMITS = {"rate": "the rate", "amplitude.output": "the output"}
 _ROOM, _TRIES = 1.1, 3
 _LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
+_OF_NOISE = re.compile(r"[cd]\d+(?:\[\d+\])?")  # parameters that nobody has named
 
 
 def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> list[str]:
@@ -68,8 +70,19 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
 
 
 def _said(part: str, facts: Mapping[str, object], clock: float = 1.0) -> list[str]:
-    filters = {"lasting": lambda time: lasting(time * clock), "decibels": decibels}
+    filters: dict[str, Callable[..., str]] = {
+        "lasting": lambda time: lasting(time * clock),
+        "decibels": decibels,
+        "listed": _listed,
+    }
     return sentences("inputdesign_cli.wizard", "verdict.txt", part, facts, filters)
+
+
+def _listed(parameters: Mapping[str, float]) -> str:
+    """Write the parameters of a plant, and leave out its noise."""
+    return ", ".join(
+        f"{name} {value:.3g}" for name, value in parameters.items() if not _OF_NOISE.fullmatch(name)
+    )
 
 
 def _scatter(result: Result) -> float:

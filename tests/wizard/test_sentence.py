@@ -488,6 +488,21 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("1 h 30 min", "time", "90 min"),
         ("to know the gain within 3 %", "wish", "parameters within 3 %"),
         ("1 min test", "time", "1 min"),
+        (
+            "one volt more gives about 20 rad/s more, 0.3-0.5 s time constant",
+            "plant",
+            "gain about 20 rad/s per 1 volt, time constant 0.4 s within 25 %",
+        ),
+        (
+            "10 % more radiator valve gives about 1.5 degC, that takes about an hour",
+            "plant",
+            "gain about 1.5 degC per 10 %, time constant about 1 hour",
+        ),
+        ("one more volt gives 2 rad/s less", "plant", "gain -2 rad/s per 1 volt"),
+        ("10 % give 5 cm per minute more", "plant", "rises by 5 cm per minute per 10 %"),
+        ("No controller runs now", "loop", "open"),
+        ("There is no controller yet", "loop", "open"),
+        ("Experiment in open loop", "loop", "open"),
     ],
 )
 def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
@@ -582,6 +597,22 @@ def test_what_is_left_out_is_said_back(tmp_path):
 def test_an_operating_point_that_is_said_twice_is_one():
     assert input_range("+-3 V around 9 V, at 9 V") == input_range("9 V +- 3 V")
     assert code_of(input_range, "+-3 V around 9 V, at 10 V") == "bad-answer"
+
+
+def test_the_question_of_the_plant_takes_what_a_sentence_may_say(tmp_path):
+    talk = Conversation({}, "x", tmp_path)
+    assert talk.answer("about 1.5 degC per 10 %, about an hour, dead time a few minutes") is None
+    assert plant_of_words(talk.answers["plant"]).values == pytest.approx(
+        {"gain": 0.15, "time_constant": 3600.0, "dead_time": 210.0}
+    )
+    assert not any(one.key in talk.answers for one in QUESTIONS if one.key != "plant")
+    assert talk.question.key == "wish"
+
+
+def test_a_sentence_may_leave_the_plant_open():
+    answers = read_answers(None, [])
+    assert spread(answers, "PI temperature loop with a safe margin")
+    assert set(answers.texts) == {"wish"}
 
 
 def test_a_plant_that_lacks_a_quantity_is_completed(tmp_path):

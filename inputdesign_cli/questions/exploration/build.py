@@ -120,7 +120,7 @@ def spec_text(
     else:
         comments = {key: comments[key] for key in ("title", "plant", "noise")}
         if asked.drifts and "drift" not in blocks["noise"]:
-            comments["noise"].append("The given spec lets the noise drift. In this record it does not.")
+            comments["noise"].append("The given spec lets the noise drift. This record shows no sign of it.")
         comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
     sections = {
         "title": f"{_DOUBTED * bool(reasons)}The next experiment after {source}",
