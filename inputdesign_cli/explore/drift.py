@@ -76,7 +76,7 @@ def _line(parts: Parts, known: bool) -> float:
 
 def _gain(loss: float, less: float, samples: int) -> float:
     """Return twice the log likelihood ratio of two mean squares of white residuals: chi-squared by chance."""
-    return samples * float(np.log(loss / max(less, 1e-300)))
+    return samples * float(np.log(max(loss, 1e-300) / max(less, 1e-300)))
 
 
 def levelled(parts: Parts, slopes: Array) -> list[tuple[Array, Array]]:

@@ -20,7 +20,7 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import Parts, output_error_form
 from inputdesign_cli.identification import ScoreTest
-from inputdesign_cli.identification.checks import check_varying
+from inputdesign_cli.identification.checks import check_noisy, check_varying
 from inputdesign_cli.plant import Model
 
 _LAGS, _AHEAD, _PER_LAG, _PER_INPUT = 20, 8, 12, 10
@@ -65,6 +65,27 @@ def answers_output(parts: Parts) -> list[tuple[int, float]]:
         0.0 if j in laws else min(_by_chance(own, more, x), at_once[j]) for j, x in enumerate(targets.T)
     ]
     return [(j, probability) for j, probability in enumerate(chances) if probability < _CERTAIN]
+
+
+def check_unpredictable(parts: Parts) -> None:
+    """Check that no output follows to rounding from past outputs and inputs, a level and a line.
+
+    Raises:
+        SpecError: `noise-free-data`.
+    """
+    lags = _lags(parts)
+    long = [part for part in _centred(parts, 3 * lags) if np.ptp(part[1])]
+    if not long:
+        return
+    rows, targets = (
+        [
+            np.column_stack([past(y, lags), past(u, lags), np.ones(len(y) - lags), np.arange(len(y) - lags)])
+            for u, y in long
+        ],
+        [y[lags:] for _, y in long],
+    )
+    errors = np.concatenate(residuals(rows, targets))
+    check_noisy(np.diag(np.mean(errors**2, axis=0)), np.concatenate(targets))
 
 
 def only_answers(parts: Parts) -> list[int]:

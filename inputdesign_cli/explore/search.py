@@ -45,6 +45,7 @@ from inputdesign_cli.plant import Model
 # An error of simulation that is larger by less than this factor, or these points, is as good, if it
 # explains almost as much of the variance of the output.
 _AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
+_WORST_ERROR = 1e6  # per cent; beyond this a fit says nothing
 # The largest deviation of a parameter of the plant, in shares of its value.
 _UNCERTAIN = 0.5
 # What a parameter must take off the variance of prediction errors, however long the record is; and what
@@ -153,7 +154,7 @@ def ranked(
     In closed loop the input depends on the noise, so that a wrong plant may simulate the output better than
     the right one. Prediction errors are free of this bias ([ljung-1999], Section 13.4): they alone count.
     """
-    error = min(100.0 - c.validation for c in usable)
+    error = min(_WORST_ERROR, *(100.0 - c.validation for c in usable))
     most, explained = max(_AS_GOOD * error, error + _POINTS), 1e4 - error**2
 
     def is_good(c: Candidate) -> bool:

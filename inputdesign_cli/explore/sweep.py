@@ -282,8 +282,9 @@ def delay_ranges(
         losses = {}
         for delay in range(max(chosen - _BESIDE, least), min(chosen + _BESIDE, most) + 1):
             delays = (*model.delays[:j], delay, *model.delays[j + 1 :])
-            losses[delay] = Regressed(parts, model.order).output_error(delays, model.F, _POLISH).loss
-        smallest = max(min(losses.values(), default=1.0), 1e-300)
+            left = Regressed(parts, model.order).output_error(delays, model.F, _POLISH).loss
+            losses[delay] = max(left, 1e-300)
+        smallest = min(losses.values(), default=1.0)
         kept = [d for d, loss in losses.items() if samples * np.log(loss / smallest) <= limit]
         found.append((min(*kept, chosen, other), max(*kept, chosen, other)))
     return tuple(found)

@@ -48,7 +48,8 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
         tried = []
         for c, d in _ORDERS:
             C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
-            criterion = v.size * np.log(np.mean(filtered(D, C, v) ** 2)) + (c + d) * np.log(v.size)
+            power = max(float(np.mean(filtered(D, C, v) ** 2)), 1e-300)
+            criterion = v.size * np.log(power) + (c + d) * np.log(v.size)
             tried.append((float(criterion), (C, D)))
         best.append(min(tried, key=lambda one: one[0])[1])
         largest.append(tried[-1][1])
@@ -72,7 +73,8 @@ class Whitening:
             # Squares of orders that nest, from one triangle.
             triangle = np.linalg.qr(np.column_stack([past, v]))[1]
             left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
-            order = int(np.argmin(v.size * np.log(left[: most + 1]) + orders * np.log(v.size)))
+            left = np.maximum(left[: most + 1], 1e-300)
+            order = int(np.argmin(v.size * np.log(left) + orders * np.log(v.size)))
             ahead = scipy.linalg.solve_triangular(triangle[:order, :order], triangle[:order, -1])
             found.append(reflected(np.append(1.0, -ahead)))
         return cls(tuple(found), lengths)

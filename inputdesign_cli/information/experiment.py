@@ -112,6 +112,11 @@ class Experiment:
         """Return poles of all densities below, as points frequency + j damping of the frequency plane."""
         return self._source.singularities
 
+    @cached_property
+    def of_records(self) -> dict[tuple[object, ...], Array]:
+        """Return what the last records that were evaluated add to the information, by their samples."""
+        return {}
+
     @property
     def slowest(self) -> float:
         """Return the slowest time constant of plant or loop, in samples or time units; 0 without one.

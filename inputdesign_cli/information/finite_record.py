@@ -18,6 +18,8 @@ _FORGOTTEN = 32.0
 _LONGEST_MEMORY = 2**20
 # A longer memory than this many records is weighted down instead; rounding grows to e^8 of itself.
 _RECORDS = 4
+# A delivered record is evaluated for its search, its accuracy, its curves and its start.
+_RECENT = 4
 _FREQUENCIES_AT_ONCE = 16384
 # Frequency responses of more numbers than this are computed anew for each record.
 _KEPT = 2**22
@@ -232,9 +234,14 @@ class FiniteRecord:
         return self.experiment.baseline_information + share * self._excited(record)
 
     def _excited(self, record: Array) -> Array:
-        psi = self.gradient(record)
-        flat = psi.swapaxes(-3, -2).reshape(*record.shape[:-2], self.experiment.size, -1)
-        return np.asarray(flat @ flat.swapaxes(-2, -1))
+        known, key = self.experiment.of_records, (self.step, record.shape, record.tobytes())
+        if key not in known:
+            psi = self.gradient(record)
+            flat = psi.swapaxes(-3, -2).reshape(*record.shape[:-2], self.experiment.size, -1)
+            while len(known) >= _RECENT:
+                del known[next(iter(known))]
+            known[key] = np.asarray(flat @ flat.swapaxes(-2, -1))
+        return known[key]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
         """Return psi (.., n, k, p) from rest, in these coordinates, noise whitened to I."""

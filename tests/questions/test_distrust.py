@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.explore import explore_structure
 from inputdesign_cli.findings.frequency_responses import contradicted
 from inputdesign_cli.identification import frequency_response
@@ -17,6 +18,7 @@ from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.exploration.build import _inside
 from inputdesign_cli.specification import parse_spec
 from tests.support.loops import LAWS, loop
+from tests.support.refusals import code_of
 
 
 def stored(path, u, y, names="u,y"):
@@ -94,6 +96,30 @@ LOGS = {
     "of an input that is a share of the output": (a_share, "input-only-answers"),
     "of a steady sinusoid": (a_sinusoid, "excitation-too-simple"),
 }
+
+
+STEPS = np.repeat(np.random.default_rng(5).choice([-1.0, 0.0, 1.0, 2.0], 20), 12)
+
+
+@pytest.mark.parametrize(
+    "y",
+    [
+        scipy.signal.lfilter([0, 0.2], [1, -0.8], STEPS),
+        scipy.signal.lfilter([0, 0.2], [1, -0.8], STEPS) + 0.01 * np.arange(STEPS.size),
+        scipy.signal.lfilter([0, 0, 0, 1], [1, -1.8, 0.95], STEPS),
+        np.r_[np.zeros(3), STEPS[:-3]],
+    ],
+)
+def test_a_simulation_without_noise_is_refused(y, tmp_path):
+    assert code_of(explore, stored(tmp_path / "log.csv", STEPS, y), kind=DataError) == "noise-free-data"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("samples", [60, 120, 200, 240])
+def test_a_static_gain_without_noise_ends_in_an_answer(samples, tmp_path):
+    """Which of the two is the input no regression shows."""
+    found = explore(stored(tmp_path / "log.csv", STEPS[:samples], 2.0 * STEPS[:samples]))
+    assert "input-only-answers" in [one.code for one in found.results.outcome.findings]
 
 
 @pytest.mark.slow

@@ -12,7 +12,16 @@ from typing import cast
 import numpy as np
 
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.explore import Family, Fits, Found, answers_output, explore_records, fits, levelled
+from inputdesign_cli.explore import (
+    Family,
+    Fits,
+    Found,
+    answers_output,
+    check_unpredictable,
+    explore_records,
+    fits,
+    levelled,
+)
 from inputdesign_cli.findings.explored_logs import (
     DRIVE,
     HALF,
@@ -80,6 +89,7 @@ def explore(
         asked.check_unit(log.time_unit)
     looped = bool(loops := answers_output(log.parts))
     with blaming_columns(paths[0], log):
+        check_unpredictable(log.parts)
         try:
             log, found = explored_beside_shifts(log, loop=looped, only=only)
         except SpecError as error:
