@@ -75,7 +75,7 @@ def check_unpredictable(parts: Parts) -> None:
     """
     lags = _lags(parts)
     long = [part for part in _centred(parts, 3 * lags) if np.ptp(part[1])]
-    if not long:
+    if sum(len(y) for _, y in parts) < _FEWEST_SAMPLES or not long:
         return
     rows, targets = (
         [
