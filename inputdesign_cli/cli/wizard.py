@@ -42,7 +42,7 @@ def wizard(
     line an answer; KEY=TEXT answers a question out of turn. The middle of the range is the operating point:
     `idesign assess` takes it as --operating-point. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import needed_of, read_answers
+    from inputdesign_cli.wizard.questions import needed_of, read_answers, taken_for_granted
     from inputdesign_cli.wizard.sentence import not_understood, spread
 
     if answers is not None and output.exists() and output.samefile(answers):
@@ -69,7 +69,8 @@ def wizard(
         if draft is None:
             if said.unclear:
                 raise not_understood(said.unclear[0])
-            draft = compose(said.texts, output.stem, output.parent, remarks=said.remarks)
+            remarks = [*said.remarks, *taken_for_granted(said.texts)] if brief else said.remarks
+            draft = compose(said.texts, output.stem, output.parent, remarks=remarks)
             draft.validate()
         draft = with_spectrum(draft, _result)
         write_text(output, draft.text)

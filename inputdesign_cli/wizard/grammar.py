@@ -26,7 +26,7 @@ ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly
 OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
 WITHIN = (
     rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS})"
-    rf"(?:(?P<per_cent>{_PER_CENT})|(?:\s*(?P<share_unit>ms|s|sec|min|h)\b)?"
+    rf"(?:(?P<per_cent>{_PER_CENT}(?P<itself>\s+itself\b)?)|(?:\s*(?P<share_unit>ms|s|sec|min|h)\b)?"
     r"(?=\s*(?:[,;.:|)]|$|(?:and|with)\b))))?"
 )
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
@@ -108,7 +108,7 @@ _BECOMES = re.compile(
     r"|(?P<down>(?:cold|cool|low|small)er|(?<!% )slower))\b",
     re.I,
 )
-_ENDS = rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})"
+_ENDS = rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–|\.\.+)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})"
 # "dead time 3 to 6 min", and "3 to 6 min of dead time".
 _BETWEEN = tuple(
     re.compile(pattern, re.I)
@@ -118,7 +118,9 @@ _BETWEEN = tuple(
     )
 )
 _SPOKEN = re.compile(
-    rf"\b({'|'.join(_COUNTED)})\s+(?=(?:{UNIT_OF_TIME}|(?:more\s+)?(?:volts?|per ?cent)\b))", re.I
+    rf"\b({'|'.join(_COUNTED)})\s+"
+    rf"(?=(?:{UNIT_OF_TIME}|(?:more\s+)?(?:volts?|per ?cent|degrees?|rad/s|bar)\b))",
+    re.I,
 )
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
@@ -137,6 +139,22 @@ _RATE = rf"(?:\s*{_SIZE})?(?:\s*(?:per|/)\s*{_TIME})?"
 _BASE = (
     rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
     rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
+)
+_RISE = (
+    rf"(?:rises|grows|increases|climbs|goes up|warms|heats|raises|changes)(?:\s+(?:by|with))?\s+"
+    rf"(?:{ABOUT}\s*)?-?{_DIGITS}\s*[^\s\d,;|]+"
+)
+# "goes up 0.5 cm in 1 minute", "for each % the level rises by 2 cm"; "the speed rises by 2 rad/s" is a size.
+_IN_ONE = re.compile(rf"\b({_RISE})\s+(?:in|every|each)\s+(?:1\s+)?({UNIT_OF_TIME})", re.I)
+_EACH = re.compile(
+    rf"\bfor\s+(?:each|every)\s+(?P<per>[^\s\d,;|]+)(?:\s+(?:more|of|the|{DRIVE})\b)*,?\s+"
+    rf"(?P<rise>(?:(?:the|my|our|it|its)\s+)?(?:[a-z]+\s+){{0,2}}?{_RISE}(?:\s+per\s+{UNIT_OF_TIME})?)",
+    re.I,
+)
+_OF_SPEED = re.compile(
+    rf"\b(?P<what>(?:angle|position|speed|velocity|flow)\s+)?(?:rises|grows|increases|climbs|goes up|changes)"
+    rf"(?:\s+(?:by|with))?\s+(?P<size>(?:{ABOUT}\s*)?-?{_DIGITS}\s*(?P<unit>[^\s\d,;|/]+)/[a-z]+)(?=\s+per\b|\s*/)",
+    re.I,
 )
 # "10 % more valve gives about 1.5 degC": a gain.
 _GIVES = re.compile(
@@ -199,6 +217,7 @@ class Quantity:
     value: float
     share: float | None = None  # "within 30 %"
     about: bool = False
+    itself: bool = False  # the share is of this value alone, as that of a tolerance with a unit
     size: str = ""  # the unit of what is measured
     base: str = ""  # what a gain is per
 
@@ -249,7 +268,8 @@ class Phrase:
             apart = self._scaled(float(said["share"]), said.get("share_unit") or said.get("unit", ""), kind)
             share = apart / max(abs(scaled), SMALLEST)
         about = re.search(ABOUT, said["words"], re.I) is not None
-        return Quantity(value, share, about, said.get("size", "").strip("()"), said.get("base", ""))
+        itself = share is not None and bool(said.get("itself") or not said.get("per_cent", "%"))
+        return Quantity(value, share, about, itself, said.get("size", "").strip("()"), said.get("base", ""))
 
     def after(
         self, words: str, kind: str = "any", *, named: bool = False, unit: str | None = None
@@ -340,7 +360,7 @@ def check_numbers(text: str, key: str) -> None:
 def in_figures(text: str) -> str:
     """Return a text with "0.1 second" for "a tenth of a second", and "rises by -2" for "falls by 2".
 
-    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 %", "an hour" becomes "1 hour", and
+    "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 % itself", "an hour" becomes "1 hour", and
     "T = 3 s" becomes "time constant 3 s".
     """
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
@@ -357,8 +377,10 @@ def in_figures(text: str) -> str:
     )
     for between in _BETWEEN:
         figures = between.sub(_middle, figures)
-    figures = _GIVES.sub(_gain, figures)
-    return _FALLS.sub(r"rises by \g<about>-", figures)
+    figures = _FALLS.sub(r"rises by \g<about>-", _GIVES.sub(_gain, figures))
+    figures = _IN_ONE.sub(r"\1 per \2", figures)
+    figures = _EACH.sub(r"\g<rise> per 1 \g<per>", figures)
+    return _OF_SPEED.sub(_size_of_a_speed, figures)
 
 
 def vague_times(text: str) -> list[str]:
@@ -389,6 +411,13 @@ def _gain(found: re.Match[str]) -> str:
     return f"{what} {size}{found['rate'] or ''} per {per}"
 
 
+def _size_of_a_speed(found: re.Match[str]) -> str:
+    """Return a change of a speed or a flow, whose unit has a time, as a gain: it is no ramp."""
+    what, unit = (found["what"] or "").strip().lower(), found["unit"].lower()
+    ramp = what in ("angle", "position") or (not what and unit not in ("rad", "deg", "°", "rev"))
+    return found[0] if ramp else f"gain {found['size']}"
+
+
 def _time_constant(found: re.Match[str]) -> str:
     """Return the time constant of a settling time."""
     constants = _SETTLED if found["settled"] else _RISEN if found["risen"] else 1.0
@@ -401,7 +430,7 @@ def _middle(found: re.Match[str]) -> str:
     if not 0.0 < one < other:
         return found[0]
     share = 100.0 * (other - one) / (other + one)
-    return f"{found['what']} {0.5 * (one + other):g} {found['unit']} within {share:.3g} %"
+    return f"{found['what']} {0.5 * (one + other):g} {found['unit']} within {share:.3g} % itself"
 
 
 def unread(text: str) -> list[str]:

@@ -21,10 +21,14 @@ from inputdesign_cli.wizard.plants import PlantAnswer, unit_of_time
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
 _CHANGES = r"(?:fad|chang|var[yi]|wander)\w*"
-_LASTING = rf"{_CHANGES}(?: slowly)?(?: in| within| over)?|correlation time|lasts|slow(?:ly)?"
+_LASTING = (
+    rf"{_CHANGES}(?: slowly)?(?: in| within| over)?|(?:with (?:an? )?)?(?:correlation time|memory)|lasts"
+    r"|slow(?:ly)?"
+)
 _SLOWLY = rf"\b(?:{_CHANGES} )?slow(?:ly)?\b(?: {_CHANGES})?"
 _FADING = 0.2  # of the time constant of the plant: how long noise lasts of which nothing is said
 _SAME_STEP = 0.01  # of rows and samples
+_DEVIATION = "(?:(?:noise )?(?:standard deviation|deviation|std|rms|sigma)|noise)"
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
 _STRONGEST = 0.98  # correlation from one sample to the next
@@ -160,7 +164,7 @@ def _stated(text: str, folder: Path, plant: PlantAnswer) -> _Level:
     slow = fades is None and said.take(_SLOWLY) is not None
     fades = max(plant.slow, WHITE * step) if slow else fades
     rounding = _resolution(said)
-    deviation = said.after(rf"(?:standard deviation|deviation|std|rms|noise)(?:\s*{PLUS_MINUS})?", named=True)
+    deviation = said.after(rf"{_DEVIATION}(?:\s*{PLUS_MINUS})?", named=True)
     if deviation is None and not re.fullmatch(rf"\s*{NUMBER}\s*", text):
         deviation = said.number(rf"^[\s|]*{NUMBER}({UNIT})")
     said_both = {"the standard deviation": deviation, "the resolution": rounding}

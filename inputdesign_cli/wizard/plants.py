@@ -169,7 +169,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     if values.get("dead_time", 0.0) < 0.0:
         raise bad_answer("plant", "the dead time is negative")
     vague = [name for name in values if name not in own and (whole or found[name].about)]
-    if part is None and len(own) == 1 and list(own) == list(values)[-1:] and not vague:
+    if part is None and list(own) == list(values)[-1:] and not vague and not found[list(values)[-1]].itself:
         part, own = own.popitem()[1], {}  # a share at the end is that of all quantities
     shares = own if part is None else dict.fromkeys(values, part) | own
     if not all(0.0 < share < 0.9 for share in shares.values()):

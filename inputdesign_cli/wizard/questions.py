@@ -74,6 +74,12 @@ def needed_of(answers: Mapping[str, str]) -> list[str]:
     return [one.key for one in QUESTIONS if one.default is None and one.key not in there]
 
 
+def taken_for_granted(answers: Mapping[str, str]) -> list[str]:
+    """Return a remark on the questions that a sentence leaves open and nobody was asked."""
+    unsaid = [f"{one.key} {one.default}" for one in QUESTIONS if one.always and one.key not in answers]
+    return [f"nobody said otherwise: {', '.join(unsaid)}"] if unsaid else []
+
+
 def complete(answers: Mapping[str, str]) -> dict[str, str]:
     """Return the answers, with defaults where none is given.
 

@@ -20,7 +20,7 @@ from inputdesign_cli.wizard.grammar import (
     unread,
     vague_times,
 )
-from inputdesign_cli.wizard.questions import Answers, bad_answer, question
+from inputdesign_cli.wizard.questions import KEYS, Answers, bad_answer, question
 
 _TURNS = (
     *("loop", "wish", "drift", "noise", "plant", "hold", "signals"),
@@ -171,6 +171,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     unclear = [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
+    beside = [part for part in beside if part.lower() not in " ".join(answers.values()).lower()]
     for word in [part for part in beside if re.fullmatch(grammar.ABOUT, part, re.I)]:
         beside.remove(word)
         if "plant" in answers:  # "gain 2, time constant 3 min, roughly"
@@ -206,8 +207,9 @@ def _taken(piece: re.Match[str]) -> str:
 
 
 def not_understood(part: str) -> SpecError:
-    """Return the error about a part of a sentence."""
-    return bad_answer("plant", f'"{part}" is not understood')
+    """Return the error about a part of a sentence, with the question that it names."""
+    named = (key for key in KEYS if re.search(rf"\b{key}\b", part, re.I))
+    return bad_answer(next(named, "plant"), f'"{part}" is not understood')
 
 
 def spread(answers: Answers, sentence: str | None = None) -> bool:

@@ -473,7 +473,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ),
         ("the valve (in %) sits at 40 %, +- 5 %", "range", "the valve (in %) sits at 40 %, +- 5 %"),
         ("gain 2, time constant 40 s, roughly", "plant", "gain 2, time constant 40 s, roughly"),
-        ("gain 2, reacts after a few s", "plant", "gain 2, reacts after 3.5 s within 42.9 %"),
+        ("gain 2, reacts after a few s", "plant", "gain 2, reacts after 3.5 s within 42.9 % itself"),
         ("10 % more makes the room about 1.5 degC warmer", "plant", "rises by about 1.5 degC per 10 %"),
         ("10 % more gets the water 1.5 degC colder", "plant", "rises by -1.5 degC per 10 %"),
         ("with 6 dB gain margin", "wish", "gain margin 6 dB"),
@@ -491,7 +491,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         (
             "one volt more gives about 20 rad/s more, 0.3-0.5 s time constant",
             "plant",
-            "gain about 20 rad/s per 1 volt, time constant 0.4 s within 25 %",
+            "gain about 20 rad/s per 1 volt, time constant 0.4 s within 25 % itself",
         ),
         (
             "10 % more radiator valve gives about 1.5 degC, that takes about an hour",
@@ -503,6 +503,16 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("No controller runs now", "loop", "open"),
         ("There is no controller yet", "loop", "open"),
         ("Experiment in open loop", "loop", "open"),
+        ("For each volt the speed rises by 20 rad/s", "plant", "gain 20 rad/s per 1 volt"),
+        ("The speed rises by 20 rad/s per V", "plant", "gain 20 rad/s per V"),
+        ("the angle rises by 2 rad/s per V", "plant", "rises by 2 rad/s per V"),
+        (
+            "level goes up 0.5 cm in a minute for each % of valve",
+            "plant",
+            "level goes up 0.5 cm per minute for each % of valve",
+        ),
+        ("gain 2, delay 2..4 minutes", "plant", "gain 2, delay 3 minutes within 33.3 % itself"),
+        ("PI for the level in a tank; level in cm", "names", "level in cm"),
     ],
 )
 def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
@@ -566,6 +576,24 @@ def test_words_that_matter_are_asked_for(part):
 def test_a_tolerance_has_a_unit_of_its_own(apart):
     found = plant_of_words(f"gain 2, time constant 40 min, dead time 3 min +- {apart}")
     assert found.intervals["dead_time"] == pytest.approx((150.0, 210.0), rel=1e-5)
+
+
+@pytest.mark.parametrize("last", ["dead time 2 to 4 min", "dead time 3 min +- 1 min", "2-4 min dead time"])
+def test_a_tolerance_of_one_quantity_is_no_tolerance_of_all(last):
+    found = plant_of_words(f"gain 2, time constant 40 min, {last}")
+    assert set(found.intervals) == {"dead_time"}
+    both = plant_of_words("gain 2, time constant 40 min, dead time 3 min, within 10 %")
+    assert set(both.intervals) == {"gain", "time_constant", "dead_time"}
+
+
+@pytest.mark.parametrize(
+    "noise", ["noise half a rad/s", "sensor noise sigma 0.5 rad/s", "noise 0.5 rad/s with a memory of 2 s"]
+)
+def test_words_of_noise(noise, tmp_path):
+    text = "PI loop with 6 dB, gain 20 rad/s per V, time constant 3 s, 9 +- 3 V, 10 min"
+    draft = heard(f"{text}, {noise}", tmp_path, *["no"] * 3)
+    assert "standard_deviation: 0.5 " in draft.text
+    assert ("correlation_time: 2 " in draft.text) == ("memory" in noise)
 
 
 def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
