@@ -89,7 +89,6 @@ def explore(
         asked.check_unit(log.time_unit)
     looped = bool(loops := answers_output(log.parts))
     with blaming_columns(paths[0], log):
-        check_unpredictable(log.parts)
         try:
             log, found = explored_beside_shifts(log, loop=looped, only=only)
         except SpecError as error:
@@ -147,6 +146,7 @@ def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = Non
     def found_in(part: Record, only: Family | None = only) -> Found:
         return explore_records(part.parts, feedback=loop, step=part.step, ramp=part.lined, only=only)
 
+    check_unpredictable(log.parts)
     whole = rest = log
     first = found = found_in(log)
     if only is None and found.estimate.tests.shifted and len(found.integrates) == found.model.outputs:
