@@ -47,6 +47,6 @@ def instructions(results: Results, spec: str) -> list[str]:
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-        rest = f"REST: the mean of {' and '.join(outputs)} over a while at rest, before signal.csv begins"
-        judge += f" --operating-point {point}   ({rest})"
+        means = f"REST: the mean of {' and '.join(outputs)} at rest, before signal.csv begins"
+        judge += f" --operating-point {point}   ({means}, or else of the first rows)"
     return [*said, judge]

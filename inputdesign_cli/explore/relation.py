@@ -68,7 +68,7 @@ def answers_output(parts: Parts) -> list[tuple[int, float]]:
 
 
 def check_unpredictable(parts: Parts) -> None:
-    """Check that no output follows to rounding from past outputs and inputs, a level and a line.
+    """Check that past outputs and inputs, a level and a line do not predict an output to the last digit.
 
     Raises:
         SpecError: `noise-free-data`.
@@ -77,13 +77,12 @@ def check_unpredictable(parts: Parts) -> None:
     long = [part for part in _centred(parts, 3 * lags) if np.ptp(part[1])]
     if sum(len(y) for _, y in parts) < _FEWEST_SAMPLES or not long:
         return
-    rows, targets = (
-        [
-            np.column_stack([past(y, lags), past(u, lags), np.ones(len(y) - lags), np.arange(len(y) - lags)])
-            for u, y in long
-        ],
-        [y[lags:] for _, y in long],
-    )
+    targets = [y[lags:] for _, y in long]
+    lines = [np.column_stack([np.ones(len(y)), np.arange(len(y))]) for y in targets]
+    rows = [
+        np.column_stack([past(y, lags), past(u, lags), line])
+        for (u, y), line in zip(long, lines, strict=True)
+    ]
     errors = np.concatenate(residuals(rows, targets))
     check_noisy(np.diag(np.mean(errors**2, axis=0)), np.concatenate(targets))
 

@@ -99,16 +99,22 @@ def other_minima(
     doubtful = beyond(model, estimate, errors or unstated, information)
     decides = beyond(model, estimate, errors) if errors else doubtful
     undecided = {id(one.rival) for one in decides}
-    return [
-        kind.found(
-            f"{_values(estimate, one.rival)}, {_higher(one.rival)}, with another G ({_far(units, one)})",
-            severity=UNDECIDED if id(one.rival) in undecided else DOUBT,
-            ratio=one.ratio,
-            measure=one.measure,
-            excess=one.rival.excess,
+    found = []
+    for one in [*decides, *(one for one in doubtful if id(one.rival) not in undecided)]:
+        matters = id(one.rival) in undecided
+        fact = f"{_values(estimate, one.rival)}, {_higher(one.rival)}, with another G ({_far(units, one)})"
+        if errors and not matters:
+            fact += ", a difference within the admissible error"
+        found.append(
+            kind.found(
+                fact,
+                severity=UNDECIDED if matters else DOUBT,
+                ratio=one.ratio,
+                measure=one.measure,
+                excess=one.rival.excess,
+            )
         )
-        for one in [*decides, *(one for one in doubtful if id(one.rival) not in undecided)]
-    ]
+    return found
 
 
 @finding(NOTE, "minimum-ruled-out", "Check whether `uncertainty` is right.")

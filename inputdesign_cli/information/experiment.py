@@ -113,8 +113,8 @@ class Experiment:
         return self._source.singularities
 
     @cached_property
-    def of_records(self) -> dict[tuple[object, ...], Array]:
-        """Return what the last records that were evaluated add to the information, by their samples."""
+    def evaluated(self) -> dict[tuple[object, ...], Array]:
+        """Return a memory, empty at first, of the information of records, by their digests."""
         return {}
 
     @property

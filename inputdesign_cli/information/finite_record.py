@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -234,13 +235,16 @@ class FiniteRecord:
         return self.experiment.baseline_information + share * self._excited(record)
 
     def _excited(self, record: Array) -> Array:
-        known, key = self.experiment.of_records, (self.step, record.shape, record.tobytes())
+        """Return the sum over time of psi psi^T, which the experiment remembers of its last records."""
+        digest = hashlib.sha256(np.ascontiguousarray(record).data).digest()
+        known, key = self.experiment.evaluated, (self.samples, self.step, record.shape, digest)
         if key not in known:
             psi = self.gradient(record)
             flat = psi.swapaxes(-3, -2).reshape(*record.shape[:-2], self.experiment.size, -1)
             while len(known) >= _RECENT:
                 del known[next(iter(known))]
             known[key] = np.asarray(flat @ flat.swapaxes(-2, -1))
+            known[key].flags.writeable = False
         return known[key]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:

@@ -68,7 +68,7 @@ _FEW = re.compile(
 _SETTLES = re.compile(
     r"\b(?:(?P<settled>(?:settles|is settled)\s+(?:in|within|after)|settling time)|(?P<risen>rise time)|"
     r"(?:reaches\s+)?63\s*%(?:\s+of (?:it|the way|its final value))?\s+(?:is reached\s+)?(?:in|within|after))"
-    rf"{OF}\s*(?P<about>{ABOUT}\s*)?(?P<number>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
+    rf"(?P<of>{OF})\s*(?P<number>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
     re.I,
 )
 # Time constants of a lag until 98 % of the way, and from 10 to 90 %.
@@ -86,6 +86,9 @@ _MINUS = re.compile(
     r"(?<!plus/)(?<!plus or )(?<!plus and )(?<!plus )\b"
     r"(?:(?P<gain>negative gain)(?: of)?|minus|negative(?: of)?)\s+(?=[\d.])",
     re.I,
+)
+_SCATTER = re.compile(
+    rf"\b(?P<what>noise|standard deviation|deviation|std|rms|sigma)\s*{PLUS_MINUS}\s*(?P<size>[\d.]+)", re.I
 )
 _HOURS_AND_MINUTES = re.compile(
     r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s+(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
@@ -140,8 +143,10 @@ _BASE = (
     rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
     rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
 )
+UP = "rises|grows|increases|climbs|goes up|warms|heats|raises"
+"""What an output does that moves upwards."""
 _RISE = (
-    rf"(?:rises|grows|increases|climbs|goes up|warms|heats|raises|changes)(?:\s+(?:by|with))?\s+"
+    rf"(?:{UP}|changes)(?:\s+(?:by|with))?\s+"
     rf"(?:{ABOUT}\s*)?-?{_DIGITS}\s*[^\s\d,;|]+"
 )
 # "goes up 0.5 cm in 1 minute", "for each % the level rises by 2 cm"; "the speed rises by 2 rad/s" is a size.
@@ -152,7 +157,7 @@ _EACH = re.compile(
     re.I,
 )
 _OF_SPEED = re.compile(
-    rf"\b(?P<what>(?:angle|position|speed|velocity|flow)\s+)?(?:rises|grows|increases|climbs|goes up|changes)"
+    rf"\b(?P<what>(?:angle|position|speed|velocity|flow)\s+)?(?:{UP}|changes)"
     rf"(?:\s+(?:by|with))?\s+(?P<size>(?:{ABOUT}\s*)?-?{_DIGITS}\s*(?P<unit>[^\s\d,;|/]+)/[a-z]+)(?=\s+per\b|\s*/)",
     re.I,
 )
@@ -364,6 +369,7 @@ def in_figures(text: str) -> str:
     "T = 3 s" becomes "time constant 3 s".
     """
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
+    figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
     figures = _MINUS.sub(lambda found: "gain -" if found["gain"] else "-", figures)
     figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
@@ -373,7 +379,7 @@ def in_figures(text: str) -> str:
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
     figures = _OR_SO.sub(r"about \1", figures)
     figures = _SETTLES.sub(
-        lambda found: f"time constant {found['about'] or ''}{_time_constant(found)}", figures
+        lambda found: f"time constant {'about ' * _vague(found['of'])}{_time_constant(found)}", figures
     )
     for between in _BETWEEN:
         figures = between.sub(_middle, figures)
@@ -383,13 +389,23 @@ def in_figures(text: str) -> str:
     return _OF_SPEED.sub(_size_of_a_speed, figures)
 
 
-def vague_times(text: str) -> list[str]:
-    """Return how "a few minutes" and "settles in 2 s" are taken, for each time in a text that is said so."""
+def taken_as(text: str) -> list[str]:
+    """Return how "a few minutes", "settles in 2 s", "noise +- 2" and "9 V gives 18 K" in a text are taken."""
     return [
         *(f'"a few {one["unit"] or one["of"]}" is taken as {_few(one)}' for one in _FEW.finditer(text)),
         *(
             f'"{one[0]}" is taken as a time constant of {_time_constant(one)}'
             for one in _SETTLES.finditer(text)
+        ),
+        *(
+            f'"{one[0]}" is taken as a standard deviation of {one["size"]}'
+            for one in _SCATTER.finditer(text)
+            if one["what"].lower() == "noise"
+        ),
+        *(
+            f'"{one[0]}" is taken as the effect of a change of {one["per"]}'
+            for one in _GIVES.finditer(text)
+            if not re.search(r"\b(?:more|less)\b", one[0], re.I)
         ),
     ]
 
@@ -416,6 +432,10 @@ def _size_of_a_speed(found: re.Match[str]) -> str:
     what, unit = (found["what"] or "").strip().lower(), found["unit"].lower()
     ramp = what in ("angle", "position") or (not what and unit not in ("rad", "deg", "°", "rev"))
     return found[0] if ramp else f"gain {found['size']}"
+
+
+def _vague(text: str) -> bool:
+    return re.search(ABOUT, text, re.I) is not None
 
 
 def _time_constant(found: re.Match[str]) -> str:

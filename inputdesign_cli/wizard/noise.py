@@ -16,7 +16,7 @@ from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
 from inputdesign_cli.specification.fading_noise import DRIFT_STEP, WHITE, discrete, drifting
 from inputdesign_cli.specification.models.units import SECONDS
-from inputdesign_cli.wizard.grammar import NUMBER, PLUS_MINUS, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import NUMBER, UNIT, Phrase, needed, short
 from inputdesign_cli.wizard.plants import PlantAnswer, unit_of_time
 from inputdesign_cli.wizard.questions import AS_LOGGED, bad_answer, chosen, file_of, in_their_words
 
@@ -164,7 +164,7 @@ def _stated(text: str, folder: Path, plant: PlantAnswer) -> _Level:
     slow = fades is None and said.take(_SLOWLY) is not None
     fades = max(plant.slow, WHITE * step) if slow else fades
     rounding = _resolution(said)
-    deviation = said.after(rf"{_DEVIATION}(?:\s*{PLUS_MINUS})?", named=True)
+    deviation = said.after(_DEVIATION, named=True)
     if deviation is None and not re.fullmatch(rf"\s*{NUMBER}\s*", text):
         deviation = said.number(rf"^[\s|]*{NUMBER}({UNIT})")
     said_both = {"the standard deviation": deviation, "the resolution": rounding}

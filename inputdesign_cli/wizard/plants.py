@@ -20,7 +20,7 @@ from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.units import SECONDS
-from inputdesign_cli.wizard.grammar import ABOUT, LATE, SIGNAL, VAGUE, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import ABOUT, LATE, SIGNAL, UP, VAGUE, Phrase, needed, short
 from inputdesign_cli.wizard.questions import bad_answer, file_of, in_their_words, package_data
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _NONE: Mapping[str, float] = MappingProxyType({})
 _WHAT = rf"(?:(?:the )?(?:{SIGNAL}|room|tank|water))"
 RISES = (
-    rf"(?:{_WHAT} )?(?:rises|grows|increases|climbs|goes up|warms|heats|raises"
+    rf"(?:{_WHAT} )?(?:{UP}"
     rf"|(?:reacts|responds|changes)(?= (?:by|with)\b|\s*{ABOUT}))(?: {_WHAT})?(?: by| with)?"
 )
 # Names of what is said of a plant -> words, and the kind of unit. What rises in a time integrates.

@@ -17,8 +17,8 @@ from inputdesign_cli.wizard.grammar import (
     check_numbers,
     in_figures,
     orders,
+    taken_as,
     unread,
-    vague_times,
 )
 from inputdesign_cli.wizard.questions import KEYS, Answers, bad_answer, question
 
@@ -36,7 +36,8 @@ _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 # What is left is asked for again if it has a number or a negation, or words whose number is missing.
 _MATTERS = re.compile(
-    r"\d|^one\b|n't\b|\b(?:two|three|four|five|six|eight|ten|twelve|twenty|thirty|not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
+    r"\d|^one\b|n't\b|\b(?:two|three|four|five|six|eight|ten|twelve|twenty|thirty|"
+    r"not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
     r"invers\w*|clos(?:e|es|ed|ing)|shut\w*|reduc\w*|less(?! is)|unstable|off|manual|slower|faster|times|"
     r"factor|accura\w*|uncertain\w*|guess\w*|total|overall|upwards?|downwards?|PRBS|binary|weekend|overnight|"
     r"dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
@@ -178,7 +179,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
             answers["plant"] += f", {word}"
     remarks = [
         *named,
-        *vague_times(text),
+        *taken_as(text),
         *beyond_models(text),
         *([f"nothing follows from: {', '.join(beside)}"] if beside else []),
     ]

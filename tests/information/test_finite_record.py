@@ -156,6 +156,19 @@ def test_several_records_answer_as_each_does_alone(model):
         np.testing.assert_allclose(answer(records), alone, atol=1e-12 * np.abs(alone).max())
 
 
+def test_an_experiment_remembers_no_record_for_another():
+    """Whatever was evaluated before, and though samples change in place, as an experiment that is new."""
+    experiment, draw = Experiment(arx(), 120).whitened(1.0), np.random.default_rng(6)
+    records = [draw.normal(size=(120, 1)) for _ in range(7)]
+    for record in [*records, records[0], records[5]]:
+        for plant in (experiment, experiment.with_samples(60)):
+            for change in (1.0, -2.0):
+                record *= change
+                known = FiniteRecord(plant, 120).information(record)
+                fresh = FiniteRecord(dataclasses.replace(plant), 120).information(record)
+                np.testing.assert_array_equal(known, fresh)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_difference_equations_and_transforms_agree(seed):
     """Open and closed loops of one channel: signals, their adjoints and gradients, two ways."""

@@ -10,7 +10,7 @@ from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.wizard.composing import Conversation, compose
 from inputdesign_cli.wizard.grammar import Phrase
 from inputdesign_cli.wizard.plants import plant_of_words
-from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
+from inputdesign_cli.wizard.questions import QUESTIONS, read_answers, taken_for_granted
 from inputdesign_cli.wizard.sentence import in_sentence, not_understood, spread
 from inputdesign_cli.wizard.wishes import input_range
 from tests.support.refusals import code_of
@@ -511,6 +511,8 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
             "plant",
             "level goes up 0.5 cm per minute for each % of valve",
         ),
+        ("gain 2, lag 3 s; experiment 20 s", "time", "20 s"),
+        ("a drive with dry friction, working at 9 V", "range", "working at 9 V"),
         ("gain 2, delay 2..4 minutes", "plant", "gain 2, delay 3 minutes within 33.3 % itself"),
         ("PI for the level in a tank; level in cm", "names", "level in cm"),
     ],
@@ -586,8 +588,26 @@ def test_a_tolerance_of_one_quantity_is_no_tolerance_of_all(last):
     assert set(both.intervals) == {"gain", "time_constant", "dead_time"}
 
 
+def test_what_nobody_was_asked_is_said():
+    (said,) = taken_for_granted({"hold": "60 s"})
+    assert [one.key for one in QUESTIONS if f" {one.key} " in said] == ["time", "converter", "return"]
+    assert taken_for_granted({"hold": "no", "time": "2 h", "converter": "no", "return": "no"}) == []
+
+
+@pytest.mark.parametrize("lag", ["settles in about 4 h", "time constant about 1 h"])
+def test_a_time_in_which_it_settles_may_be_vague(lag):
+    assert plant_of_words(f"gain 2, {lag}").intervals["time_constant"] == pytest.approx((2880.0, 4320.0))
+
+
 @pytest.mark.parametrize(
-    "noise", ["noise half a rad/s", "sensor noise sigma 0.5 rad/s", "noise 0.5 rad/s with a memory of 2 s"]
+    "noise",
+    [
+        "noise half a rad/s",
+        "sensor noise sigma 0.5 rad/s",
+        "noise 0.5 rad/s with a memory of 2 s",
+        "noise +- 0.5 rad/s",
+        "standard deviation +- 0.5 rad/s",
+    ],
 )
 def test_words_of_noise(noise, tmp_path):
     text = "PI loop with 6 dB, gain 20 rad/s per V, time constant 3 s, 9 +- 3 V, 10 min"
