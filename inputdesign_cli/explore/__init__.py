@@ -13,6 +13,7 @@ from inputdesign_cli.explore.relation import (
     answers_output as answers_output,
     check_unpredictable as check_unpredictable,
     early_answers as early_answers,
+    exact_multiple as exact_multiple,
     left_of_inputs as left_of_inputs,
     like_answers as like_answers,
     only_answers as only_answers,

@@ -184,12 +184,13 @@ def _estimated(
         plant, deviations = model.in_plant, np.sqrt(np.diag(estimate.covariance))
         if steady and certain(model.theta[plant], deviations[plant], model.dead_times[plant], step):
             return made[-1][1:]
-    if made:
-        return min(made, key=lambda one: one[0])[1:]
+    if stable := [one for one in made if not one[0][1]]:  # no spec holds an unstable plant without its loop
+        return min(stable, key=lambda one: one[0])[1:]
     raise reason or bad_spec(
         "no-structure",
         "no stable model explains the record",
-        hint="record it in a loop, or remove the drift: --detrend linear",
+        hint="record it in a loop; remove a drift (--detrend linear); or is it an integrator: --structure "
+        "integrator",
         key="y",
     )
 

@@ -107,6 +107,18 @@ def only_answers(parts: Parts) -> list[int]:
     return found
 
 
+def exact_multiple(parts: Parts, j: int) -> tuple[int, float] | None:
+    """Return the output i and the factor with which u_j(t) = factor y_i(t) but for a level; None: no such."""
+    long = _centred(parts, 1)
+    u, outputs = (np.concatenate(signals) for signals in zip(*long, strict=True))
+    for i, y in enumerate(outputs.T):
+        factor = float(u[:, j] @ y) / max(float(y @ y), 1e-300)
+        left = u[:, j] - factor * y
+        if float(left @ left) <= _FOLLOWS * float(u[:, j] @ u[:, j]):
+            return i, factor
+    return None
+
+
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
     """Return for each input the probability, by chance, that it answers y(t) between jumps of its own.
 

@@ -8,6 +8,7 @@ from inputdesign_cli.explore import (
     Found,
     Parts,
     by_chance,
+    exact_multiple,
     left_of_inputs,
     like_answers,
     only_answers,
@@ -47,14 +48,25 @@ def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
     """
     moving = [(u[:, found.moving], y) for u, y in parts]
     inverses = [] if loop else _inverses(found, moving)
-    return [*undriven(parts), *inverses, *(_too_simple(found, moving) or _open(found))]
+    return [*inverses, *(_too_simple(found, moving) or _open(found))]
 
 
 @finding(DOUBT, "input-only-answers", "Move the reference of the loop, or add dither to the input.")
 def undriven(kind: FindingKind, parts: Parts) -> list[Finding]:
     """An input follows from the outputs alone. The inverse of the controller explains the data as well."""
-    names = [signal_name("u", j, parts[0][0].shape[1]) for j in only_answers(parts)]
-    return [kind.found(f"{name}, and the plant is not identifiable", where=name) for name in names]
+    inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
+    found = []
+    for j in only_answers(parts):
+        name = signal_name("u", j, inputs)
+        fact = f"{name}, and the plant is not identifiable"
+        if same := exact_multiple(parts, j):
+            output, factor = signal_name("y", same[0], outputs), same[1]
+            fact = (
+                f"{name} is {factor:.4g} {output} in every row, but for a level. A proportional controller "
+                "has a reference at rest, or one column was computed from the other"
+            )
+        found.append(kind.found(fact, where=name))
+    return found
 
 
 @finding(DOUBT, "like-inverse-controller", "Move the reference of the loop, or add dither to the input.")
@@ -155,6 +167,11 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
             f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone. The inputs "
             f"hardly act, or by more than {chosen.swept.most} samples later"
         )
+        if found.wanders[i]:
+            fact = (
+                f"{output} wanders, and the inputs do not help to predict it from sample to sample. That the "
+                f"simulation explains {fit:.1f} % may be chance"
+            )
         doubtful += kind.when(little, fact, where=output, fit_percent=fit, chance_percent=luck)
     return doubtful
 

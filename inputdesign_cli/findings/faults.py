@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
+from inputdesign_cli.findings.outlying_values import visible_step
 from inputdesign_cli.findings.places import SHOWN, Record, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
@@ -19,6 +20,8 @@ from inputdesign_cli.plant import TransferMatrix
 
 # Share of samples above which a frozen sensor biases a model; fit (%) below which spikes do.
 _BIASING, _HALF = 0.02, 50.0
+# The error that rounding may leave in a level, as a share of the deviation of the output.
+_ROUNDED_OFF = 0.03
 # Moves of inputs up to so many samples before explain spikes, if they leave less than this share of squares.
 _BEFORE, _LEFT = 6, 0.25
 
@@ -33,6 +36,13 @@ FROZEN = refuted(
     "An output stands still while the input moves. It keeps its value for longer than rounding explains. "
     "The sensor is frozen or saturated, or the logger repeats its last value.",
     "Leave these rows out with `--without`, which cuts the record there.",
+)
+
+COARSE = refuted(
+    "sensor-too-coarse",
+    "The steps of a sensor decide what is measured. The noise is too small beside a step to even rounding "
+    "out, so that the error follows the output.",
+    "Log with more digits, or let the output move over many more steps.",
 )
 
 
@@ -68,6 +78,33 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
         remedy = f"Leave these rows out, which cuts the record there: {option}."
         span = [[first, last] for _, first, last in rows]
         found.append(FROZEN.found(fact, where=name, remedy=remedy, samples=still, rows=span, option=option))
+    return [*found, *_coarse(units, estimate, data)]
+
+
+def _coarse(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
+    """Return a finding for each output whose noise does not even out the steps of its sensor.
+
+    Gaussian noise of deviation s in front of steps d leaves an error of at most (d / pi) exp(-2 (pi s / d)^2)
+    in a level that is held ([widrow-kollar-2008]).
+    """
+    if data.recorded is None:
+        return []
+    found = []
+    for output, simulated in enumerate(estimate.simulation.outputs.T):
+        y = data.recorded.values[:, data.u.shape[1] + output]
+        step, spread = visible_step(y), float(np.std(y))
+        if not step:
+            continue
+        left = float(np.var(data.y[:, output] - simulated))
+        noise = float(np.sqrt(max(left - step**2 / 12.0, 0.0)))
+        error = step / np.pi * float(np.exp(-2.0 * (np.pi * noise / step) ** 2))
+        name = _named(units, output)
+        fact = (
+            f"{name} in steps of {step:.3g}, and noise of about {noise:.2g}. Levels may be wrong by "
+            f"{error:.2g}, {100.0 * error / spread:.2g} % of the deviation of {name}"
+        )
+        off = error > _ROUNDED_OFF * spread
+        found += COARSE.when(off, fact, where=name, step=step, noise=noise, error=error)
     return found
 
 
@@ -94,7 +131,8 @@ def biasing(units: Units, estimate: Estimate, data: Record, fitted: Sequence[flo
     return [
         one
         for one in faults(units, estimate, data)
-        if (fits[one.where] < _HALF if one.code == SPIKES.code else one.where in long)
+        if one.code == COARSE.code
+        or (fits[one.where] < _HALF if one.code == SPIKES.code else one.where in long)
     ]
 
 

@@ -29,6 +29,7 @@ _NEXT = {
     "columns-misaligned": _EXPLORE,
     "sensor-stands-still": _AGAIN + "{rows}",
     "spikes": _AGAIN + "{rows}",
+    "sensor-too-coarse": "idesign solve SPEC  # and apply it with larger moves, or log with more digits",
     "input-logged-late": _EXPLORE,
     "input-answers-output": _AGAIN
     + '--set "experiment.controller={{numerator: [..], denominator: [..]}}"  # the controller of the loop',

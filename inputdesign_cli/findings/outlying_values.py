@@ -32,7 +32,7 @@ SENSOR_SATURATED = note(
 SENSOR_ROUNDED = note(
     "sensor-rounded",
     "An output moves in visible steps. All values lie on a grid whose step exceeds a tenth of the standard "
-    "deviation. Rounding acts as noise.",
+    "deviation. Rounding acts as noise, if the noise is no smaller than half a step.",
     "Log with more digits, or excite with larger moves.",
 )
 
@@ -131,14 +131,21 @@ def sensor_limits(name: str, x: Array) -> list[Finding]:
         if levels.size > _FEW_LEVELS and stays > _CLIPPED * x.size:
             fact = f"{name} at its {word} value {value:.6g} for {stays} samples"
             found.append(SENSOR_SATURATED.found(fact, where=name, value=value, samples=stays))
-    gaps = np.diff(levels)
-    step = float(gaps.min(initial=np.inf))
-    # Values that are not rounded hardly come again.
-    visible = _COARSE * spread < step < np.inf and 2 * levels.size < x.size
-    if visible and np.all(np.abs(gaps / step - np.round(gaps / step)) < _OFF_GRID):
+    step = visible_step(x)
+    if step:
         fact = f"{name} in steps of {step:.3g}, {step / spread:.2f} of its standard deviation"
         found.append(SENSOR_ROUNDED.found(fact, where=name, step=step, share=step / spread))
     return found
+
+
+def visible_step(x: Array) -> float:
+    """Return the step of a grid on which a signal x (n,) moves, beyond a tenth of its deviation; 0: none."""
+    levels = np.unique(x)
+    gaps = np.diff(levels)
+    step = float(gaps.min(initial=np.inf))
+    # Values that are not rounded hardly come again.
+    visible = _COARSE * float(np.std(x)) < step < np.inf and 2 * levels.size < x.size
+    return step if visible and np.all(np.abs(gaps / step - np.round(gaps / step)) < _OFF_GRID) else 0.0
 
 
 def _far(x: Array) -> NDArray[np.bool_]:

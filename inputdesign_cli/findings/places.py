@@ -18,7 +18,7 @@ SHOWN = 5
 SHORTEST = 10
 """Samples of the shortest segment."""
 # Rows that an option lists.
-_LISTED = 12
+_LISTED = 40
 
 
 def is_called(role: str, name: str) -> bool:

@@ -21,6 +21,9 @@ from inputdesign_cli.records.sheet import Preparation, Run, Sheet
 # Steps of time differ from a round number by less than this share of it by rounding alone.
 _EVEN_STEPS = 0.01  # the share by which even steps differ as times are rounded
 _ROUND = 1e-4
+# Steps of two lengths, which differ by this share at least, come from rounding where no time is farther
+# from a line than this share of their difference. Fewer steps of one length are gaps.
+_COARSE, _ROUNDED_OFF, _BOTH = 0.1, 0.75, 3
 _SINCE_1970 = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 # Counts of these years: a count in one unit is out of range in any other, and as seconds lies millennia away.
 _FIRST, _LAST = (datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (2000, 2100))
@@ -99,6 +102,7 @@ def signals_of(sheet: Sheet, roles: Mapping[str, str], preparation: Preparation)
             check_range(kept.sheet, roles[role], values)
     if name:
         _check_rising(kept.sheet, kept.time)
+        kept = _at_even_times(kept)
     return kept
 
 
@@ -188,6 +192,30 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
     hint += f"; or is the time in column {other[0]}? Then --columns time={other[0]}" if other else ""
     message = f"the times of {sheet.path.name} do not increase: {time[before]:.10g} is followed by "
     raise sheet.error("data-not-uniform", f"{message}{time[row]:.10g}", hint, int(row))
+
+
+def _at_even_times(signals: Signals) -> Signals:
+    """Return the signals at even times, where the times of the file differ from a line by rounding alone.
+
+    Times in days with five decimals take two lengths of steps at a sample time of a second.
+    """
+    time, rows = signals.time, np.arange(len(signals.time))
+    if len(time) < SHORTEST or np.isnan(time).any():
+        return signals
+    steps = np.diff(time)
+    digit = float(np.ptp(steps))
+    longer = steps > 0.5 * float(steps.min() + steps.max())
+    alike = _EVEN_STEPS * min(digit, float(steps.min()))
+    two = all(own.size >= _BOTH and float(np.ptp(own)) <= alike for own in (steps[longer], steps[~longer]))
+    if not two or digit <= _COARSE * float(steps.max()):
+        return signals
+    line = np.polynomial.Polynomial.fit(rows, time, 1)
+    even = np.asarray(line(rows), dtype=float)
+    if float(np.abs(time - even).max()) > _ROUNDED_OFF * digit:
+        return signals
+    fact = f"{signals.name} is rounded to {digit:.3g}, and its rows are {line.deriv()(0.0):.6g} apart"
+    read = TIMES_READ.found(fact, where=signals.name, rounded=digit)
+    return replace(signals, time=even, findings=(*signals.findings, read))
 
 
 def typical_step(time: Array) -> float:

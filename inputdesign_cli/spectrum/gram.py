@@ -20,8 +20,8 @@ from inputdesign_cli.spectrum.directions import directed_scale
 from inputdesign_cli.spectrum.svec import smat
 
 _DIRECTIONS = 8
-# Share of the largest eigenvalue below which a generator is dropped. The cost is the trace, so that such a share
-# of it is far below any tolerance: it is the solver's distance from the boundary, and costs it many steps.
+# Share of the largest eigenvalue below which a generator is dropped. The cost is the trace. So small a share
+# of it is the solver's distance from the boundary of the cone, and further steps are spent on it.
 _KEPT = 1e-10
 _SINGULAR_PRICE = 1e-12
 

@@ -101,6 +101,38 @@ LOGS = {
 STEPS = np.repeat(np.random.default_rng(5).choice([-1.0, 0.0, 1.0, 2.0], 20), 12)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_steps_of_a_coarse_sensor_are_said_to_decide_and_fine_ones_are_not(seed, tmp_path):
+    """Noise of less than half a step leaves levels off by a share of it, and the gain by many deviations."""
+    rng = RNG(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 15), 40)
+    y = scipy.signal.lfilter([0, 0.2], [1, -0.9], u) + 0.1 * rng.standard_normal(600)
+    for step, blamed in ((0.75, True), (1.5, True), (0.1, False)):
+        found = explore(stored(tmp_path / f"{step}.csv", u, step * np.round(y / step)))
+        codes = {one.code for one in found.results.outcome.findings}
+        assert ("sensor-too-coarse" in codes, bool(found.reasons)) == (blamed, blamed)
+
+
+def test_an_input_that_is_a_share_of_the_output_says_only_that(tmp_path):
+    """Neither the fit nor the noise of such a model says anything."""
+    found = explore(stored(tmp_path / "log.csv", *a_share()))
+    (reason,) = found.reasons
+    assert "-0.6 y" in reason
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_double_integrator_is_no_error_of_a_spec_that_nobody_wrote(seed, tmp_path):
+    rng = RNG(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 12), 50)
+    y = scipy.signal.lfilter([0, 0.001], [1, -2, 1], u) + 0.1 * rng.standard_normal(600)
+    path = stored(tmp_path / "log.csv", u, y)
+    try:
+        said = explore(path).reasons
+    except DataError as error:
+        said = [error.diagnostics[0].code] * (error.diagnostics[0].code == "no-structure")
+    assert said
+
+
 @pytest.mark.parametrize(
     "y",
     [

@@ -199,6 +199,24 @@ def test_the_operating_point_is_taken_away(tmp_path):
     np.testing.assert_allclose(record.means, 40.0 + u.mean())
 
 
+@pytest.mark.parametrize("apart", [1.157407, 1.4142, 1.9, 2.414, 3.3])
+@pytest.mark.parametrize("rounding", [np.round, np.floor])
+def test_even_times_that_are_rounded_coarsely_are_even(apart, rounding, tmp_path):
+    """Days with five decimals at a sample time of a second take steps of one and of two digits."""
+    u, y = signals()
+    t = np.arange(len(u))
+    found = read_log(log(tmp_path / "log.csv", rounding(apart * np.arange(len(t))), u, y), Preparation())
+    assert found.lengths == (len(t),)
+    assert found.step == pytest.approx(apart, rel=1e-4)
+
+
+def test_rows_that_are_missing_here_and_there_are_no_rounding(tmp_path):
+    u, y = signals()
+    kept = np.delete(np.arange(len(u)), [40, 90, 170])
+    found = read_log(log(tmp_path / "log.csv", kept.astype(float), u[kept], y[kept]), Preparation())
+    assert (found.step, len(found.lengths)) == (1.0, 4)
+
+
 @pytest.mark.parametrize("step", [0.98, 1.02, 1.06])
 def test_even_times_near_the_sample_time_of_the_spec_are_another_sample_time(step, tmp_path):
     """Evened out, every move would come up to half a sample late, and the dead time be wrong by as much."""

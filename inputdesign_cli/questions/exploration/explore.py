@@ -22,6 +22,7 @@ from inputdesign_cli.explore import (
     fits,
     levelled,
 )
+from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.explored_logs import (
     DRIVE,
     HALF,
@@ -30,7 +31,7 @@ from inputdesign_cli.findings.explored_logs import (
     doubtful_model,
     undriven,
 )
-from inputdesign_cli.findings.faults import biasing, left_out, shifted_levels
+from inputdesign_cli.findings.faults import SPIKES, biasing, left_out, shifted_levels
 from inputdesign_cli.findings.frequency_responses import contradicted, response_note, silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
@@ -40,7 +41,7 @@ from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.curves import FitCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.shares import chance
-from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
 from inputdesign_cli.questions.assessment.outcome import fit_of, fit_to_log, response_without_model
@@ -103,22 +104,19 @@ def explore(
     )
     whole = lines is not None and len(log.lengths) == 1
     silent = silent_in(log.u[:, found.moving], log.y) if whole else {}
-    doubts = [
-        *doubtful_model(found, measured.parts, log.step, log.time_unit, integrates=only == "integrator"),
-        *doubtful_inputs(found, measured.parts, loop=looped),
-        # Behind a reference the input answers the noise of the output, and seems to be late.
-        *(() if looped and log.r is not None else late_inputs(measured.parts)),
-        *biasing(units, found.estimate, data, found.validation.simulation),
-        *(() if lines is None else contradicted(lines)),
-    ]
+    doubts = _doubts(found, measured, data, units, loop=looped, integrates=only == "integrator")
+    doubts += () if lines is None else contradicted(lines)
     reasons = tuple(one.message for one in doubts)
     remarks = (*log.remarks, *exploration_notes(log, found, loops))
     noted = replace(data, findings=log.findings, remarks=remarks)
     identified = Identified(found.estimate, found.model, noted, preparation, loop_noted=looped)
     results = identification_results(task, identified.asked_by(task, "the estimate"), started)
     names = " and ".join(path.name for path in paths)
+    was = results.outcome
     outcome = replace(
-        results.outcome,
+        was,
+        findings=tuple(one for one in was.findings or () if one.message not in reasons) or None,
+        notes=tuple(note for note in was.notes or () if note not in reasons) or None,
         title=f"What {names} {'tells' if len(paths) == 1 else 'tell'}",
         exploration=exploration_of(log, found, loops, reasons, lines, silent),
         validation=validation_of(found.validation),
@@ -134,6 +132,30 @@ def explore(
     against += refutations(found.model, found.estimate)
     levels = "--detrend linear" if np.any(found.slopes) else "--remove-means"
     return Exploration(results, reasons, tuple(one.message for one in against), levels)
+
+
+def _doubts(
+    found: Found, log: Record, data: Record, units: Units, *, loop: bool, integrates: bool
+) -> list[Finding]:
+    """Return what speaks against a model that was found in a log.
+
+    Args:
+        log: the whole log, without its drift.
+        data: the samples that the model was estimated from.
+        loop, integrates: whether inputs answer the outputs, and the user says that the plant integrates.
+    """
+    if idle := undriven(log.parts):  # the rest says nothing of the plant then
+        return idle
+    faulty = biasing(units, found.estimate, data, found.validation.simulation)
+    if spiked := [one for one in faulty if one.code == SPIKES.code]:
+        return spiked
+    return [
+        *doubtful_model(found, log.parts, log.step, log.time_unit, integrates=integrates),
+        *doubtful_inputs(found, log.parts, loop=loop),
+        # Behind a reference the input answers the noise of the output, and seems to be late.
+        *(() if loop and log.r is not None else late_inputs(log.parts)),
+        *faulty,
+    ]
 
 
 def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = None) -> tuple[Record, Found]:

@@ -137,7 +137,10 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
             f"{log.time_unit}"
         )
     for j in found.still:
-        yield f"u{j + 1} never moves in this record: the model has no part of it. An experiment must move it"
+        yield (
+            f"u{j + 1} never moves in this record: the model has no part of it, and is one in q^-1. An "
+            "experiment must move it; or leave it out of --columns, and models in s are tried as well"
+        )
     for j, p in loops:
         yield (
             f"the noise of the outputs helps to predict {signal_name('u', j, inputs)} (probability "
