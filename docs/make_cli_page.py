@@ -30,7 +30,7 @@ Results go to standard output, everything else to standard error. Progress is sh
 | 2 | the spec, the data or the usage is wrong, or something cannot be written |
 | 3 | no experiment can do what is asked |
 | 4 | the required accuracy was not proved |
-| 5 | undecided: the data contradict the model structure (`assess`, `next`) |
+| 5 | undecided: the data contradict the model or leave it open (`assess`, `next`) |
 | 70 | an error inside idesign; please report it |
 | 130, 143, 129 | interrupted (Ctrl-C), terminated (SIGTERM), the terminal has gone (SIGHUP) |
 | 141 | the reader of standard output has gone (`idesign .. \\| head`); nothing is printed then |

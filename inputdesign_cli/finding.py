@@ -1,7 +1,7 @@
 """Findings: what speaks for or against data, a model or a design, with a stable code and a severity.
 
-A kind of finding is declared once, in the file that decides when it holds and what it says. Verdict, trust
-and exit code follow from the severities, here and nowhere else.
+A kind of finding is declared once, in the file that decides when it holds and what it says. Verdict and
+trust follow from the severities, here and nowhere else.
 """
 
 from __future__ import annotations
@@ -96,7 +96,8 @@ class FindingKind:
         Args:
             fact: what holds in the case at hand.
             where: what it is about.
-            remedy: what to do in the case at hand, if not that of the kind.
+            remedy: what to do in the case at hand, if not that of the kind. One that begins with "Nothing" is
+                left out of the message.
             severity: where the case at hand weighs more or less than usual.
             figures: its numbers and names.
         """

@@ -26,8 +26,9 @@ app = typer.Typer(
     name="idesign",
     help="Optimal experiments for system identification: from a YAML file to a signal and a proof.",
     epilog="Exit codes: 0 done, 1 a golden mismatch or a missed target, 2 bad input or usage, "
-    "3 infeasible, 4 the required accuracy was not proved, 5 undecided (the data contradict the model "
-    "structure), 130 interrupted, 141 the reader of the output has gone, 143 terminated.",
+    "3 infeasible, 4 the required accuracy was not proved, 5 undecided (the data contradict the model or "
+    "leave it open), 70 an internal error, 129 the terminal has gone, 130 interrupted, 141 the reader of the "
+    "output has gone, 143 terminated.",
     no_args_is_help=True,
     add_completion=True,
     rich_markup_mode=None,

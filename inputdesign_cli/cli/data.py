@@ -120,8 +120,8 @@ def assess(
 
     Identifies the model, from all records jointly, and compares the accuracy that the data give with what
     the spec asks for. Exits with 0 if it is met. If not, exits with 1 and writes the cheapest experiment
-    that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where tests of
-    the residuals refute the model structure; the note says what to change.
+    that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where the
+    data contradict the model or leave it open; the output says what to run next.
     """
     # Records that are judged together are another run than the first of them alone.
     together = f"_and_{len(data) - 1}_more" if len(data) > 1 else ""
@@ -214,8 +214,8 @@ def proceed(
     """Take the record of a part, and plan the next or stop.
 
     All records that count are estimated jointly. Without DATA the decision is made anew. Exits with 0 while
-    the campaign goes on, and when the data meet the target; with 1 where it has ended without that, with 5
-    where the data contradict the model structure.
+    the campaign goes on and when the data meet the target, and with 1 where it has ended without that. Exits
+    with 5 where the data contradict the model or leave it open.
     """
     if data is not None and withdraw is not None:
         raise typer.BadParameter("give a record, or withdraw one", param_hint="--withdraw")

@@ -26,7 +26,7 @@ def read_spec(file: Path, changes: Changes, *, design: bool | None = True) -> Sp
     """Return the spec in a file; in standard input (`-`) names are relative to the current folder.
 
     Args:
-        design: whether it must ask for a design, None: if it states anything of one; see `load_spec`.
+        design: whether the spec must ask for a design. None: only a spec that states a part of one must.
 
     Raises:
         SpecError: as `load_spec`.

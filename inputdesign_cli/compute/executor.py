@@ -39,7 +39,10 @@ class Executor(Protocol):
         """Return whether the function sees the file system of the caller."""
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
-        """Yield every job with its answer. `function` is importable by name; everything can be pickled."""
+        """Yield every job with its answer.
+
+        Workers import `function` by its name, and receive jobs as pickles.
+        """
 
 
 class WorkerLostError(Exception):

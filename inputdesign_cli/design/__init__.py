@@ -1,1 +1,1 @@
-"""Designs: least cost by exchange, with certificates."""
+"""Designs with proofs: least cost by exchange, regression, loop error, and bounds within an amplitude."""

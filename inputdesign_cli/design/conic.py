@@ -1,4 +1,4 @@
-"""The only place that calls a conic solver.
+"""Calls the conic solver; only two reference methods call one elsewhere, through cvxpy.
 
 minimise q^T x subject to offset_i + matrix_i x in cone_i for every block i.
 """

@@ -76,6 +76,8 @@ class Leading(NamedTuple):
 def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record) -> Leading | None:
     """Return the findings that leave a verdict open and explain the others; None if nothing does.
 
+    A drift that explains them is a finding of its own, even if no test has found it.
+
     Args:
         estimate: of a model from the `data`; None for a response without one.
     """

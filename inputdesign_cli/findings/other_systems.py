@@ -42,7 +42,11 @@ _PRIOR = "experiment.prior"
 
 
 def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
-    """Return what a prior that the spec `stated` has to do with the estimate."""
+    """Return findings on a prior: it was left out, or it contradicts the data.
+
+    Args:
+        stated: whether the spec states a prior.
+    """
     without = stated and estimate.prior is None
     return [*PRIOR_LEFT_OUT.when(without, where=_PRIOR), *(contradictions(estimate) if stated else [])]
 

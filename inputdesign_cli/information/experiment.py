@@ -219,7 +219,7 @@ class Experiment:
         return WeightedProducts.of(self.excitation_gradient, w, self.size * self.model.outputs * self.inputs)
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
-        """Return `value_density` where the products are at hand."""
+        """Return `value_density` from products that were computed before."""
         return self.squeezed(self.samples * products.at(weight))
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:

@@ -100,9 +100,14 @@ class Results:
 
     @cached_property
     def result(self) -> Result:
-        """Return the outcome as plain data: the content of result.json."""
+        """Return the outcome as plain data: result.json without the provenance that a run directory adds."""
         found: Result = plain(self.outcome)
         return found
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what speaks for or against the data, the model or the design, with codes and severities."""
+        return self.outcome.findings or ()
 
     @property
     def cost(self) -> float | None:
@@ -145,14 +150,19 @@ class Results:
 
     @property
     def signal(self) -> Array:
-        """Return the record to be applied as (n, r), as signal.csv has it."""
-        _, *channels = self.tables["signal"].columns.values()
+        """Return the record to be applied as (n, r), as signal.csv has it; `AttributeError` without one."""
+        _, *channels = self._table("signal").columns.values()
         return np.stack(channels, axis=1)
 
     @property
     def bound(self) -> Mapping[str, Array]:
-        """Return the columns of bound.csv: frequency_rad_per_s, r_u, r_adm, .."""
-        return self.tables["bound"].columns
+        """Return the columns of bound.csv: frequency_rad_per_s, r_u, r_adm, ..; else `AttributeError`."""
+        return self._table("bound").columns
+
+    def _table(self, stem: str) -> Table:
+        if stem not in self.tables:
+            raise AttributeError(f"this run has no {stem}.csv")
+        return self.tables[stem]
 
     def spectrum(self, w: ArrayLike) -> NDArray[np.complex128]:
         """Return the spectrum (.., r, r) at frequencies `w`, a number or an array (..), in rad per time unit.
@@ -160,7 +170,12 @@ class Results:
         A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
         and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
         is that of the line.
+
+        Raises:
+            AttributeError: the run has no spectrum.
         """
+        if "spectrum" not in self.curves:
+            raise AttributeError("this run has no spectrum")
         found, stated = cast(SpectrumCurves, self.curves["spectrum"]), np.asarray(w, dtype=float)
         at, shape = stated.ravel(), (*stated.shape, *found.spectrum.shape[1:])
         if found.lines:

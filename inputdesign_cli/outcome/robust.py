@@ -37,7 +37,10 @@ class LostPlant:
 
 @dataclass(frozen=True)
 class FloorUse:
-    """Holds the numbers of plants that are held only to a share of the r_adm of the plant of the spec."""
+    """Holds plants that must keep only a `share` of r_adm of the spec's plant, by their numbers.
+
+    At `raised` plants r_adm of their own is smaller than that somewhere; at `lost` ones it vanishes.
+    """
 
     share: float
     raised: tuple[int, ...] = ()
@@ -47,7 +50,11 @@ class FloorUse:
 
 @dataclass(frozen=True)
 class SearchedPlant:
-    """Holds the worst plant that an ascent over the region found; nothing is proved of others."""
+    """Holds the worst plant that an ascent over the region found; nothing is proved of others.
+
+    `tried` plants were examined, and `added` ones joined the design. `lost`: no model keeps the requirement
+    there.
+    """
 
     proved: bool
     region: str
@@ -79,7 +86,11 @@ class BeyondLimits:
 
 @dataclass(frozen=True)
 class FreshPlants:
-    """Holds the number of other plants from the same distribution that miss the accuracy."""
+    """Holds the number of other plants from the same distribution that miss the accuracy.
+
+    `limits` hold the true share of such plants with the stated confidence. `less` counts plants that reach
+    less than the accuracy, `dearer` plants at which the experiment costs more than was promised.
+    """
 
     draws: int
     rejected: int

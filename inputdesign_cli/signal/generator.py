@@ -22,7 +22,7 @@ _FACTOR_RESIDUAL = 1e-8
 
 @dataclass(frozen=True)
 class SignalGenerator:
-    """Makes records of `samples` samples, each from random numbers of its own; other processes can have it.
+    """Makes records of `samples` samples, each from random numbers of its own; it can be pickled.
 
     Args:
         band: the band of white excitation, in rad per sample.

@@ -129,7 +129,7 @@ def grid_lines(density: NDArray, period: int, step: float) -> Lines:
 
 @dataclass(frozen=True)
 class DesignedSpectrum:
-    """A density over frequency or sinusoids, for records of values `step` apart; other processes can have it.
+    """A density over frequency or sinusoids, for records of values `step` apart; it can be pickled.
 
     Args:
         inputs: the number r of inputs.

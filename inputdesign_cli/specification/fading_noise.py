@@ -1,4 +1,4 @@
-"""Noise in an engineer's words, its standard deviation and how fast it fades, as `variance` and `D`."""
+"""Noise in an engineer's words, its standard deviation and how fast it fades, as `variance`, `C` and `D`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DRIFT_STEP = 0.2  # of noise that drifts besides, from one sample to the next, i
 
 
 def in_filters(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
-    """Add `variance` and `D` to each noise that is stated by its standard deviation."""
+    """Add `variance`, `D` and, if it drifts, `C` to each noise that is stated by its standard deviation."""
     plant, study = data.get("plant"), data.get("simulation")
     true = study if isinstance(study, dict) else {}
     for path, noise, of in (

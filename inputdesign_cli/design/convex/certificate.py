@@ -1,5 +1,8 @@
 """Lower bounds that we prove ourselves: dual points, evaluated and made exactly feasible.
 
+M' of a scenario is its information matrix (see `Problem`), s the factor or number of samples that is
+minimised, M_fixed + s M_scaled what M' has without a spectrum; "side" marks requirements on M' / s.
+
 Every cut gives tr(Y M') >= r for all admissible M' of its scenario; every limit a(z) <= b (times s) takes a
 weight w >= 0. With price = cost + sum w a over the upper limits and value = sum_s tr(Y_s M_s(.)) + sum w a
 over the lower ones, let t be the largest number with price - t value >= 0 on the whole cone of spectra. Then,
@@ -47,9 +50,9 @@ class Certificate:
     """Holds a proved lower bound on the objective, and the dual point that proves it.
 
     `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
-    on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
-    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs whose
-    maximum is minimised. `form` (m, r, r) is the price of the amplitude, a form of the lags of the
+    on the cone of spectra. `price` and `value` are the functionals of the module's text. `directions` are the
+    spectra where the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs
+    whose maximum is minimised. `form` (m, r, r) is the price of the amplitude, a form of the lags of the
     excitation, which is at most `form_share` for signals within the amplitude.
     """
 

@@ -117,7 +117,7 @@ class Cone(ABC):
 
     @abstractmethod
     def look(self, at: Array) -> float:
-        """Evaluate S(at) and return the largest entry of its difference from the slack.
+        """Evaluate the constraint at the unknowns `at` (n,); return its largest difference from the slack S.
 
         Raises:
             LinAlgError: the slack has left the cone.
@@ -193,7 +193,7 @@ class Orthant(Cone):
         return reach(self.S, self.dS), reach(self.Z, self.dZ)
 
     def multipliers(self) -> list[Array]:
-        """Return the multipliers of all inequalities as one array."""
+        """Return the multipliers of all inequalities: one array (n,)."""
         return [self.Z]
 
 

@@ -45,9 +45,9 @@ class MatrixPart:
 class FiniteProgram:
     """The program minimise cost . v over v = (y on the face, multiples of kept spectra, s), (n,).
 
-    `matrices` are the information matrices with their cuts, one a scenario; `signs` v >= 0 for the kept
-    spectra and s; `limit_offset` + `limits` v >= 0. s in natural units is `unit` v[-1]; without s, `unit` is
-    None. `size` is k.
+    `matrices` are the information matrices with their cuts, one for each scenario. The constraints are
+    `signs` v >= 0 (kept spectra and s are not negative) and `limit_offset` + `limits` v >= 0. In natural
+    units s is `unit` v[-1]; without s, `unit` is None. `size` is k.
     """
 
     cost: Array

@@ -85,8 +85,8 @@ class Proof:
 class MasterSolution:
     """Holds the optimum of the finite program: y on the face, the spectrum z = columns y, s, and its proof.
 
-    Without `converged` it is the last iterate of a solver that gave up: often good enough to scale the
-    next attempt by, and the proof holds as always.
+    If the solver has not `converged`, this is its last iterate. The proof holds for it as well, and it often
+    sets the scale of the next attempt.
     """
 
     y: Array

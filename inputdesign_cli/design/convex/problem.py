@@ -406,7 +406,7 @@ class Problem:
         return Functional(vector, self.gradients.zero_density, concentrated=True)
 
     def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
-        """Return local maxima of Phi over its limits times s (once for fixed ones), if above `above`."""
+        """Return the local maxima beyond `above` of Phi over its limits, which s multiplies unless fixed."""
         found = []
         for index, limit in enumerate(self.densities):
             factor = self.bound_factor(limit.upper, s)

@@ -135,7 +135,7 @@ class DesiredLoop(ControlLaw):
         return self.whole.at(w)
 
     def mirrored(self, determinants: Array) -> Array:
-        """Return polynomials m (runs, l) with b = determinant / m for the determinants (runs, l) of models.
+        """Return polynomials m (runs, l) for determinants (runs, l); determinant / m is the all-pass b.
 
         Zeros outside the circle are mirrored into it, and the value at frequency zero stays.
         """

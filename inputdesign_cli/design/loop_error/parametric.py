@@ -34,7 +34,7 @@ class ParametricCriterion:
     experiment: Experiment
 
     def information(self, w: Array, Phi: ComplexArray, weights: Array) -> Array:
-        """Return M (k, k) of the spectrum Phi (K, n, n) at `w`, for a mean with `weights` (K,)."""
+        """Return M0 + M(Phi) (k, k) of a spectrum Phi (K, n, n) at `w`, for a mean with `weights` (K,)."""
         X = self.experiment.excitation_gradient(w)
         excited = np.einsum("klab,kmab,k->lm", X @ Phi[:, None], np.conj(X), weights).real
         return self.experiment.noise_information + excited

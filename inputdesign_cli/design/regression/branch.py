@@ -40,7 +40,7 @@ class BranchAndBound:
 
     @property
     def bound(self) -> float:
-        """Return the least error over all boxes, at the largest energy considered so far."""
+        """Return a lower bound on the error over all boxes, at the largest energy considered so far."""
         return min(self.closed, self.open[0][0] if self.open else np.inf)
 
     def prove(

@@ -125,8 +125,8 @@ def error_bound(regression: Regression, energy: float) -> float:
 def energy_bound(regression: Regression, target: float) -> float:
     """Return the energy below which no R >= 0, whatever its structure, has the error `target`.
 
-    `error_bound` falls in E. It is gamma at the positive root of a quadratic, written so that nothing
-    cancels ([eckhard-mse], Theorem 2):
+    `error_bound` falls in E. It is gamma = `target` at the positive root of a quadratic, written so that
+    nothing cancels ([eckhard-mse], Theorem 2):
     gamma alpha^2 E^2 + (gamma - alpha^2 |L1|^2 - alpha^2 |L2|^2) sigma^2 E = sigma^4 |L1|^2.
     """
     a2, variance = regression.neglected_norm**2, regression.variance

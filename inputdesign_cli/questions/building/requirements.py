@@ -30,7 +30,7 @@ class AddedRequirement(Protocol):
     """Describes a section of `accuracy` that another package adds (`specification.plugins`)."""
 
     def build(self, spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-        """Return the function that makes its requirements in the coordinates of a design."""
+        """Return a function for each of its requirements, which makes it in the coordinates of a design."""
 
 
 def build_requirements(

@@ -115,7 +115,8 @@ class Planner:
         """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
         Data that suffice now, or with the next part, may leave several models open. Then the next part
-        also separates minima. If tests are the reason, a sufficient part is planned as if without data.
+        also separates minima. If tests leave data undecided that suffice, the part is planned as if without
+        data.
 
         Args:
             known: None before any data.

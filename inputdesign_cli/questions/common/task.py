@@ -132,8 +132,8 @@ def growth_by_start(
 ) -> float:
     """Return the factor on the errors if the start of a record (n, r) and its levels are unknown.
 
-    Where it hardly matters it is an upper bound: samples after the start has been forgotten, without their
-    means, know nothing of either.
+    For long records it is an upper bound: it counts only the samples after the plant has forgotten its
+    start, about their means.
     """
     plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
     poles = np.concatenate([experiment.singularities, experiment.model.singularities])

@@ -40,7 +40,10 @@ Known = Callable[[Record | None], Array | None]
 
 @dataclass(frozen=True)
 class ExactConfidence:
-    """Holds the confidence asked, with the `usual` chi-squared alpha; asymptotic without `simulator`."""
+    """Holds the confidence asked, and the `usual` alpha of the chi-squared distribution.
+
+    Without a `simulator` the estimates are drawn from their asymptotic distribution.
+    """
 
     calibration: Calibration
     usual: float

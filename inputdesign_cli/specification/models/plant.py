@@ -352,4 +352,4 @@ TruePlant = Annotated[
     pick(lambda v: TrueParameters.phrase if set(v) == {"parameters"} else _kind(v)),
     _FORMS,
 ]
-"""The plant of a simulation; of a regression only its parameters."""
+"""The plant of a simulation; for a regression it may be the parameters alone."""
