@@ -18,7 +18,7 @@ NUMBER = rf"([-+]?{_DIGITS})"
 ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 PLUS_MINUS = r"(?:plus(?:/| or | )minus|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
-_UNIT = r"(?:[^\s,;|.:]|[.:](?=[^\s|]))"  # a letter of it
+_UNIT = r"(?:[^\s,;|.:+±]|[.:](?=[^\s|]))"  # a letter of it
 _NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak|may|can|must"
 UNIT = rf"(?:\s*(?!(?:{_NO_UNIT})\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
@@ -91,10 +91,10 @@ _SCATTER = re.compile(
     rf"\b(?P<what>noise|standard deviation|deviation|std|rms|sigma)\s*{PLUS_MINUS}\s*(?P<size>[\d.]+)", re.I
 )
 _HOURS_AND_MINUTES = re.compile(
-    r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s+(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
+    r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s*(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
 )
 _FALLS = re.compile(
-    rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?|goes down)(?: by)?\s+"
+    rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?(?: the [a-z]+)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
     re.I,
 )

@@ -54,7 +54,10 @@ RISES_WHEN = (
     r"(?=\s*(?:[,;.]|$|(?:more|in|after|within|and)\b))"
 )
 """A gain as in "rises by 1.5 degC when the valve opens 10 %"."""
-NO_DELAY = r"\b(?:no|without|hardly any|negligible)\s+(?:dead time|delay)\b"
+NO_DELAY = (
+    r"\b(?:(?:no|without|hardly any|negligible)\s+(?:dead time|delay)"
+    r"|(?:dead time|delay)(?:\s+is)?[:=]?\s+(?:none|zero|negligible))\b"
+)
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
 _SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
 _HARDLY = 0.5  # of a sample: as good as no dead time in a log
@@ -158,6 +161,8 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     if len(steady) != 1 or not found[steady[0]].value:
         raise bad_answer("plant", "it does not say the gain, or says that it is zero, or says two")
     gain = found[steady[0]]
+    if steady == ["gain"] and not gain.base and re.search(rf"\b(?:{UP})\b", text, re.I):
+        raise bad_answer("plant", f'"{text}" does not say of what move of the input: "1.5 degC per 10 %"')
     found = {name.replace("rise", "slope"): one for name, one in found.items()}
     own = {name: one.share for name, one in found.items() if one.share is not None}
     sampled = phrase.after(r"sampl(?:e|ing) time|sampled? every|sampling(?: every)?", "time", named=True)

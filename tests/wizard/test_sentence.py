@@ -515,6 +515,12 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("a drive with dry friction, working at 9 V", "range", "working at 9 V"),
         ("gain 2, delay 2..4 minutes", "plant", "gain 2, delay 3 minutes within 33.3 % itself"),
         ("PI for the level in a tank; level in cm", "names", "level in cm"),
+        (
+            "gain 2 rad/s per V, lag 1h7min, dead time none",
+            "plant",
+            "gain 2 rad/s per V, lag 67 min, dead time none",
+        ),
+        ("gain 2, lag 3 s, speed between 150 and 210 rad/s, 9V+-3V", "range", "9V+-3V"),
     ],
 )
 def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
@@ -537,6 +543,14 @@ def test_a_gain_that_is_negative_is(gain, tmp_path):
     words = gain if "valve" in gain else f"gain {gain}"
     spec = heard(PLAIN.replace("gain 2 degC/%", words), tmp_path, *["no"] * 3).spec()
     assert spec.plant.continuous.gain == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize("does", ["warms", "cools"])
+def test_a_rise_without_a_move_of_the_input_is_no_gain(does):
+    """The move may have been any: nothing is taken for it, and the size is no range of the input."""
+    said = in_sentence(f"the heater {does} the room by 1.5 degC in about an hour; noise 0.1, white").answers
+    assert "range" not in said
+    assert code_of(plant_of_words, said["plant"]) == "bad-answer"
 
 
 @pytest.mark.parametrize(
