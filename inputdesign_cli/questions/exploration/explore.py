@@ -117,7 +117,7 @@ def explore(
         was,
         findings=tuple(one for one in was.findings or () if one.message not in reasons) or None,
         notes=tuple(note for note in was.notes or () if note not in reasons) or None,
-        title=f"What {names} {'tells' if len(paths) == 1 else 'tell'}",
+        title=f"The plant, from {names}",
         exploration=exploration_of(log, found, loops, reasons, lines, silent),
         validation=validation_of(found.validation),
     )
