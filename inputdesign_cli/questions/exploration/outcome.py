@@ -10,6 +10,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore import Candidate, Fits, Found
 from inputdesign_cli.findings.explored_logs import open_parameters
+from inputdesign_cli.findings.prepared_records import JITTER_EVENED
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.identification.response_chance import perhaps_zero
@@ -135,6 +136,11 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
         yield (
             f"{damping:.3g} is a damping above 1: the plant has two lags, {slow:.4g} and {fast:.4g} "
             f"{log.time_unit}"
+        )
+    if np.any(found.model.dead_times) and any(one.code == JITTER_EVENED.code for one in log.findings):
+        yield (
+            "a dead time counts from the row in which the input has moved: it is longer by up to "
+            f"{log.step:.4g} {log.time_unit} if the input moved between two rows"
         )
     for j in found.still:
         yield (
