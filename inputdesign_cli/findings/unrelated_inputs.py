@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore import early_answers
-from inputdesign_cli.finding import REFUTED, Finding, FindingKind, doubt, finding, note
+from inputdesign_cli.finding import DOUBT, REFUTED, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import perhaps_other_inputs, perhaps_zero
@@ -18,6 +20,8 @@ from inputdesign_cli.plant import Model
 _OTHERWISE = 1e-6
 # Of the squares of prediction errors: what the future of an input explains if it moves the output.
 _MOSTLY = 0.5
+# An output that moves in so many times fewer rows than every input may be an input itself.
+_HELD = 20.0
 
 UNEXPLAINED = doubt(
     "output-unexplained",
@@ -61,6 +65,23 @@ def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
     """Return a finding for each input before which an output moves: u (n, r), y (n, p) without a model."""
     inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
     return [_late(inputs, outputs, test) for test in early_answers(parts)]
+
+
+@finding(DOUBT, "columns-perhaps-swapped", "Exchange u and y in `--columns`.")
+def perhaps_swapped(kind: FindingKind, parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
+    """An output is held as an input is, and the inputs move as outputs do. The columns may be swapped.
+
+    Args:
+        parts: all records, u (n, r), y (n, p).
+    """
+    u, y = (np.concatenate([np.diff(signals[k], axis=0) != 0.0 for signals in parts]) for k in (0, 1))
+    inputs, outputs = u.mean(axis=0), y.mean(axis=0)
+    seldom, often = int(np.argmin(outputs)), float(inputs.min(initial=1.0))
+    name = signal_name("y", seldom, len(outputs))
+    shares = [f"{100.0 * share:.2g} %" for share in (outputs[seldom], often)]
+    fact = f"{name} moves in {shares[0]} of the rows, and the inputs in {shares[1]}"
+    held = _HELD * outputs[seldom] < often
+    return kind.when(outputs[seldom] > 0.0 and held and often > 0.5, fact, where=name)
 
 
 @finding(

@@ -133,6 +133,15 @@ def test_a_double_integrator_is_no_error_of_a_spec_that_nobody_wrote(seed, tmp_p
     assert said
 
 
+@pytest.mark.parametrize("swapped", [True, False])
+def test_columns_that_are_perhaps_swapped_are_said_to_be(swapped, tmp_path):
+    rng = RNG(3)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0, 2.0], 8), 50)
+    y = scipy.signal.lfilter([0, 0.2], [1, -0.9], u) + 0.1 * rng.standard_normal(400)
+    found = explore(stored(tmp_path / "log.csv", *((y, u) if swapped else (u, y))))
+    assert ("columns-perhaps-swapped" in [one.code for one in found.results.outcome.findings]) is swapped
+
+
 @pytest.mark.parametrize(
     "y",
     [

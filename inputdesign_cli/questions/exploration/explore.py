@@ -34,7 +34,7 @@ from inputdesign_cli.findings.explored_logs import (
 from inputdesign_cli.findings.faults import SPIKES, biasing, left_out, shifted_levels
 from inputdesign_cli.findings.frequency_responses import contradicted, response_note, silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
-from inputdesign_cli.findings.unrelated_inputs import late_inputs
+from inputdesign_cli.findings.unrelated_inputs import late_inputs, perhaps_swapped
 from inputdesign_cli.identification import cross_correlations, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.outcome import Outcome
@@ -146,6 +146,8 @@ def _doubts(
     """
     if idle := undriven(log.parts):  # the rest says nothing of the plant then
         return idle
+    if swapped := perhaps_swapped(log.parts):
+        return swapped
     faulty = biasing(units, found.estimate, data, found.validation.simulation)
     if spiked := [one for one in faulty if one.code == SPIKES.code]:
         return spiked
