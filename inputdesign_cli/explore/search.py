@@ -198,7 +198,7 @@ class _Records:
 
     def candidate(self, shape: Shape) -> Candidate:
         """Return a structure, estimated and judged; it may raise one of `NOT_COMPUTED`."""
-        parts, near = self.first if shape.shared else self.white, self.swept.near(shape.order)
+        parts, near = self.first if shape.shared else self.white, self.swept.near(shape.poles)
         if not shape.physical and near.delays != shape.delays:
             near = Regressed(parts, near.order).output_error(shape.delays, near.F)
         kind, start = estimator(shape.model(), 1.0), shape.start(near)
@@ -303,6 +303,8 @@ def _shapes(records: _Records, physical: bool, only: Family | None) -> Iterator[
     elif only is not None:
         order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
         yield Process(swept.near(order).delays, order, step)
+        if not order:
+            yield Process(swept.near(2).delays, 1, step, rising=True)
     if only is not None:
         return
     yield Orders("FIR", swept.near(1).delays, 1)
@@ -312,6 +314,8 @@ def _shapes(records: _Records, physical: bool, only: Family | None) -> Iterator[
         yield Process(swept.near(2).delays, 2, step, zero=True)
     if physical and lingering(swept.near(1).F, records.samples):
         yield Process(swept.near(1).delays, 0, step)
+    if physical and near.order > 1 and lingering(swept.near(2).F, records.samples):
+        yield Process(swept.near(2).delays, 1, step, rising=True)
     for n in sorted({1, near.order}):
         yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
     if max(swept.by_order) > 1 and not records.feedback:

@@ -56,6 +56,11 @@ class Orders:
         return self.a + self.f
 
     @property
+    def poles(self) -> int:
+        """Return the number of poles of the plant of each input."""
+        return self.order
+
+    @property
     def unknowns(self) -> int:
         """Return the number of coefficients of one input."""
         return self.b + self.order
@@ -100,6 +105,7 @@ def _monic(order: int) -> Array:
 
 
 _NAMES = {0: "integrator", 1: "FOPDT", 2: "SOPDT", 3: "TOPDT"}
+_LAGGING = "integrator with a lag"
 # Numerators and denominators in s by their parameters, descending.
 _BELOW = {
     0: ("1", "0"),
@@ -124,6 +130,7 @@ class Process:
     Attributes:
         delays: the lag of the first sample that each input moves.
         order: the number of poles with a time constant, none to three; none: K / s.
+        rising: whether the output integrates what a lag of order one gives.
         step: the sample time.
         zero: whether the numerator is K (Tz s + 1).
         noise: the order of C and D, none for white noise.
@@ -134,6 +141,7 @@ class Process:
     step: float
     zero: bool = False
     noise: int = 0
+    rising: bool = False
 
     # Plant and noise have no poles in common, and the parameters have names.
     shared: ClassVar[bool] = False
@@ -142,7 +150,7 @@ class Process:
     @property
     def family(self) -> str:
         """Return the usual name: first, second, third order plus dead time, or integrator."""
-        return _NAMES[self.order]
+        return _LAGGING if self.rising else _NAMES[self.order]
 
     @property
     def numbers(self) -> dict[str, int]:
@@ -153,7 +161,12 @@ class Process:
     @property
     def integrates(self) -> bool:
         """Return whether the structure is an integrator."""
-        return not self.order
+        return self.rising or not self.order
+
+    @property
+    def poles(self) -> int:
+        """Return the number of poles, those of integrators counted."""
+        return self.order + self.rising
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -208,15 +221,17 @@ class Process:
         poles = np.roots(near.F)
         size = np.clip(np.abs(poles), _FASTEST, _SLOWEST)
         angle = np.where(poles.real > 0.0, np.angle(poles), 0.0)
-        s = np.resize(np.sort_complex(-(np.log(size) + 1j * angle)), max(self.order, 1)) / self.step
+        s = np.resize(np.sort_complex(-(np.log(size) + 1j * angle)), max(self.poles, 1)) / self.step
         gains = near.B.sum(axis=1) / max(float(np.sum(near.F)), 1e-300)
+        if self.integrates:  # the slowest pole is that of the integrator
+            s, gains = (s[1:] if self.rising else s), gains * abs(s[0])
         below = self._below(s) if self.order else []
         found: list[float] = []
-        for gain, row, delay in zip(
-            gains if self.order else gains * abs(s[0]), near.B, near.delays, strict=True
-        ):
+        for gain, row, delay in zip(gains, near.B, near.delays, strict=True):
             # A lag of first order that begins between two samples shares its first two coefficients.
-            share = row[1] / (row[0] + row[1]) if self.order == 1 and row[0] * row[1] > 0.0 else 0.0
+            share = (
+                row[1] / (row[0] + row[1]) if self.poles == 1 == self.order and row[0] * row[1] > 0.0 else 0.0
+            )
             late = max(delay - 1 + share, _LEAST) * self.step
             found += [float(gain), *below, *([_ZERO * below[0]] if self.zero else []), late]
         return np.array([*found, *np.zeros(2 * self.noise)])
@@ -245,7 +260,8 @@ def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance:
         values |= dict(zip(every, theta.tolist(), strict=False))  # those of the noise follow
         top = ("{K}*{Tz}", "{K}") if row.zero else ("{K}",)
         above.append([[text.format(**names) for text in top] for names in own])
-        below.append([[text.format(**names) for text in _BELOW[row.order]] for names in own])
+        texts = (*_BELOW[row.order], *(("0",) if row.rising else ()))
+        below.append([[text.format(**names) for text in texts] for names in own])
         late.append([names["L"] for names in own])
     names, at = tuple(values), np.array(list(values.values()))
 

@@ -13,7 +13,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
 from inputdesign_cli.finding import Finding, undecided
 from inputdesign_cli.findings.places import Record
-from inputdesign_cli.findings.refuted_structure import DRIFT, drifting, leaking
+from inputdesign_cli.findings.refuted_structure import DRIFT, drifting, leaking, no_leak
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.plant.model import SampledPlant
@@ -95,7 +95,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     shifts = first.code == "level-shift" and _may_drift(first, data)
     if estimate is not None and ((drifts and (own or first.code == "plant-structure")) or shifts):
         # Past inputs, or a shift of most of a record, explain what a leak takes away.
-        if leaks := _leaking(estimate, data.time):
+        if leaks := "" if no_leak(estimate) else _leaking(estimate, data.time):
             model = estimate.search.records.kind.model
             alike, command = drifts or [drifting(model, "its level shifts for most of the record")], leaks
         elif own and _drifts(estimate):

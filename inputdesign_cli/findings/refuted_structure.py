@@ -13,18 +13,23 @@ from inputdesign_cli.outcome.model_words import Plain, blocks_of
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
+_BY_CHANCE = 0.05
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
 _LAG = "a further lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
-def remedies_of(model: Model) -> dict[str, str]:
-    """Return the keys to change, by what the tests find: `plant`, `noise` or `drift`."""
+def remedies_of(model: Model, *, leaks: bool = True) -> dict[str, str]:
+    """Return the keys to change, by what the tests find: `plant`, `noise` or `drift`.
+
+    Args:
+        leaks: whether a drift may come from a leak.
+    """
     blocks = blocks_of(model)
     plant, known = _of_plant(blocks["plant"]), blocks["plant"].get("known")
     if known:
         plant = f"see whether what is known is right (plant.known: {', '.join(known)}; without it, it is "
         plant += f"estimated), or {_of_plant(blocks['plant'])}"
-    return {"plant": plant, **_of_noise(model, blocks)}
+    return {"plant": plant, **_of_noise(model, blocks, leaks=leaks)}
 
 
 def quantities(model: Model) -> NDArray[np.bool_]:
@@ -85,7 +90,15 @@ def leaking(model: Model) -> str:
     return ""
 
 
-def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[str, str]:
+def no_leak(estimate: Estimate) -> bool:
+    """Return whether past inputs explain residuals, and a leak does not: a lag is missing, for example."""
+    failing = any(test.fault == "plant" for test in estimate.tests.failed_besides)
+    return failing and any(
+        one.name == "leak" and one.probability > _BY_CHANCE for one in estimate.tests.scores
+    )
+
+
+def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]], *, leaks: bool) -> dict[str, str]:
     plant, noise = blocks["plant"], blocks["noise"]
     if model.continuous:
         sampled = "sample the plant (plant.sample: zoh), so that noise may have"
@@ -95,8 +108,10 @@ def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[s
     drifts = "drift" in noise
     drift = "raise the order of D under noise" if drifts else "let the noise drift (noise: {drift: true})"
     drift += ", remove the trend from the record, or use a part of it without drift"
-    if leaks := leaking(model):
-        drift = f"let the plant leak (plant.continuous.denominator: {leaks}, and leak in plant.parameters)"
+    if leaks and (denominator := leaking(model)):
+        drift = (
+            f"let the plant leak (plant.continuous.denominator: {denominator}, and leak in plant.parameters)"
+        )
     return {"noise": f"raise the orders of C and D under noise{first}{polynomials}", "drift": drift}
 
 
@@ -145,7 +160,7 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
     """Return the strongest test of each kind of fault, and the single parameters that are missing."""
     directed = {one.test: one.alternatives for one in estimate.tests.directed}
     failing = sorted(estimate.tests.failed_besides, key=lambda test: test.probability)
-    remedies, found = remedies_of(model), []
+    remedies, found = remedies_of(model, leaks=not no_leak(estimate)), []
     for fault, kind in OF_MANY.items():
         test = next((test for test in failing if test.fault == fault and test not in directed), None)
         if test is not None:

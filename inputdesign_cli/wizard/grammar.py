@@ -16,7 +16,7 @@ LARGEST, SMALLEST = 1e15, 1e-15
 _DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"([-+]?{_DIGITS})"
 ALONE = r"(?<![\w.])"  # the number that follows is no part of another
-PLUS_MINUS = r"(?:plus(?:/| or | )minus|\+/?-|±)"
+PLUS_MINUS = r"(?:plus(?:/| or | )minus|give or take|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
 _UNIT = r"(?:[^\s,;|.:+±]|[.:](?=[^\s|]))"  # a letter of it
 _NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak|may|can|must"
@@ -50,7 +50,8 @@ _ALIKE: tuple[dict[str, float], ...] = (
 )
 # "a minute", "half an hour", "two shifts": words in place of numbers.
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
-            "five": 5, "six": 6, "eight": 8, "ten": 10, "twelve": 12, "twenty": 20, "thirty": 30,
+            "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "twelve": 12, "fifteen": 15,
+            "twenty": 20, "thirty": 30, "forty": 40, "forty-five": 45, "fifty": 50, "sixty": 60, "ninety": 90,
             "a couple of": 2}  # fmt: skip
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
@@ -68,7 +69,7 @@ _FEW = re.compile(
 _SETTLES = re.compile(
     r"\b(?:(?P<settled>(?:settles|is settled)\s+(?:in|within|after)|settling time)|(?P<risen>rise time)|"
     r"(?:reaches\s+)?63\s*%(?:\s+of (?:it|the way|its final value))?\s+(?:is reached\s+)?(?:in|within|after))"
-    rf"(?P<of>{OF})\s*(?P<number>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})",
+    rf"(?P<of>{OF})\s*(?P<number>{_DIGITS})(?:\s*(?:to|-|–)\s*(?P<high>{_DIGITS}))?\s*(?P<unit>{UNIT_OF_TIME})",
     re.I,
 )
 # Time constants of a lag until 98 % of the way, and from 10 to 90 %.
@@ -121,8 +122,9 @@ _BETWEEN = tuple(
     )
 )
 _SPOKEN = re.compile(
-    rf"\b({'|'.join(_COUNTED)})\s+"
-    rf"(?=(?:{UNIT_OF_TIME}|(?:more\s+)?(?:volts?|per ?cent|degrees?|rad/s|bar)\b))",
+    rf"(?<![\w-])({'|'.join(sorted(_COUNTED, key=len, reverse=True))})\s+"
+    rf"(?=(?:{UNIT_OF_TIME}|(?:more\s+)?(?:volts?|per ?cent|degrees?|rad/s|bar)\b|[^\s\d,;|]+\s+more\b"
+    rf"|to\s+(?:{'|'.join(_COUNTED)}|\d+)\s+{UNIT_OF_TIME}))",
     re.I,
 )
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
@@ -143,14 +145,16 @@ _BASE = (
     rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
     rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
 )
-UP = "rises|grows|increases|climbs|goes up|warms|heats|raises"
+UP = "rises|grows|increases|climbs|goes up|warms|heats|raises|lifts"
 """What an output does that moves upwards."""
 _RISE = (
     rf"(?:{UP}|changes)(?:\s+(?:by|with))?\s+"
     rf"(?:{ABOUT}\s*)?-?{_DIGITS}\s*[^\s\d,;|]+"
 )
 # "goes up 0.5 cm in 1 minute", "for each % the level rises by 2 cm"; "the speed rises by 2 rad/s" is a size.
-_IN_ONE = re.compile(rf"\b({_RISE})\s+(?:in|every|each)\s+(?:1\s+)?({UNIT_OF_TIME})", re.I)
+_IN_ONE = re.compile(
+    rf"\b({_RISE})\s+(?:(?:in|every|each)\s+(?:1\s+)?|1\s+)({UNIT_OF_TIME})(?!\s+(?:after|later)\b)", re.I
+)
 _EACH = re.compile(
     rf"\bfor\s+(?:each|every)\s+(?P<per>[^\s\d,;|]+)(?:\s+(?:more|of|the|{DRIVE})\b)*,?\s+"
     rf"(?P<rise>(?:(?:the|my|our|it|its)\s+)?(?:[a-z]+\s+){{0,2}}?{_RISE}(?:\s+per\s+{UNIT_OF_TIME})?)",
@@ -164,7 +168,7 @@ _OF_SPEED = re.compile(
 # "10 % more valve gives about 1.5 degC": a gain.
 _GIVES = re.compile(
     rf"{ALONE}(?:(?P<many>{_DIGITS})\s+more\s+(?P<unit>[^\s\d,;|]+)|(?P<per>{_DIGITS}\s*(?!{UNIT_OF_TIME}){_UNIT}+))"
-    rf"(?:\s+(?:more|of|the|{DRIVE})\b)*\s+(?:gives?|makes?|brings?|causes?|means?)\s+"
+    rf"(?:\s+(?:more|of|on|the|{DRIVE})\b)*\s+(?:gives?|makes?|brings?|causes?|means?|adds?)\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?P<size>{_DIGITS}\s*[^\s\d,;|]+)"
     rf"(?P<rate>\s+per\s+{UNIT_OF_TIME})?(?:\s+(?:more|(?P<less>less))\b)?",
     re.I,
@@ -441,7 +445,11 @@ def _vague(text: str) -> bool:
 def _time_constant(found: re.Match[str]) -> str:
     """Return the time constant of a settling time."""
     constants = _SETTLED if found["settled"] else _RISEN if found["risen"] else 1.0
-    return f"{float(found['number']) / constants:.4g} {found['unit']}"
+    low, high = float(found["number"]), float(found["high"] or found["number"])
+    if not 0.0 < low < high:
+        return f"{low / constants:.4g} {found['unit']}"
+    share = 100.0 * (high - low) / (high + low)
+    return f"{0.5 * (low + high) / constants:.4g} {found['unit']} within {share:.3g} % itself"
 
 
 def _middle(found: re.Match[str]) -> str:

@@ -60,7 +60,7 @@ MOVES = (
     r"(?:\s+(?:it|by|over))*"
 )
 BOTH_WAYS = (
-    r"(?:up (?:and|or) down|(?:either|each) way|(?:to|on) (?:either|each|both) sides?"
+    r"(?:up (?:and|or) down|(?:either|each|both) ways?|(?:(?:to|on) )?(?:either|each|both) sides?"
     r"|in (?:both|either) directions?)"
 )
 ACTUATOR = rf"(?:(?!(?:the|our|my|move|may|can|by|from|around|when|open|if|i)\b)[a-z]+ )?{DRIVE}"

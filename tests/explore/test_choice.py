@@ -126,6 +126,23 @@ def test_an_integrator_is_taken_where_no_time_constant_follows():
     assert found.estimate.theta[0] == pytest.approx(0.02, rel=0.03)
 
 
+def lagging_tank(rng, samples):
+    """A tank, 0.02 a second, behind a valve: a lag of 20 s, 8 s of dead time; by steps of 0.1 s."""
+    u = held(rng, samples, 8)
+    valve = scipy.signal.lfilter([0.0, 0.005], [1.0, -0.995], np.repeat(u, 50))
+    level = np.cumsum(np.concatenate([np.zeros(80), 0.1 * 0.02 * valve]))[: 50 * samples : 50]
+    return column(u, level + 0.05 * rng.standard_normal(samples))
+
+
+@pytest.mark.parametrize("only", [None, "integrator"])
+def test_an_integrator_behind_a_lag_is_found(only):
+    found = explore_records([lagging_tank(np.random.default_rng(2), 600)], step=5.0, only=only)
+    assert found.taken[0].orders.family == "integrator with a lag"
+    assert found.integrates == (0,)
+    # The steps of 0.1 s make time constant and dead time uncertain by about one of them.
+    assert found.model.theta[:3] == pytest.approx([0.02, 20.0, 8.0], rel=0.03, abs=0.3)
+
+
 @pytest.mark.slow
 def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
     """Gain 1.7, pole 0.98, dead time of six samples, one line, noise that fades in twelve samples."""

@@ -16,6 +16,7 @@ from inputdesign_cli.findings import kinds
 from inputdesign_cli.findings.faults import follows_inputs
 from inputdesign_cli.findings.leading import leading
 from inputdesign_cli.findings.places import Record
+from inputdesign_cli.findings.refuted_structure import no_leak, remedies_of
 from inputdesign_cli.questions import explore
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.records import Preparation
@@ -166,7 +167,8 @@ def led(plant, noise, *codes):
     text = f"sample_time: 10\nplant: {plant}\nnoise: {noise}\n"
     model = build_model(parse_spec(text, design=False))
     estimate = SimpleNamespace(
-        search=SimpleNamespace(records=SimpleNamespace(kind=SimpleNamespace(model=model)))
+        search=SimpleNamespace(records=SimpleNamespace(kind=SimpleNamespace(model=model))),
+        tests=SimpleNamespace(scores=(), failed_besides=()),
     )
     line = np.linspace(0.0, 9.0, 200)[:, None] + np.random.default_rng(0).standard_normal((200, 1))
     data = Record(np.sin(np.arange(200.0))[:, None], line, None, np.arange(200.0), (200,), (("a.csv", 200),))
@@ -177,6 +179,19 @@ def led(plant, noise, *codes):
 
 LAG = "{continuous: {gain: 1, time_constant: 60}, sample: zoh}"
 TANK = "{continuous: {numerator: [0.02], denominator: [1, 0], delay: 10}, sample: zoh}"
+NAMED_TANK = TANK.replace("{cont", "{parameters: {slope: 0.02}, cont").replace("[0.02]", "[slope]")
+
+
+def test_a_lag_that_is_missing_is_no_leak():
+    """Past inputs explain the residuals, and a leak does not (its test: 0.4, or 1e-6)."""
+    for probability, leaks in ((0.4, False), (1e-6, True)):
+        tests = SimpleNamespace(
+            scores=(SimpleNamespace(name="leak", probability=probability),),
+            failed_besides=(SimpleNamespace(fault="plant"),),
+        )
+        assert no_leak(SimpleNamespace(tests=tests)) is not leaks
+        model = build_model(parse_spec(f"sample_time: 10\nplant: {NAMED_TANK}\n", design=False))
+        assert ("leak" in remedies_of(model, leaks=leaks)["drift"]) is leaks
 
 
 def test_no_command_asks_for_what_the_model_has_already():
@@ -185,9 +200,8 @@ def test_no_command_asks_for_what_the_model_has_already():
     noise = "{standard_deviation: 1, correlation_time: 60}"
     assert "noise.drift=true" in led(TANK, noise)
     assert led(TANK, noise.replace("}", ", drift: true}")).startswith("idesign explore")
-    named = TANK.replace("{cont", "{parameters: {slope: 0.02}, cont").replace("[0.02]", "[slope]")
     of_structure = ("drift", "plant-structure")
     for more in ((), of_structure, (*of_structure, "noise-structure"), ("level-shift",)):
-        assert '"plant.continuous.denominator=[1, leak]"' in led(named, noise, *more)
+        assert '"plant.continuous.denominator=[1, leak]"' in led(NAMED_TANK, noise, *more)
     assert "leak" not in led(LAG, "{variance: 1}", *of_structure)
     assert "leak" not in led(LAG, "{variance: 1}", "level-shift")

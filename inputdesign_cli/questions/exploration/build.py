@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, bad_spec
+from inputdesign_cli.errors import DataError, SpecError, bad_spec
 from inputdesign_cli.explore import Found, output_error_form
 from inputdesign_cli.findings.prepared_records import name_and_unit
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.assessment.identify import Identification
 from inputdesign_cli.questions.building.system import build_model
@@ -57,6 +58,7 @@ class Asked:
     time_unit: str
     sections: Mapping[str, Any]
     drifts: bool = False  # whether its noise does
+    integrates: bool = False  # whether its plant does
 
     @classmethod
     def of(cls, spec: Spec) -> Asked:
@@ -65,7 +67,10 @@ class Asked:
         match sections:
             case {"experiment": {"prior": _, **rest}}:  # it is of other parameters
                 sections["experiment"] = rest
-        return cls(spec.time_unit, sections, bool(np.any(spec.noise.drift)))
+        integrates = False
+        with suppress(SpecError):  # a plant that no log is compared with
+            integrates = bool(np.any(np.abs(build_model(spec).plant_points) < INTEGRATES))
+        return cls(spec.time_unit, sections, bool(np.any(spec.noise.drift)), integrates)
 
     def check_unit(self, time_unit: str) -> None:
         """Raise `SpecError` (`data-wrong-unit`) unless a log counts times in the same unit."""

@@ -104,7 +104,8 @@ def explore(
     )
     whole = lines is not None and len(log.lengths) == 1
     silent = silent_in(log.u[:, found.moving], log.y) if whole else {}
-    doubts = _doubts(found, measured, data, units, loop=looped, integrates=only == "integrator")
+    integrates = only == "integrator" or (asked is not None and asked.integrates)
+    doubts = _doubts(found, measured, data, units, loop=looped, integrates=integrates)
     doubts += () if lines is None else contradicted(lines)
     reasons = tuple(one.message for one in doubts)
     remarks = (*log.remarks, *exploration_notes(log, found, loops))
