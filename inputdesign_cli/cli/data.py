@@ -61,14 +61,17 @@ def explore(
     if found.reasons:
         raise typer.Exit(EXIT_MISSED)
     if validate is None and not (shown.quiet or shown.json_output or into.no_output):
-        found_spec = str(place.directory / "spec.yaml")
+        from inputdesign_cli.findings.places import argument
+
+        found_spec = argument(str(place.directory / "spec.yaml"))
         if spec is None:
             then = f"idesign solve {shlex.quote(found_spec)}   (say in it how accurate the model must be)"
         else:
             removed = found.levels.split() if rows.detrend == "none" else []
             options = [*typed(rows), *(point if point and "--detrend" not in removed else removed)]
             again = ["-o", f"{place.directory}_assessed"]  # the usual place holds the run of the other spec
-            then = shlex.join(["idesign", "assess", found_spec, *options, *again, *map(str, data)])
+            logs = (argument(str(path)) for path in data)
+            then = shlex.join(["idesign", "assess", found_spec, *options, *again, *logs])
         typer.echo(f"Then: {then}")
 
 
@@ -186,7 +189,7 @@ def campaign(
     estimates the model, plans the next part with all data so far, and stops as soon as they meet the target.
     The directory remembers every plan, record and decision.
     """
-    place = Place(Into(output, overwrite), name_of(spec), [spec])
+    place = Place(Into(output, overwrite), name_of(spec), [spec], relocates=False)
     with computing(spec, quiet=quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.questions.campaign.directory import begun

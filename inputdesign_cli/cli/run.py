@@ -73,6 +73,7 @@ class Place:
     judges: bool = False  # the run has a verdict
     asked: str = ""  # the spec as it was read
     figures: Figures | None = None  # their form, if the spec has one
+    relocates: bool = True  # whether files that the spec names are named from the directory of the run
 
     def __post_init__(self) -> None:
         if self.into.no_output and self.into.output is not None:
@@ -107,6 +108,8 @@ class Place:
     def spared(self, spec: str) -> str:
         """Return the `spec.yaml` of the run: the user's own text where it is the spec itself.
 
+        File names in it, which start in the folder of the spec, start in the directory of the run then.
+
         Args:
             spec: the text of the run otherwise.
 
@@ -114,12 +117,16 @@ class Place:
             OutputError: `output-is-the-spec`, it would say something else.
         """
         from inputdesign_cli.outcome.run_files import SPEC
-        from inputdesign_cli.specification import same_content
+        from inputdesign_cli.specification import relocated, same_content
         from inputdesign_cli.specification.yaml.files import read_text
 
         target = self.directory / SPEC
         if not any(target.exists() and one.exists() and target.samefile(one) for one in self.sources[:1]):
-            return spec
+            if not (self.relocates and self.sources):
+                return spec
+            stated = self.sources[0]
+            here = Path() if str(stated) == STANDARD_STREAM else stated.parent
+            return relocated(spec, here, self.directory)
         text = read_text(target)
         if not same_content(text, spec):
             message = (

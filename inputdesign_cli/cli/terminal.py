@@ -153,11 +153,15 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             refused = OutputError(_refusal(error))
             raise typer.Exit(_printed(refused, as_data=kwargs.get("json_output", False))) from None
         except Exception as error:
+            from inputdesign_cli.plugins import culprit
+
             _trace()
+            package = culprit(error)
+            whose = f"in {package}, which adds to idesign" if package else "in idesign, not in your spec"
             typer.echo(
                 f"internal error: {type(error).__name__}: {error}\n"
-                "This is a mistake in idesign, not in your spec. Please report it with the spec and with "
-                "what IDESIGN_DEBUG=1 prints.",
+                f"This is a mistake {whose}. Please report it with the spec and with what IDESIGN_DEBUG=1 "
+                "prints.",
                 err=True,
             )
             raise typer.Exit(EXIT_INTERNAL) from None

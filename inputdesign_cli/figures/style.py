@@ -159,7 +159,9 @@ def rendered(
     `seen` gets the page as it was laid out.
     """
     buffer = io.BytesIO()
-    with mpl.rc_context(_look(width)), warnings.catch_warnings():
+    with mpl.rc_context(), warnings.catch_warnings():
+        mpl.rcdefaults()  # whatever the user's matplotlibrc says
+        mpl.rcParams.update(_look(width))
         # A box stands for a letter of the user's that the font lacks; tables and pages have it.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         page = painted(paint, width)

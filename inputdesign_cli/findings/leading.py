@@ -12,7 +12,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
 from inputdesign_cli.finding import Finding, undecided
-from inputdesign_cli.findings.places import Record
+from inputdesign_cli.findings.places import Record, argument
 from inputdesign_cli.findings.refuted_structure import DRIFT, drifting, leaking, no_leak
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant.loop import INTEGRATES
@@ -103,7 +103,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed
         command = _EXPLORE
-    middle, files = float(data.time[len(data.time) // 2]), data.paths or ("DATA",)
+    middle, files = float(data.time[len(data.time) // 2]), [*map(argument, data.paths or ("DATA",))]
     figures = {
         "columns": data.columns_option,
         "logs": shlex.join(files),

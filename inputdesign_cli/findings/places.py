@@ -137,6 +137,11 @@ class Record:
         return self.at(np.concatenate(kept), tuple(map(len, kept)))
 
 
+def argument(path: str) -> str:
+    """Return a path as an argument of a command: one that begins with a dash is no option."""
+    return f"./{path}" if path.startswith("-") else path
+
+
 def file_of(files: Sequence[tuple[str, int]], at: int) -> str:
     """Return the file of a sample, empty where there is one alone; `files` are names and samples."""
     ends = np.cumsum([samples for _, samples in files])

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 _ITEM = re.compile(r"^\s*- ", re.MULTILINE)
+_BLANK = "\ue000"  # stands for a blank that stays
 _LOOSE = re.compile(r" ([,;)]|:(?!:)|\.(?!\.))")
 
 
@@ -48,7 +49,7 @@ def filled(package: str, file: str, facts: Mapping[str, object]) -> str:
 
 
 def _tidy(text: str) -> str:
-    return _LOOSE.sub(r"\1", " ".join(text.split()))
+    return _LOOSE.sub(r"\1", " ".join(text.split())).replace(_BLANK, " ")
 
 
 @cache
@@ -67,6 +68,7 @@ def _templates(package: str) -> Environment:
         "fixed": lambda value, digits=1: f"{value:.{digits}f}",
         "per_cent": per_cent,
         "json": lambda value: json.dumps(value, ensure_ascii=False),
+        "verbatim": lambda command: command.replace(" ", _BLANK),
         "shown": shown,
         "precise": precise,
         "enumerated": enumerated,

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
@@ -347,6 +348,9 @@ def _response(spec: Spec) -> Task:
     return build_response_task(spec)
 
 
+_ALONE = RLock()
+
+
 @contextmanager
 def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
     """Raise overflow, division by zero and singular matrices inside as errors of the spec.
@@ -357,7 +361,9 @@ def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
     Raises:
         InaccurateError: `beyond-precision`, `numerically-singular`.
     """
-    with np.errstate(over="raise", divide="raise", invalid="raise"), warnings.catch_warnings():
+    # Filters of warnings are common to all threads: one computes at a time.
+    strict = np.errstate(over="raise", divide="raise", invalid="raise")
+    with _ALONE, strict, warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         try:
             yield

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plugins import announce, own, points
+from inputdesign_cli.plugins import announce, loaded, own, points, refused
 from inputdesign_cli.signal.kind import SignalKind
 
 GROUP = "idesign.signals"
@@ -22,14 +21,9 @@ def kind_of(name: str) -> SignalKind:
     """Return the kind of this name; raise `SpecError` if the package that adds it does not hold it."""
     if name not in _KINDS:
         point = {**points(GROUP), **own(GROUP)}[name]
-        try:
-            kind = point.load()
-            _KINDS[name] = kind() if isinstance(kind, type) else kind
-        except (ImportError, AttributeError) as error:
-            raise bad_spec(
-                "not-supported",
-                f"the signal {name} is no part of {point.value}, which a package names for it: {error}",
-                hint="update or remove that package, or use another kind of signal",
-                key="signal.type",
-            ) from error
+        kind = loaded(point)
+        kind = kind() if isinstance(kind, type) else kind
+        if not isinstance(kind, SignalKind):
+            raise refused(point, "is no SignalKind")
+        _KINDS[name] = kind
     return _KINDS[name]

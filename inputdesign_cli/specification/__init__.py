@@ -7,6 +7,7 @@ from inputdesign_cli.specification.loading import (
     load_spec,
     parse_spec,
     read_template,
+    relocated,
     same_content,
 )
 from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
@@ -37,5 +38,6 @@ __all__ = [
     "load_spec",
     "parse_spec",
     "read_template",
+    "relocated",
     "same_content",
 ]

@@ -332,6 +332,22 @@ def same_content(one: str, other: str) -> bool:
     return fingerprint(first) == fingerprint(second)
 
 
+def relocated(text: str, here: FilePath, there: FilePath) -> str:
+    """Return the text of a spec in the folder `there` that names the files which it named in `here`.
+
+    Names of files that do not exist, and absolute ones, stay.
+    """
+    tree, lines = read(text, "spec.yaml"), text.splitlines(keepends=True)
+    named = [(tree.places.at(path), name) for path, name in named_files(tree.data)]
+    placed = [(place, name) for place, name in named if place is not None and os.path.isfile(here / name)]
+    for place, name in sorted(placed, key=lambda one: (one[0].line, -one[0].column)):
+        if not FilePath(name).is_absolute():
+            line, at = lines[place.line - 1], place.column - 1
+            moved = FilePath(os.path.relpath(here / name, there)).as_posix()
+            lines[place.line - 1] = line[:at] + line[at:].replace(name, moved, 1)
+    return "".join(lines)
+
+
 # Sample times differ by this share at most, from rounding in a text.
 _SAME = 1e-6
 

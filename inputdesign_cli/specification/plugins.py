@@ -7,14 +7,15 @@ what it asks for, and its `CODES` explain the errors that it raises.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache, reduce
 from operator import or_
 from typing import Annotated, get_args
 
 from pydantic.fields import FieldInfo
 
-from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.plugins import points
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.plugins import loaded, points, refused
 from inputdesign_cli.specification.models.accuracy import Accuracy
 from inputdesign_cli.specification.models.loop import ClosedLoopError, Control
 from inputdesign_cli.specification.models.section import Section, optional
@@ -30,12 +31,9 @@ def added(group: str) -> dict[str, type[Section]]:
     """Return the sections that installed packages add to a group, by key; `SpecError` (`bad-plug-in`)."""
     found: dict[str, type[Section]] = {}
     for point in points(f"idesign.{group}").values():
-        try:
-            section = point.load()
-        except Exception as error:  # whatever the code of another package raises
-            raise _refused(group, point.name, f"cannot be loaded: {error}") from error
+        section = loaded(point)
         if not (isinstance(section, type) and issubclass(section, Section) and hasattr(section, "build")):
-            raise _refused(group, point.name, "is no Section with a method build")
+            raise refused(point, "is no Section with a method build")
         found[point.name] = section
     return found
 
@@ -49,7 +47,7 @@ def install() -> None:
     for group, model in (("requirements", Accuracy), ("control_laws", Control)):
         for name, section in sections[group].items():
             if name in model.model_fields:
-                raise _refused(group, name, "has the name of a key that exists")
+                raise refused(points(f"idesign.{group}")[name], "has the name of a key that exists")
             _set_field(model, name, section | None, (section.__doc__ or name).splitlines()[0])
     alternatives, *choice = get_args(Spectrum)
     wider: Plain = Annotated[(reduce(or_, sections["spectra"].values(), alternatives), *choice)]
@@ -64,10 +62,8 @@ def _set_field(model: type[Section], name: str, annotation: Plain, description: 
 
 def codes() -> dict[str, dict[str, str]]:
     """Return the explanations of the codes of errors that installed packages raise: title, text, remedy."""
-    sections = (section for group in GROUPS for section in added(group).values())
+    sections = list[type[Section]]()
+    for group in GROUPS:
+        with suppress(SpecError):  # the explanation of this error, too, is one of those that are asked for
+            sections += added(group).values()
     return {code: dict(entry) for section in sections for code, entry in section.CODES.items()}
-
-
-def _refused(group: str, name: str, what: str) -> SpecError:
-    message = f"{name}, which an installed package adds to idesign.{group}, {what}"
-    return bad_spec("bad-plug-in", message, hint="mend the package, or uninstall it")

@@ -105,6 +105,10 @@ def parse_settings(settings: Settings) -> tuple[list[str], list[SweepAxis]]:
             raise bad_spec("sweep-twice", f"{key} is swept by two settings", hint=hint, key=key)
         else:
             axes[key] = SweepAxis(key, tuple(texts))
+    for key in (setting.partition("=")[0].strip() for setting in fixed):
+        if key in axes:
+            hint = "leave one of them out"
+            raise bad_spec("sweep-twice", f"{key} is swept, and has one value too", hint=hint, key=key)
     return fixed, list(axes.values())
 
 
@@ -122,6 +126,10 @@ def build_grid(block: Sweep | None, axes: Sequence[SweepAxis], *, zipped: bool) 
         message = "nothing is varied: no key has several values"
         hint = "write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5"
         raise bad_spec("sweep-empty", message, hint=hint)
+    for key in merged:
+        if inner := next((one for one in merged if one.startswith(f"{key}.")), None):
+            message = f"{inner} is swept, and so is {key}, which holds it"
+            raise bad_spec("sweep-twice", message, hint="sweep keys that do not overlap", key=key)
     lengths = {axis.key: len(axis.values) for axis in grid.axes}
     if grid.zipped and len(set(lengths.values())) > 1:
         listed = ", ".join(f"{key} has {n}" for key, n in lengths.items())

@@ -155,10 +155,16 @@ class Identified:
     scatter: tuple[Finding, ...] = ()
 
     def asked_by(self, task: Identification, source: str) -> Identified:
-        """Return the estimate with the question that the spec asks at it, where it can be asked."""
+        """Return the estimate with the question that the spec asks at it, where it can be asked.
+
+        Raises:
+            DataError: a file that the spec names cannot be used.
+        """
         samples, factor = len(self.data.y), self.estimate.factor
         try:
             return replace(self, question=task.at(self.model, samples, factor, source))
+        except DataError:
+            raise
         except IdesignError as error:
             return replace(self, unasked=sentence_of(error))
 
