@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path as FilePath
 
+import yaml
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
@@ -337,6 +338,8 @@ def relocated(text: str, here: FilePath, there: FilePath) -> str:
 
     Names of files that do not exist, and absolute ones, stay.
     """
+    if not any(os.path.isfile(here / one) for one in _texts(yaml.safe_load(text))):
+        return text  # without a look at the schema, which takes its time
     tree, lines = read(text, "spec.yaml"), text.splitlines(keepends=True)
     named = [(tree.places.at(path), name) for path, name in named_files(tree.data)]
     placed = [(place, name) for place, name in named if place is not None and os.path.isfile(here / name)]
@@ -346,6 +349,14 @@ def relocated(text: str, here: FilePath, there: FilePath) -> str:
             moved = FilePath(os.path.relpath(here / name, there)).as_posix()
             lines[place.line - 1] = line[:at] + line[at:].replace(name, moved, 1)
     return "".join(lines)
+
+
+def _texts(data: Plain) -> Iterator[str]:
+    """Yield every text among plain data."""
+    if isinstance(data, str):
+        yield data
+    for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _texts(value)
 
 
 # Sample times differ by this share at most, from rounding in a text.
