@@ -23,9 +23,8 @@ _YOUNG = 500_000
 def main() -> None:
     """Run the `idesign` command."""
     sys.unraisablehook = _send_again
-    os.environ["MPLBACKEND"] = (
-        "agg"  # that of a notebook from which the command is started need not exist here
-    )
+    # The backend of a notebook from which the command is started need not exist here.
+    os.environ["MPLBACKEND"] = "agg"
     gc.set_threshold(_YOUNG, 10, 10)
     atexit.register(gc.freeze)  # what is left at the end need not be looked through
     try:

@@ -50,8 +50,8 @@ class Requirement(ABC):
     """A convex condition on the information matrix M (k, k) in the coordinates of the experiment.
 
     Its `ratio` is measured as an error is, in standard deviations: with ratio r, the matrix r^2 M just
-    meets the requirement (and no smaller multiple does). A new requirement is a subclass that
-    defines `name`, `violations`, `ratios` and `cut`; the other methods have defaults.
+    meets the requirement (and no smaller multiple does). A new requirement is a subclass that defines
+    `name`, `violations`, `ratios` and `cut`; the other methods have defaults.
     """
 
     @property

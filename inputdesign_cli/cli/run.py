@@ -108,7 +108,7 @@ class Place:
     def spared(self, spec: str) -> str:
         """Return the `spec.yaml` of the run: the user's own text where it is the spec itself.
 
-        File names in it, which start in the folder of the spec, start in the directory of the run then.
+        Names of files in it, which start in the folder of the spec, then start in the directory of the run.
 
         Args:
             spec: the text of the run otherwise.

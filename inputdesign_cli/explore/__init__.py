@@ -11,6 +11,7 @@ from inputdesign_cli.explore.fits import (
 from inputdesign_cli.explore.joint import Found as Found, explore_records as explore_records
 from inputdesign_cli.explore.relation import (
     answers_output as answers_output,
+    check_enough as check_enough,
     check_unpredictable as check_unpredictable,
     early_answers as early_answers,
     exact_multiple as exact_multiple,

@@ -294,16 +294,21 @@ def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]
     still = tuple(int(j) for j in np.flatnonzero(rest))
     moving = [j for j in range(u.shape[1]) if j not in still]
     for needed in (_FEWEST_SAMPLES, _FEWEST_SAMPLES * (len(moving) + 1) // 2):
-        if len(y) < needed:
-            are = "1 sample is" if len(y) == 1 else f"{len(y)} samples are"
-            raise bad_spec(
-                "too-few-samples",
-                f"{are} too few to choose a structure and to judge it: take {needed} at least",
-                hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
-                key="u",
-            )
+        check_enough(y, needed)
         check_varying(_UNKNOWN, u[:, moving] if moving else u, y)
     return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
+
+
+def check_enough(y: Array, needed: int = _FEWEST_SAMPLES) -> None:
+    """Check that outputs y (n, p) have samples to judge a model; raise `SpecError` (`too-few-samples`)."""
+    if len(y) < needed:
+        are = "1 sample is" if len(y) == 1 else f"{len(y)} samples are"
+        raise bad_spec(
+            "too-few-samples",
+            f"{are} too few to choose a structure or to judge one: take {needed} at least",
+            hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
+            key="u",
+        )
 
 
 def order_of_excitation(parts: Parts, most: int = 50) -> int:

@@ -165,7 +165,7 @@ class Process:
 
     @property
     def poles(self) -> int:
-        """Return the number of poles, those of integrators counted."""
+        """Return the number of poles, also of integrators."""
         return self.order + self.rising
 
     @property

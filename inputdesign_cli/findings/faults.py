@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
+from inputdesign_cli.finding import NOTE, REFUTED, Finding, FindingKind, finding, refuted
 from inputdesign_cli.findings.outlying_values import visible_step
 from inputdesign_cli.findings.places import SHOWN, Record, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
@@ -21,7 +21,7 @@ from inputdesign_cli.plant import TransferMatrix
 # Share of samples above which a frozen sensor biases a model; fit (%) below which spikes do.
 _BIASING, _HALF = 0.02, 50.0
 # The error that rounding may leave in a level, as a share of the deviation of the output.
-_ROUNDED_OFF = 0.03
+_ROUNDED_OFF, _HARMONICS = 0.03, 50
 # Moves of inputs up to so many samples before explain spikes, if they leave less than this share of squares.
 _BEFORE, _LEFT = 6, 0.25
 
@@ -82,11 +82,7 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
 
 
 def _coarse(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
-    """Return a finding for each output whose noise does not even out the steps of its sensor.
-
-    Gaussian noise of deviation s in front of steps d leaves an error of at most (d / pi) exp(-2 (pi s / d)^2)
-    in a level that is held ([widrow-kollar-2008]).
-    """
+    """Return a finding for each output whose noise does not even out the steps of its sensor."""
     if data.recorded is None:
         return []
     found = []
@@ -97,7 +93,7 @@ def _coarse(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
             continue
         left = float(np.var(data.y[:, output] - simulated))
         noise = float(np.sqrt(max(left - step**2 / 12.0, 0.0)))
-        error = step / np.pi * float(np.exp(-2.0 * (np.pi * noise / step) ** 2))
+        error = rounding_error(step, noise)
         name = _named(units, output)
         fact = (
             f"{name} in steps of {step:.3g}, and noise of about {noise:.2g}. Levels may be wrong by "
@@ -114,6 +110,17 @@ def follows_inputs(errors: Array, samples: Sequence[int], u: Array) -> bool:
     columns = np.column_stack([moves[np.maximum(at - lag, 0)] for lag in range(_BEFORE + 1)])
     left = errors - columns @ np.linalg.lstsq(columns, errors, rcond=None)[0]
     return len(at) >= 2 * columns.shape[1] and float(left @ left) < _LEFT * float(errors @ errors)
+
+
+def rounding_error(step: float, noise: float) -> float:
+    """Return the largest mean error of rounded samples of a level, behind Gaussian noise of that deviation.
+
+    It is a sawtooth of the level with harmonics (d / (pi k)) exp(-2 (pi k s / d)^2), step d and noise s
+    ([widrow-kollar-2008]). Their sum bounds it, and so does half a step.
+    """
+    k = np.arange(1, _HARMONICS + 1)
+    harmonics = step / (np.pi * k) * np.exp(-2.0 * (np.pi * k * noise / step) ** 2)
+    return float(min(0.5 * step, np.sum(harmonics)))
 
 
 def biasing(units: Units, estimate: Estimate, data: Record, fitted: Sequence[float]) -> list[Finding]:
@@ -189,10 +196,17 @@ def shifted_levels(kind: FindingKind, estimate: Estimate, data: Record, time_uni
     return [kind.found(what, remedy=remedy, probability=probability, rows=rows, option=option)]
 
 
+@finding(NOTE, "shifts-left-out", "Leave the same rows out for identify and assess: `--without ROWS`.")
 def left_out(
-    log: Record, shifts: Sequence[LevelShift], samples: NDArray[np.int64], time_unit: str, *, short: int
-) -> str:
-    """Return the step of preparation that leaves shifts out of a log.
+    kind: FindingKind,
+    log: Record,
+    shifts: Sequence[LevelShift],
+    samples: NDArray[np.int64],
+    time_unit: str,
+    *,
+    short: int,
+) -> Finding:
+    """Shifts of an output were left out, and each part has its own level. A load may have changed.
 
     Args:
         samples: positions in the log of the samples by which the shifts are numbered.
@@ -202,10 +216,10 @@ def left_out(
     what, runs = _described(shifts, log, rows, samples, time_unit)
     listed = " and ".join(f"{first} to {last}{f' of {name}' if name else ''}" for name, first, last in runs)
     besides = f", and {short} samples next to them, too few for a segment" if short else ""
-    return (
-        f"{what} (a change of load, or of the gain?): rows {listed} were left out{besides}. Each part has "
-        f"its own level; identify and assess need {without_option(runs)}"
-    )
+    option = without_option(runs)
+    fact = f"{what} (a change of load, or of the gain?). Rows {listed}{besides}"
+    remedy = f"Leave the same rows out for identify and assess: {option}."
+    return kind.found(fact, remedy=remedy, rows=[[first, last] for _, first, last in runs], option=option)
 
 
 def _described(

@@ -95,7 +95,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     shifts = first.code == "level-shift" and _may_drift(first, data)
     if estimate is not None and ((drifts and (own or first.code == "plant-structure")) or shifts):
         # Past inputs, or a shift of most of a record, explain what a leak takes away.
-        if leaks := "" if no_leak(estimate) else _leaking(estimate, data.time):
+        if leaks := _leaking(estimate, data.time):
             model = estimate.search.records.kind.model
             alike, command = drifts or [drifting(model, "its level shifts for most of the record")], leaks
         elif own and _drifts(estimate):
@@ -122,8 +122,8 @@ def _integrates(estimate: Estimate) -> bool:
 
 
 def _leaking(estimate: Estimate, time: Array) -> str:
-    """Return the command that lets a plant leak which is known to integrate; empty for another plant."""
-    if not (denominator := leaking(estimate.search.records.kind.model)):
+    """Return the command that lets a plant leak which is known to integrate; empty if it does not leak."""
+    if no_leak(estimate) or not (denominator := leaking(estimate.search.records.kind.model)):
         return ""
     rate = _LEAK / float(np.median(np.diff(time)))
     return (

@@ -66,7 +66,6 @@ class Record:
         repeated: files that have samples in common.
         lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
             the inputs cause a part of it.
-        remarks: what a question did to the record later.
         paths: of the files, as they were given.
     """
 
@@ -85,13 +84,12 @@ class Record:
     means: Array | None = None
     repeated: tuple[Finding, ...] = ()
     lined: bool = False
-    remarks: tuple[str, ...] = ()
     paths: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return the messages of the findings, and the remarks."""
-        return (*(one.message for one in self.findings), *self.remarks)
+        """Return the messages of the findings."""
+        return tuple(one.message for one in self.findings)
 
     @property
     def columns_option(self) -> str:

@@ -13,7 +13,7 @@ from inputdesign_cli.outcome.model_words import Plain, blocks_of
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
-_BY_CHANCE = 0.05
+_BY_CHANCE = 0.05  # a leak that is no better than this explains nothing
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
 _LAG = "a further lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 

@@ -69,7 +69,7 @@ def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
 
 @finding(DOUBT, "columns-perhaps-swapped", "Exchange u and y in `--columns`.")
 def perhaps_swapped(kind: FindingKind, parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
-    """An output is held as an input is, and the inputs move as outputs do. The columns may be swapped.
+    """Columns of inputs and outputs may be swapped. An output is held, and the inputs move in most rows.
 
     Args:
         parts: all records, u (n, r), y (n, p).

@@ -10,13 +10,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
 
 class Curves:
     """Holds the content of one figure; `figures.plots` draws each kind."""
+
+
+# Users write frequencies with three digits or so: within this share, a frequency is that of the line.
+_SAME_LINE = 1e-3
+
+
+def _room(frequency: Array) -> Array:
+    """Return the frequency of each line, or its distance to the next one where that is less, (n,)."""
+    apart = np.abs(frequency[:, None] - frequency)
+    np.fill_diagonal(apart, np.inf)
+    return np.minimum(frequency, apart.min(axis=1))
 
 
 @dataclass(frozen=True)
@@ -31,6 +42,30 @@ class SpectrumCurves(Curves):
     record: Array | None = None  # (n, r), smoothed periodograms of the record
     band: tuple[float, float] | None = None  # where the sinusoids might be
     label: str = "design"  # what gave it
+
+    @property
+    def phi(self) -> Array | NDArray[np.complex128]:
+        """Return the spectrum at `frequency`: (n,) of one input, else (n, r, r)."""
+        single = self.spectrum.shape[1:] == (1, 1)
+        return np.asarray(self.spectrum[:, 0, 0].real) if single else self.spectrum
+
+    def __call__(self, w: ArrayLike) -> NDArray[np.complex128]:
+        """Return the spectrum (.., r, r) at frequencies `w`, a number or an array (..), in rad per time unit.
+
+        A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
+        and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
+        is that of the line.
+        """
+        stated = np.asarray(w, dtype=float)
+        at, shape = stated.ravel(), (*stated.shape, *self.spectrum.shape[1:])
+        if self.lines:
+            nearest = np.abs(self.frequency - at[:, None]).argmin(axis=1)
+            on = np.abs(self.frequency[nearest] - at) <= _SAME_LINE * _room(self.frequency)[nearest]
+            powers = np.where(on[:, None, None], self.spectrum[nearest], 0.0)
+            return powers.reshape(shape).astype(complex)
+        flat = self.spectrum.reshape(len(self.frequency), -1)
+        columns = [np.interp(at, self.frequency, column, left=0.0, right=0.0) for column in flat.T]
+        return np.stack(columns, axis=1).reshape(shape).astype(complex)
 
 
 @dataclass(frozen=True)

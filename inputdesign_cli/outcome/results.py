@@ -7,14 +7,14 @@ circle / 2 pi).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from typing import Any, Self, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.outcome import design, estimate
@@ -73,11 +73,12 @@ class Outcome:
 
     def saying(self, findings: Iterable[Finding]) -> Self:
         """Return the outcome with further findings and their notes."""
-        more = tuple(findings)
-        if not more:
-            return self
-        messages = tuple(one.message for one in more)
-        return replace(self, findings=(*(self.findings or ()), *more), notes=(*(self.notes or ()), *messages))
+        return self.with_findings([*(self.findings or ()), *findings])
+
+    def with_findings(self, findings: Sequence[Finding]) -> Self:
+        """Return the outcome with these findings in place of its own; the notes are their messages."""
+        notes = tuple(one.message for one in findings)
+        return replace(self, findings=tuple(findings) or None, notes=notes or None)
 
 
 @dataclass(frozen=True)
@@ -164,28 +165,16 @@ class Results:
             raise AttributeError(f"this run has no {stem}.csv")
         return self.tables[stem]
 
-    def spectrum(self, w: ArrayLike) -> NDArray[np.complex128]:
-        """Return the spectrum (.., r, r) at frequencies `w`, a number or an array (..), in rad per time unit.
-
-        A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
-        and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
-        is that of the line.
+    @property
+    def spectrum(self) -> SpectrumCurves:
+        """Return the spectrum: `frequency` and `phi` as in spectrum.csv; `spectrum(w)` at other frequencies.
 
         Raises:
             AttributeError: the run has no spectrum.
         """
         if "spectrum" not in self.curves:
             raise AttributeError("this run has no spectrum")
-        found, stated = cast(SpectrumCurves, self.curves["spectrum"]), np.asarray(w, dtype=float)
-        at, shape = stated.ravel(), (*stated.shape, *found.spectrum.shape[1:])
-        if found.lines:
-            nearest = np.abs(found.frequency - at[:, None]).argmin(axis=1)
-            on = np.abs(found.frequency[nearest] - at) <= _SAME_LINE * _room(found.frequency)[nearest]
-            powers = np.where(on[:, None, None], found.spectrum[nearest], 0.0)
-            return powers.reshape(shape).astype(complex)
-        flat = found.spectrum.reshape(len(found.frequency), -1)
-        columns = [np.interp(at, found.frequency, column, left=0.0, right=0.0) for column in flat.T]
-        return np.stack(columns, axis=1).reshape(shape).astype(complex)
+        return cast(SpectrumCurves, self.curves["spectrum"])
 
     def _repr_html_(self) -> str:
         """Return the head of the result for a notebook."""
@@ -202,14 +191,3 @@ class Results:
             f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in rows
         )
         return f"<b>{escape(found.title or '')}</b><table>{cells}</table>"
-
-
-# Users write frequencies with three digits or so: within this share, a frequency is that of the line.
-_SAME_LINE = 1e-3
-
-
-def _room(frequency: Array) -> Array:
-    """Return the frequency of each line, or its distance to the next one where that is less, (n,)."""
-    apart = np.abs(frequency[:, None] - frequency)
-    np.fill_diagonal(apart, np.inf)
-    return np.minimum(frequency, apart.min(axis=1))

@@ -21,7 +21,7 @@ import yaml
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
+from inputdesign_cli.errors import DataError, IdesignError, InaccurateError, InfeasibleError
 from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.specification import Spec, load_spec, parse_spec
 
@@ -254,7 +254,10 @@ def _known(spec: Stated, design: bool | None = True) -> Spec:
 
 
 def _paths(data: Files) -> list[Path]:
-    return [Path(data)] if isinstance(data, str | Path) else [Path(one) for one in data]
+    paths = [Path(data)] if isinstance(data, str | Path) else [Path(one) for one in data]
+    if not paths:
+        raise DataError.because("data-unreadable", "no data file is given", "name one file at least")
+    return paths
 
 
 def _prepared(

@@ -5,9 +5,11 @@ from inputdesign_cli.specification.loading import (
     is_prior,
     load_estimate,
     load_spec,
+    moved_names,
     parse_spec,
     read_template,
     relocated,
+    renamed,
     same_content,
 )
 from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
@@ -36,8 +38,10 @@ __all__ = [
     "json_schema",
     "load_estimate",
     "load_spec",
+    "moved_names",
     "parse_spec",
     "read_template",
     "relocated",
+    "renamed",
     "same_content",
 ]

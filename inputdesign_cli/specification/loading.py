@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path as FilePath
@@ -338,16 +338,26 @@ def relocated(text: str, here: FilePath, there: FilePath) -> str:
 
     Names of files that do not exist, and absolute ones, stay.
     """
-    if not any(os.path.isfile(here / one) for one in _texts(yaml.safe_load(text))):
-        return text  # without a look at the schema, which takes its time
+    names = {one for one in _texts(yaml.safe_load(text)) if os.path.isfile(here / one)}
+    return renamed(text, moved_names(names, here, there)) if names else text
+
+
+def moved_names(names: Iterable[str], here: FilePath, there: FilePath) -> dict[str, str]:
+    """Return how files that are named from the folder `here` are named from `there`; absolute names stay."""
+    own = [name for name in names if not FilePath(name).is_absolute()]
+    return {name: FilePath(os.path.relpath(here / name, there)).as_posix() for name in own}
+
+
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """Return the text of a spec in which files have other names, by their names so far."""
+    if not names:
+        return text
     tree, lines = read(text, "spec.yaml"), text.splitlines(keepends=True)
-    named = [(tree.places.at(path), name) for path, name in named_files(tree.data)]
-    placed = [(place, name) for place, name in named if place is not None and os.path.isfile(here / name)]
+    found = [(tree.places.at(path), name) for path, name in named_files(tree.data) if name in names]
+    placed = [(place, name) for place, name in found if place is not None]
     for place, name in sorted(placed, key=lambda one: (one[0].line, -one[0].column)):
-        if not FilePath(name).is_absolute():
-            line, at = lines[place.line - 1], place.column - 1
-            moved = FilePath(os.path.relpath(here / name, there)).as_posix()
-            lines[place.line - 1] = line[:at] + line[at:].replace(name, moved, 1)
+        line, at = lines[place.line - 1], place.column - 1
+        lines[place.line - 1] = line[:at] + line[at:].replace(name, names[name], 1)
     return "".join(lines)
 
 

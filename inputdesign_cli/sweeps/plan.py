@@ -25,12 +25,12 @@ from inputdesign_cli.outcome.run_directory import digest
 from inputdesign_cli.outcome.run_files import environment
 from inputdesign_cli.questions import Verb
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification import Spec, SpecTemplate, Sweep, read_template
+from inputdesign_cli.specification import Spec, SpecTemplate, Sweep, moved_names, read_template, renamed
 from inputdesign_cli.specification.models.sweep import range_values
 from inputdesign_cli.specification.yaml.plain import plain, to_yaml
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.specification.yaml.scalars import resolve
-from inputdesign_cli.sweeps.points import PointJob
+from inputdesign_cli.sweeps.points import Layout, PointJob
 from inputdesign_cli.version import __version__
 
 Settings = Sequence[str] | Mapping[str, object]
@@ -198,19 +198,33 @@ class Plan:
             self._keys[index] = hashlib.sha256(name).hexdigest()[:_KEY_LENGTH]
         return self._keys[index]
 
-    def job(self, index: int, root: Path | None, *, figures: str) -> PointJob:
-        """Return the job of a point for a worker; without `root` it carries the files that the spec names."""
+    def names(self, index: int, directory: Path) -> dict[str, str]:
+        """Return how the run of a point in the `directory` of the sweep names the files of the spec."""
+        try:
+            files = self.draft.files(self.draft.variant(self.grid.overrides(index)))
+        except SpecError:
+            return {}
+        return moved_names(files, self.draft.folder, Layout(directory).run(self.key(index)))
+
+    def job(self, index: int, root: Path | None, *, directory: Path, figures: str) -> PointJob:
+        """Return the job of a point for a worker; without `root` it carries the files that the spec names.
+
+        Args:
+            directory: of the sweep, which `root` is for a worker that may see it.
+        """
         overrides, files = tuple(self.grid.overrides(index)), None
         if root is None:
             with suppress(SpecError):
                 names = [*self.draft.included, *self.draft.files(self.draft.variant(overrides))]
                 files = {name: read_regular(self.draft.folder / name) for name in names}
-        return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
+        key, moved = self.key(index), self.names(index, directory)
+        return PointJob(index, key, self.draft, overrides, self.verb, figures, root, moved, files)
 
-    def resolved(self, index: int) -> str | None:
-        """Return the `spec.yaml` of a point, or None for an invalid spec."""
+    def resolved(self, index: int, directory: Path) -> str | None:
+        """Return the `spec.yaml` of a point in the `directory` of the sweep, or None for an invalid spec."""
         try:
-            return self.draft.spec(self.grid.overrides(index)).to_yaml()
+            spec = self.draft.spec(self.grid.overrides(index))
+            return renamed(spec.to_yaml(), self.names(index, directory))
         except SpecError:
             return None
 

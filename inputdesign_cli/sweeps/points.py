@@ -48,7 +48,7 @@ from inputdesign_cli.outcome.run_files import (
 )
 from inputdesign_cli.questions import Verb, run_verb
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification import SpecTemplate
+from inputdesign_cli.specification import SpecTemplate, renamed
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, OWNER, WORKER = ".lock", ".process", ".worker-"
@@ -224,6 +224,7 @@ class PointJob:
     verb: Verb
     figures: str
     root: Path | None  # the directory of the sweep; None on a machine that may not see it
+    names: Mapping[str, str]  # files that the spec names -> their names in the run
     files: dict[str, bytes] | None = None  # what the spec names, for such a machine
 
 
@@ -266,7 +267,8 @@ def _compute(job: PointJob, directory: Path) -> dict[str, object] | None:
         with bare_interruptions():
             results = run_verb(job.verb, spec)
         timing = {**(results.outcome.timing_s or {}), "point": time.perf_counter() - started}
-        results = replace(results, outcome=replace(results.outcome, timing_s=timing))
+        written = renamed(results.resolved_spec, job.names)
+        results = replace(results, outcome=replace(results.outcome, timing_s=timing), resolved_spec=written)
         write_run(results, directory, draw_all(results, job.figures) if job.figures else {})
     except OutputError:
         raise

@@ -16,6 +16,7 @@ from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.run_directory import Origin, output_errors, replace_text
 from inputdesign_cli.outcome.run_files import PAGE, is_page
 from inputdesign_cli.outcome.text_formats import csv_line, shortest
+from inputdesign_cli.specification import relocated
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps import points
 from inputdesign_cli.sweeps.plan import Plan
@@ -112,7 +113,7 @@ def list_points(plan: Plan, directory: Path) -> Iterator[Listing]:
     for index, point in enumerate(plan.grid.points):
         key = plan.key(index)
         try:
-            content = layout.read(key, plan.resolved(index))
+            content = layout.read(key, plan.resolved(index, directory))
             status = PENDING if content is None else "failed" if "code" in content else "done"
         except DataError:
             status = DAMAGED
@@ -180,7 +181,8 @@ class SweepRun:
             if is_page(directory / PAGE):  # it is about what the sweep was before
                 (directory / PAGE).unlink()
             replace_text(directory / points.SUMMARY, json_text(plan.summary(made_from, {})))
-            replace_text(directory / points.SPEC, to_yaml({**plan.base, "sweep": plan.grid.block()}))
+            text = to_yaml({**plan.base, "sweep": plan.grid.block()})
+            replace_text(directory / points.SPEC, relocated(text, plan.draft.folder, directory))
             try:
                 self._compute()
             finally:
@@ -236,7 +238,7 @@ class SweepRun:
                 content = self._known(index, key)
                 self.rows[key] = row_of(key, content) if content else None
                 if content is None:
-                    yield self.plan.job(index, root, figures=drawn)
+                    yield self.plan.job(index, root, directory=self.directory, figures=drawn)
                     continue
                 if "code" in content:
                     self._note_failure(index, content)
@@ -245,7 +247,7 @@ class SweepRun:
     def _known(self, index: int, key: str) -> Mapping[str, object] | None:
         """Return the known result of a point; nothing if that is damaged, or if it is to be tried again."""
         try:
-            content = self.layout.read(key, self.plan.resolved(index))
+            content = self.layout.read(key, self.plan.resolved(index, self.directory))
         except DataError as error:
             self.damaged.append(error.diagnostics[0].message)
             self.layout.discard(key)

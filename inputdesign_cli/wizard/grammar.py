@@ -448,17 +448,21 @@ def _time_constant(found: re.Match[str]) -> str:
     low, high = float(found["number"]), float(found["high"] or found["number"])
     if not 0.0 < low < high:
         return f"{low / constants:.4g} {found['unit']}"
-    share = 100.0 * (high - low) / (high + low)
-    return f"{0.5 * (low + high) / constants:.4g} {found['unit']} within {share:.3g} % itself"
+    return _between(low / constants, high / constants, found["unit"])
 
 
 def _middle(found: re.Match[str]) -> str:
-    """Return the middle of two ends, and the share to either side that reaches them."""
+    """Return what is said to lie between two ends by their middle."""
     one, other = float(found["low"]), float(found["high"])
     if not 0.0 < one < other:
         return found[0]
-    share = 100.0 * (other - one) / (other + one)
-    return f"{found['what']} {0.5 * (one + other):g} {found['unit']} within {share:.3g} % itself"
+    return f"{found['what']} {_between(one, other, found['unit'])}"
+
+
+def _between(low: float, high: float, unit: str) -> str:
+    """Return the middle of two ends, and the share to either side that reaches them."""
+    share = 100.0 * (high - low) / (high + low)
+    return f"{0.5 * (low + high):.4g} {unit} within {share:.3g} % itself"
 
 
 def unread(text: str) -> list[str]:

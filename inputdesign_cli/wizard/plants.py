@@ -162,7 +162,7 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
         raise bad_answer("plant", "it does not say the gain, or says that it is zero, or says two")
     gain = found[steady[0]]
     if steady == ["gain"] and not gain.base and re.search(rf"\b(?:{UP})\b", text, re.I):
-        raise bad_answer("plant", f'"{text}" does not say of what move of the input: "1.5 degC per 10 %"')
+        raise bad_answer("plant", f'"{text}" names no move of the input: "1.5 degC per 10 %"')
     found = {name.replace("rise", "slope"): one for name, one in found.items()}
     own = {name: one.share for name, one in found.items() if one.share is not None}
     sampled = phrase.after(r"sampl(?:e|ing) time|sampled? every|sampling(?: every)?", "time", named=True)

@@ -62,5 +62,7 @@ def differences(expected, found, where):
 def test_results_hold_what_they_held(name, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     caller(monkeypatch)(*command(name), "-o", tmp_path / "run", "--no-figures", "--quiet")
-    found = condensed(json.loads((tmp_path / "run/result.json").read_text()))
+    result = json.loads((tmp_path / "run/result.json").read_text())
+    assert result.get("notes", []) == [one["message"] for one in result.get("findings", [])]
+    found = condensed(result)
     assert list(differences(EXPECTED[name], found, name)) == []

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.finding import REFUTED, Finding
+from inputdesign_cli.finding import REFUTED, Finding, Severity
 from inputdesign_cli.questions import explore, identify, solve
 from inputdesign_cli.questions.exploration import explore as exploring
 from inputdesign_cli.questions.exploration.build import Asked, spec_text
@@ -74,9 +74,8 @@ def test_a_damping_above_one_is_said_as_two_lags(tmp_path):
     x = scipy.signal.lfilter([0, 0.1], [1, -0.9], scipy.signal.lfilter([0, 0.3], [1, -0.7], u))
     rows = np.column_stack([np.arange(600), u, x + 0.02 * rng.standard_normal(600)])
     np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time_s,u,y", comments="")
-    result = explore(tmp_path / "log.csv", structure="sopdt").results.result
-    (note,) = (one for one in result["notes"] if "two lags" in one)
-    lags = [float(number) for number in re.findall(r"[\d.]+", note.split("two lags")[1])[:2]]
+    findings = explore(tmp_path / "log.csv", structure="sopdt").results.findings
+    (lags,) = (one.figures["lags"] for one in findings if one.code == "two-lags")
     assert lags == pytest.approx([-1 / np.log(0.9), -1 / np.log(0.7)], rel=0.15)
 
 
@@ -411,7 +410,9 @@ def test_a_poor_fit_is_held_against_a_model_where_inputs_explain_the_rest(noise,
     )
     assert right.reasons == ()
     assert right.results.result["validation"]["simulation_fit_percent"] < explained
-    assert ["past inputs explain" in reason for reason in lag.reasons] == [True]
+    doubts = [one.code for one in lag.results.findings if one.severity is Severity.DOUBT]
+    assert doubts == ["model-of-other-plant"]
+    assert len(lag.reasons) == 1
 
 
 def test_a_model_without_a_sample_time_is_named(tmp_path):

@@ -110,6 +110,8 @@ def test_results_are_arrays():
     table = outcome.tables["spectrum"].columns
     frequency, phi = table["frequency_rad_per_s"], table["phi"]
     np.testing.assert_allclose(outcome.spectrum(frequency[5:9])[:, 0, 0], phi[5:9])
+    np.testing.assert_array_equal(outcome.spectrum.frequency, frequency)
+    np.testing.assert_array_equal(outcome.spectrum.phi, phi)
     w = np.array([0.3, 2.0])
     exact = c[0] + 2 * sum(c[k] * np.cos(k * w) for k in range(1, len(c)))
     np.testing.assert_allclose(outcome.spectrum(w)[:, 0, 0], exact, rtol=1e-2)
@@ -132,7 +134,7 @@ def test_what_a_run_does_not_have_is_no_attribute_of_it():
         with pytest.raises(AttributeError, match=name):
             getattr(bare, name)
     with pytest.raises(AttributeError, match="spectrum"):
-        bare.spectrum(0.1)
+        _ = bare.spectrum
 
 
 def test_the_power_of_a_line_is_found_by_the_digits_that_people_write():

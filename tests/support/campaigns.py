@@ -77,5 +77,5 @@ def stands(at: Planner, theta: Sequence[float] = (), share: float = 1.0, samples
 def found(result: dict, code: str) -> list[dict]:
     """The findings of a result that have this code; each stands in the notes as well."""
     listed = [one for one in result.get("findings", []) if one["code"] == code]
-    assert {one["message"] for one in listed} <= set(result.get("notes", []))
+    assert result.get("notes", []) == [one["message"] for one in result.get("findings", [])]
     return listed

@@ -199,9 +199,7 @@ def _topped_up(
         status="missed",
         identification=was.identification,
         assessment=completed.outcome.assessment,
-        findings=(*(design.findings or ()), *(was.findings or ())) or None,
-        notes=(*(design.notes or ()), *(was.notes or ())) or None,
-    )
+    ).saying(was.findings or ())
     return replace(
         topped,
         outcome=outcome,

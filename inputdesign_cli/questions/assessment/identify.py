@@ -330,9 +330,7 @@ def identification_results(task: Identification, found: Identified, began: float
         identification=identification_entry(estimate, found.preparation, found.ruled_out),
         information=information_entry(estimate),
         model_error=bound,
-        notes=found.data.notes or None,
-        findings=found.data.findings or None,
-    ).saying(findings_of(task, found))
+    ).with_findings([*found.data.findings, *findings_of(task, found)])
     outcome = replace(outcome, timing_s={"identification": time.perf_counter() - began})
     files = {"model.yaml": model_text(header.units, found.model, estimate).encode()}
     return Results(outcome, header.resolved_spec, header.units.time_unit, tables, curves, files)

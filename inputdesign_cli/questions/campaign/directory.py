@@ -125,7 +125,7 @@ def advanced(
         files[record.file] = csv_text(table).encode()
         files[f"{Path(record.file).stem}_as_given{given.suffix.lower()}"] = read_regular(given)
         campaign = replace(campaign, records=(*campaign.records, record))
-        said = Outcome(notes=data.notes).saying(findings)
+        said = Outcome().saying([*data.findings, *findings])
     if regardless:
         campaign = replace(campaign, regardless=True)
     return _again(task, memory, campaign, files, said, given)
@@ -209,14 +209,9 @@ def _decided(
     campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=found.state)
     campaign = replace(campaign, digests=digests(campaign, files))
     tables["rounds"], progress = history(campaign.rounds, task.rules.end)
-    outcome = replace(
-        outcome,
-        status=found.state,
-        samples=campaign.done,
-        campaign=campaign,
-        notes=tuple(dict.fromkeys([*(said.notes or ()), *(outcome.notes or ())])) or None,
-        findings=(*(said.findings or ()), *(outcome.findings or ())) or None,
-    )
+    listed = {one.message: one for one in [*(said.findings or ()), *(outcome.findings or ())]}
+    outcome = replace(outcome, status=found.state, samples=campaign.done, campaign=campaign)
+    outcome = outcome.with_findings(list(listed.values()))
     time_unit, curves = header.units.time_unit, curves | progress
     return Results(outcome, header.resolved_spec, time_unit, tables, curves, files)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,52 +14,38 @@ import numpy as np
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore import (
     Family,
-    Fits,
     Found,
     answers_output,
+    check_enough,
     check_unpredictable,
     explore_records,
     fits,
     levelled,
 )
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.explored_logs import (
-    DRIVE,
-    HALF,
-    LEAST_FIT,
-    doubtful_inputs,
-    doubtful_model,
-    undriven,
-)
+from inputdesign_cli.findings.explored_logs import DRIVE, doubtful_inputs, doubtful_model, undriven
+from inputdesign_cli.findings.explored_structures import explored_structures
 from inputdesign_cli.findings.faults import SPIKES, biasing, left_out, shifted_levels
 from inputdesign_cli.findings.frequency_responses import contradicted, response_note, silent_lines_answer
+from inputdesign_cli.findings.judged_models import other_plants
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs, perhaps_swapped
-from inputdesign_cli.identification import cross_correlations, silent_in
-from inputdesign_cli.identification.checks import check_varying, signal_name
+from inputdesign_cli.identification import silent_in
+from inputdesign_cli.identification.checks import check_varying
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.curves import FitCurves
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identified, blaming_columns, identification_results
 from inputdesign_cli.questions.assessment.outcome import fit_of, fit_to_log, response_without_model
 from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.exploration.build import Asked, build_explored, spec_text
-from inputdesign_cli.questions.exploration.outcome import (
-    exploration_notes,
-    exploration_of,
-    structure_curves,
-    validation_of,
-)
+from inputdesign_cli.questions.exploration.outcome import exploration_of, structure_curves, validation_of
 from inputdesign_cli.records import Preparation, Record, read_data, read_logs, read_sheet, with_channels
 
 # Where more shifts appear, once these are left out so often, the plant is none of the models tried.
 _MOST_SHIFTS = 2
-# Probability that past inputs explain the residuals of a model by chance alone.
-_SURELY = 1e-6
-_SEE = "see whether the model is of this plant, and gain, delay, units and columns agree"
 
 
 @dataclass(frozen=True)
@@ -108,21 +94,18 @@ def explore(
     doubts = _doubts(found, measured, data, units, loop=looped, integrates=integrates)
     doubts += () if lines is None else contradicted(lines)
     reasons = tuple(one.message for one in doubts)
-    remarks = (*log.remarks, *exploration_notes(log, found, loops))
-    noted = replace(data, findings=log.findings, remarks=remarks)
+    noted = replace(data, findings=(*log.findings, *explored_structures(log, found, loops)))
     identified = Identified(found.estimate, found.model, noted, preparation, loop_noted=looped)
     results = identification_results(task, identified.asked_by(task, "the estimate"), started)
     names = " and ".join(path.name for path in paths)
-    was = results.outcome
+    once = [one for one in results.outcome.findings or () if one.message not in reasons]
     outcome = replace(
-        was,
-        findings=tuple(one for one in was.findings or () if one.message not in reasons) or None,
-        notes=tuple(note for note in was.notes or () if note not in reasons) or None,
+        results.outcome.with_findings(once),
         title=f"The plant, from {names}",
         exploration=exploration_of(log, found, loops, reasons, lines, silent),
         validation=validation_of(found.validation),
     )
-    findings = [replace(one, message=f"no trust: {one.message}") for one in doubts]
+    findings = [*map(_untrusted, doubts)]
     findings += () if lines is None else response_note(lines)
     findings += silent_lines_answer(silent)
     text = spec_text(log, found, paths, reasons, loop=looped and not asked, asked=asked)
@@ -194,15 +177,20 @@ def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = Non
             return rest, found
         short = len(rest.y) - len(less.y) - len(shifting)
         step = left_out(rest, shifts, found.samples, rest.time_unit, short=short)
-        rest, found = replace(less, remarks=(*rest.remarks, step)), another
+        rest, found = replace(less, findings=(*rest.findings, step)), another
     return (whole, first) if found.estimate.tests.shifted else (rest, found)
+
+
+def _untrusted(doubt: Finding) -> Finding:
+    """Return a reason against trust in a model as a finding that says so."""
+    return replace(doubt, message=f"no trust: {doubt.message}")
 
 
 def _data(log: Record, found: Found) -> Record:
     """Return the samples that the model was estimated from."""
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     own = log.at(found.samples, tuple(len(part) for _, part in found.used))
-    return replace(own, u=u, y=y, r=None, findings=(), remarks=(), means=None, repeated=(), lined=False)
+    return replace(own, u=u, y=y, r=None, findings=(), means=None, repeated=(), lined=False)
 
 
 def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
@@ -223,46 +211,21 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     data = read_data(paths, header.units, preparation)
     with blaming_columns(paths[0], data):
         check_varying((), data.u[:, :0], data.y)
+        check_enough(data.y)
     found = fits(model, data.parts)
     simulated = [
         (fit if np.all(np.isfinite(curve)) else None, curve)
         for fit, curve in zip(found.simulation, found.simulated.T, strict=True)
     ]
     columns, curves = fit_of(header.units, data, found.errors, simulated, data.time)
-    reasons = tuple(_reasons(found, data))
+    doubts = other_plants(found, data)
+    reasons = tuple(one.message for one in doubts)
     outcome = Outcome(
         title=header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
         status="validated",
         samples=len(data.y),
         validation=validation_of(found, reasons),
-        findings=data.findings or None,
-        notes=(*data.notes, *(f"no trust: {reason}" for reason in reasons)),
         timing_s={"validation": time.perf_counter() - started},
-    )
+    ).saying([*data.findings, *map(_untrusted, doubts)])
     tables, unit = {"fit": Table(columns)}, header.units.time_unit
     return Exploration(Results(outcome, header.resolved_spec, unit, tables, {"fit": curves}), reasons)
-
-
-def _reasons(found: Fits, data: Record) -> Iterator[str]:
-    """Yield reasons why a model is not of these data: its simulation explains nothing, or too little.
-
-    A poor fit alone is no fault of the model, since the noise may be strong, unless past inputs explain the
-    rest.
-    """
-    for i, fit in enumerate(found.simulation):
-        output = signal_name("y", i, len(found.simulation))
-        if not np.isfinite(fit):
-            yield f"the model has no simulation of {output}: its plant is unstable; {_SEE}"
-        elif fit < LEAST_FIT:
-            what = (
-                f"the simulation explains {fit:.1f} % of {output}, and less than {LEAST_FIT:g} % is nothing"
-            )
-            yield f"{what}: a level alone explains as much; {_SEE}"
-        elif fit < HALF:
-            test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
-            if not test.probability >= _SURELY:
-                yield (
-                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain the "
-                    f"rest (probability {chance(test.probability)}): the model is not of the plant of "
-                    "these data, or this acts otherwise here"
-                )

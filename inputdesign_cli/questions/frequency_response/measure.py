@@ -185,10 +185,8 @@ def measure(
         samples=len(data.y),
         identification=Identification(method=lines.method),
         frequency_response=replace(lines, blocks=1),
-        findings=data.findings or None,
-        notes=data.notes or None,
         timing_s={"measurement": time.perf_counter() - started},
-    )
+    ).saying(data.findings)
     drawn = {"frequency_response": table}, {"frequency_response": curve}
     results = results_of(question.header, outcome, *drawn)
     if terms is None or judged is None:
