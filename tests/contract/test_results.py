@@ -18,10 +18,15 @@ ROOT = HERE.parents[1]
 EXPECTED = json.loads((HERE / "results.json").read_text())
 QUICK = {"analyse-first_order_given", "simulate-first_order", "simulate-regression"}
 CLOSE = 2e-6
+# A design is proved to 1e-7 of its cost, and the cost is flat at its optimum. What another machine designs
+# differs by the root of that; costs, bounds and the error that binds agree.
+ALIKE = 4e-4
+PROVED = {"objective", "cost", "baseline", "model_error", "certificate", "samples"}
 # Proofs stop where they are good enough, and that depends on the order of additions.
 ROUGH = {
     *("lower_bound", "relative_gap", "any_spectrum_gap", "any_spectrum_bound", "any_structure_bound"),
     *("cuts", "rounds", "steps", "nodes", "active_frequencies", "spectral_factor_residual"),
+    "worst_scenario",  # of plants that bind alike
 }
 DATA = [HERE / "data/w1_5.csv", "--operating-point", "u1=45,y1=82"]
 OTHERS = {
@@ -39,18 +44,28 @@ def command(name):
     return [verb, ROOT / f"specs/{spec}.yaml", *runs]
 
 
-def differences(expected, found, where):
+def largest(value):
+    """The largest number of nested lists, or of a long list that is condensed."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return max(map(largest, parts), default=abs(value) if isinstance(value, int | float) else 0.0)
+
+
+def differences(expected, found, where, close=CLOSE, scale=1e-9):
+    """Every difference; entries of a list that are zero but for rounding count beside the largest."""
     if isinstance(expected, dict) and isinstance(found, dict):
+        size = largest(expected) if "length" in expected else scale
         for key in expected:
             if key not in found:
                 yield f"{where}.{key} is missing"
             elif key not in ROUGH:
-                yield from differences(expected[key], found[key], f"{where}.{key}")
+                share = CLOSE if key in PROVED else close
+                yield from differences(expected[key], found[key], f"{where}.{key}", share, size)
     elif isinstance(expected, list) and isinstance(found, list) and len(expected) == len(found):
+        size = max(scale, largest(expected))
         for index, pair in enumerate(zip(expected, found, strict=True)):
-            yield from differences(*pair, f"{where}[{index}]")
+            yield from differences(*pair, f"{where}[{index}]", close, size)
     elif isinstance(expected, float) and isinstance(found, int | float):
-        if abs(found - expected) > CLOSE * max(abs(expected), 1e-9):
+        if abs(found - expected) > close * max(abs(expected), scale):
             yield f"{where} is {found}, not {expected}"
     elif expected != found:
         yield f"{where} is {found}, not {expected}"
@@ -65,4 +80,5 @@ def test_results_hold_what_they_held(name, tmp_path, monkeypatch):
     result = json.loads((tmp_path / "run/result.json").read_text())
     assert result.get("notes", []) == [one["message"] for one in result.get("findings", [])]
     found = condensed(result)
-    assert list(differences(EXPECTED[name], found, name)) == []
+    designed = name.startswith("simulate")
+    assert list(differences(EXPECTED[name], found, name, ALIKE if designed else CLOSE)) == []
