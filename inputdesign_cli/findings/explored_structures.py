@@ -66,15 +66,13 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
         )
         judge = "the record" if found.split == "none" else "the part that judges"
-        better, tried = (
-            max(c.validation for c in chosen.candidates) - taken.validation,
-            len(chosen.candidates),
-        )
+        better, tried = max(c.validation for c in chosen.candidates), len(chosen.candidates)
+        better -= taken.validation
         beside = f"the best explains {better:.2g} % more" if better > 0.0 else "it explains most"
         compared = f"chosen of {tried} structures, of which {beside} of {judge}"
         name = signal_name("y", i, found.model.outputs)
         fact = (
-            f"{name}: {known or family} ({orders}), delay in samples {delays}; "
+            f"for {name}, {known or family} ({orders}), delay in samples {delays}; "
             f"{compared if tried > 1 else 'no other structure was compared'}"
         )
         said.append(kind.found(fact, where=name, family=family, structures=tried, better_percent=better))

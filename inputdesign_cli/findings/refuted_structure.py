@@ -13,7 +13,6 @@ from inputdesign_cli.outcome.model_words import Plain, blocks_of
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
-_BY_CHANCE = 0.05  # a leak that is no better than this explains nothing
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
 _LAG = "a further lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
@@ -91,11 +90,10 @@ def leaking(model: Model) -> str:
 
 
 def no_leak(estimate: Estimate) -> bool:
-    """Return whether past inputs explain residuals, and a leak does not: a lag is missing, for example."""
-    failing = any(test.fault == "plant" for test in estimate.tests.failed_besides)
-    return failing and any(
-        one.name == "leak" and one.probability > _BY_CHANCE for one in estimate.tests.scores
-    )
+    """Return whether past inputs explain the residuals better than a leak: a lag is missing, for example."""
+    failing = (test.probability for test in estimate.tests.failed_besides if test.fault == "plant")
+    leak = (test.probability for test in estimate.tests.scores if test.name == "leak")
+    return min(failing, default=1.0) < min(leak, default=1.0)
 
 
 def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]], *, leaks: bool) -> dict[str, str]:
