@@ -180,7 +180,8 @@ def tutorial(folder: Path, images: Path) -> str:
             "residuals",
             "note        Single",
             "note        The record",
-            "note        y",
+            "note        A structure",
+            "note        An output",
             "files",
         ),
     )
