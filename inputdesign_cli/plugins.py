@@ -9,7 +9,8 @@ from typing import Any
 
 from inputdesign_cli.errors import SpecError, bad_spec
 
-GROUPS = tuple(f"idesign.{group}" for group in ("requirements", "spectra", "signals", "control_laws"))
+_ADDED = ("requirements", "spectra", "signals", "control_laws", "findings")
+GROUPS = tuple(f"idesign.{group}" for group in _ADDED)
 _ANNOUNCED = defaultdict[str, set[str]](set)
 # The kinds of this package, in the form of entry points.
 _OWN = {

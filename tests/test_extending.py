@@ -31,6 +31,7 @@ from pydantic import Field
 from extending.integrated_variance import IntegratedVariance
 from extending.pieces import PiecesBasis
 from inputdesign_cli.design.loop_error.laws import ModelReference
+from inputdesign_cli.finding import NOTE, finding
 from inputdesign_cli.plant import Rational, TransferMatrix
 from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.specification.models.fields import Frequencies, Index, Numbers, Positive
@@ -44,6 +45,11 @@ class DeadBeat(Section):
     def build(self, spec, plant):
         return ModelReference(TransferMatrix.diagonal(Rational(np.eye(self.steps + 1)[-1]), plant.outputs))
 """
+FINDING = {
+    "undecided": "def judges(results):\n    return [Finding('mine', UNDECIDED, 'No.')]\n",
+    "no finding": "def judges(results):\n    return ['no']\n",
+    "no function": "judges = 1\n",
+}
 ENTRY_POINTS = """
 [idesign.requirements]
 integrated_variance = h2:H2
@@ -51,6 +57,8 @@ integrated_variance = h2:H2
 pieces = h2:Pieces
 [idesign.control_laws]
 dead_beat = h2:DeadBeat
+[idesign.findings]
+high_peaks = h2:high_peaks
 """
 PLANT = (
     "plant: {B: [0, 1, 0.5, 0.2]}\nnoise: {variance: 0.5}\nexperiment: {samples: 200}\nsignal: {seed: 1}\n"
@@ -164,6 +172,34 @@ def test_schema_and_explanations_know_it(found):
     assert {"H2", "Pieces", "DeadBeat"} <= set(sections)
     assert "integrated_variance" in keys
     assert "too-dead" in found["codes"]
+
+
+def test_a_finding_of_another_package_stands_beside_ours(found):
+    assert "high-peaks" in found["codes"]
+    peaks = []
+    for name in SPECS.keys() - {"wrong"}:
+        result = found[name]
+        high = max(result.get("signal", {}).get("crest_factor", [0.0])) > 3.03
+        codes = [one["code"] for one in result.get("findings", [])]
+        assert codes.count("high-peaks") == high
+        peaks.append(high)
+        assert [one["message"] for one in result.get("findings", [])] == result.get("notes", [])
+    assert True in peaks
+    assert False in peaks
+
+
+@pytest.mark.parametrize("what", FINDING)
+def test_a_finding_of_another_package_changes_no_verdict(what, tmp_path):
+    (tmp_path / "judge.py").write_text(f"from inputdesign_cli.finding import *\n{FINDING[what]}")
+    (tmp_path / "judge-1.dist-info").mkdir()
+    (tmp_path / "judge-1.dist-info" / "entry_points.txt").write_text(
+        "[idesign.findings]\nmine = judge:judges\n"
+    )
+    (tmp_path / "spec.yaml").write_text(SPECS["stated loop"])
+    done = run(
+        tmp_path, "-m", "inputdesign_cli", "solve", str(tmp_path / "spec.yaml"), "-o", str(tmp_path / "r")
+    )
+    assert (done.returncode, "bad-plug-in" in done.stderr) == (2, True)
 
 
 def test_its_words_are_checked_like_all_others(found):

@@ -3,18 +3,25 @@
 A file says when its finding holds and what its sentence is. It is found by its place: nothing else lists it.
 """
 
+from contextlib import suppress
 from importlib import import_module
 from pkgutil import iter_modules
 
 from inputdesign_cli.diagnostics import Explanation, explanations as of_errors
-from inputdesign_cli.finding import KINDS, FindingKind
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.finding import DOUBT, KINDS, NOTE, Finding, FindingKind
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.plugins import loaded, points, refused
 from inputdesign_cli.specification import plugins
 
 
 def kinds() -> dict[str, FindingKind]:
-    """Return every kind of finding by its code."""
+    """Return every kind of finding by its code, and what other packages add."""
     for module in iter_modules(__path__):
         import_module(f"{__name__}.{module.name}")
+    with suppress(SpecError):  # the explanation of this error, too, is one of those that are asked for
+        for point in points("idesign.findings").values():
+            loaded(point)
     return dict(sorted(KINDS.items()))
 
 
@@ -23,3 +30,25 @@ def explanations() -> dict[str, Explanation]:
     found = {code: Explanation(kind.title, kind.text, kind.remedy) for code, kind in kinds().items()}
     added = {code: Explanation(**entry) for code, entry in plugins.codes().items()}
     return {**of_errors(), **found, **added}
+
+
+def with_added(results: Results) -> Results:
+    """Return the results with what functions of other packages find in them.
+
+    Each entry point of `idesign.findings` refers to a function that takes the results and returns findings.
+    The verdict is there before them.
+
+    Raises:
+        SpecError: `bad-plug-in`, what is referred to cannot be loaded, or gives another thing than notes and
+            doubts.
+    """
+    added = list[Finding]()
+    for point in points("idesign.findings").values():
+        find = loaded(point)
+        if not callable(find):
+            raise refused(point, "is no function from results to findings")
+        found = list(find(results))
+        if not {getattr(one, "severity", None) for one in found} <= {NOTE, DOUBT}:
+            raise refused(point, "gives something that is no note and no doubt")
+        added += found
+    return results.saying(added) if added else results

@@ -105,6 +105,10 @@ class Results:
         found: Result = plain(self.outcome)
         return found
 
+    def saying(self, findings: Iterable[Finding]) -> Self:
+        """Return the results with further findings and their notes."""
+        return replace(self, outcome=self.outcome.saying(findings))
+
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Return what speaks for or against the data, the model or the design, with codes and severities."""

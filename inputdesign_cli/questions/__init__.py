@@ -22,6 +22,7 @@ import yaml
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import DataError, IdesignError, InaccurateError, InfeasibleError
+from inputdesign_cli.findings import with_added
 from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.specification import Spec, load_spec, parse_spec
 
@@ -138,7 +139,7 @@ def identify(
             found = measure(build_measurement(known), files, prepared)
         else:
             found = identify_records(build_identification(known), files, prepared)
-        return finite(found, most_extreme(known.content))
+        return with_added(finite(found, most_extreme(known.content)))
 
 
 def assess(
@@ -164,8 +165,10 @@ def assess(
             results = measure(build_measurement(known), _paths(data), prepared, assess=True)
             found = results.outcome.assessment
             assert found is not None  # the spec has lines
-            return Assessment(found.verdict, finite(results, most_extreme(known.content)))
-        return assess_records(build_identification(known), _paths(data), prepared)
+            judged = Assessment(found.verdict, finite(results, most_extreme(known.content)))
+        else:
+            judged = assess_records(build_identification(known), _paths(data), prepared)
+        return replace(judged, results=with_added(judged.results))
 
 
 def next_round(spec: Spec, decide: Callable[[Rounds], Results], *, begins: bool = False) -> Results:
@@ -179,7 +182,7 @@ def next_round(spec: Spec, decide: Callable[[Rounds], Results], *, begins: bool 
     from inputdesign_cli.questions.campaign.build import build_rounds
 
     with _placed(spec), time_limit(spec.solver.time_limit):
-        return decide(build_rounds(spec, begins=begins))
+        return with_added(decide(build_rounds(spec, begins=begins)))
 
 
 def explore(
@@ -212,9 +215,11 @@ def explore(
     prepared = preparation or Preparation()
     if model is None:
         with sound_arithmetic(most_extreme({})):
-            return explore_log(_paths(data), prepared, structure, Asked.of(asked) if asked else None)
+            found = explore_log(_paths(data), prepared, structure, Asked.of(asked) if asked else None)
+            return replace(found, results=with_added(found.results))
     with _placed(model), naming_model(model):
-        return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
+        found = judge(model_to_judge(model), build_header(model), _paths(data), prepared)
+        return replace(found, results=with_added(found.results))
 
 
 @singledispatch
@@ -274,7 +279,7 @@ def _prepared(
 def _in_time(spec: Spec, found: Callable[[], Results]) -> Results:
     """Return finite results that are found within the time limit of the spec."""
     with _placed(spec), time_limit(spec.solver.time_limit):
-        return finite(found(), most_extreme(spec.content))
+        return with_added(finite(found(), most_extreme(spec.content)))
 
 
 @contextmanager
