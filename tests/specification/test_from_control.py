@@ -1,6 +1,5 @@
 """Systems of python-control as plants: states become transfer functions, and wrong arguments are named."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import control
@@ -120,28 +119,12 @@ def test_a_gain_alone_and_what_floats_cannot_hold():
 
 
 STATES = control.ss([[0, 1], [0, -3.5]], [[0], [10.0]], [[1, 0]], [[0]])
-
-
 HEATER = control.tf([2.1], [180, 1])
-
-
 SAMPLES = control.tf([0.1], [1, -0.8], 0.5)
-
-
 PLACES = [
-    ["a list"],
-    "d",
-    {"d": ("Q", 1, 1)},
-    {"d": (["A"], 0, 0)},
-    {"d": ("A", 5, 1)},
-    {"d": ("A", -3, 1)},
-    {"d": ("A", 1)},
-    {"d": ("A", 1.0, 1)},
-    {"d": None},
-    {"d": ("A", 1, 1), "e": ("A", -1, -1)},
-]
-
-
+    ["a list"], "d", {"d": ("Q", 1, 1)}, {"d": (["A"], 0, 0)}, {"d": ("A", 5, 1)}, {"d": ("A", -3, 1)},
+    {"d": ("A", 1)}, {"d": ("A", 1.0, 1)}, {"d": None}, {"d": ("A", 1, 1), "e": ("A", -1, -1)},
+]  # fmt: skip
 WRONG = [
     *((STATES, "parameters", {"parameters": places}) for places in PLACES),
     (HEATER, "parameters", {"parameters": {"d": ("A", 0, 0)}, "delay": 5}),
@@ -209,9 +192,3 @@ def test_keys_that_are_no_keys():
     ):
         with pytest.raises(SpecError):
             call()
-
-
-def test_names_of_files_may_be_paths():
-    prior = {"information": Path("there-is-none.csv")}
-    spec = from_control(HEATER, experiment={"prior": prior})
-    assert spec.experiment.prior.information == "there-is-none.csv"

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from inputdesign_cli.specification import Spec, load_spec, parse_spec, read_template
-from inputdesign_cli.specification.yaml import reader
+from inputdesign_cli.specification import load_spec, parse_spec, read_template
 from tests.support.refusals import refused
 
 GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
@@ -137,13 +136,6 @@ def test_places_of_other_keys_stay_and_new_values_name_their_source():
     assert (found.code, found.key, found.location.file) == ("out-of-range", "noise.variance", "the estimate")
 
 
-def test_no_text_is_parsed(monkeypatch):
-    spec = parse_spec(TEXT)
-    monkeypatch.setattr(reader, "_Loader", None)
-    assert spec.with_(**{"experiment.samples": 600}).experiment.samples == 600
-    assert Spec.from_dict(spec.content).model_dump() == spec.model_dump()
-
-
 @pytest.mark.parametrize("text", ["a\x00b", "\x1b[31m"])
 def test_unprintable_texts_are_refused(text):
     found = refused(parse_spec(TEXT).with_, title=text)
@@ -182,12 +174,6 @@ def test_several_files_are_joined_key_by_key(tmp_path):
         written(tmp_path, "include: [model.yaml, prior.yaml]\n" + ASKED, model=MODEL, prior=prior)
     )
     assert (spec.experiment.samples, spec.experiment.prior.information) == (200, ((4, 0), (0, 9)))
-
-
-def test_overrides_reach_what_is_included_and_name_the_file(tmp_path):
-    path = written(tmp_path, ASKED, model=MODEL)
-    spec = load_spec(path, ["plant.F=[1, -0.9]", "include=model.yaml"])
-    assert spec.plant.F == (1, -0.9)
 
 
 def test_complaints_point_into_the_included_file(tmp_path):
