@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import clarabel
@@ -19,7 +17,6 @@ from inputdesign_cli.errors import DataError, InaccurateError, InfeasibleError, 
 from inputdesign_cli.outcome.results import Results
 from tests.support.command_line import RESULT, diagnostic
 from tests.support.outcomes import typed
-from tests.support.processes import running
 
 
 @pytest.mark.parametrize("verb", ["solve", "analyse"])
@@ -111,14 +108,6 @@ def test_wrong_usage_ends_with_2(run, verbs, arguments):
     code, out, err = run(*arguments)
     assert (code, out) == (2, "")
     assert "Error: " in err
-
-
-def test_a_closed_pipe_is_no_error():
-    command = [sys.executable, "-m", "inputdesign_cli", "init"]
-    with running(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        process.stdout.close()
-        assert process.stderr.read() == b""
-        assert process.wait() == 141
 
 
 SPEC = """

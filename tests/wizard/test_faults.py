@@ -126,15 +126,6 @@ def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder)
             assert told.location is None or told.location.file.startswith(str(folder)), text
 
 
-def test_an_unstable_loop_is_that_of_the_answer_that_has_a_controller(folder):
-    for key, answer in (("wish", "own loop with 6 dB, Kp 100"), ("loop", "PI Kp 100, Ti 60")):
-        with pytest.raises(SpecError) as caught:
-            compose({**GOOD, key: answer}, "x", folder).validate()
-        (told,) = caught.value.diagnostics
-        assert (told.code, told.key) == ("unstable-loop", key)
-        assert "smaller Kp" in told.hint
-
-
 def test_what_a_design_of_the_draft_says_is_told_in_words_too(folder):
     def solve(_):
         place = Location("<answers>", 3, 1, "limits: {amplitude: 5}")

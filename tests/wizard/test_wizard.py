@@ -279,26 +279,6 @@ def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("said", "drift", "variance", "drifts"),
-    [
-        ("standard deviation 0.2", "yes", 0.04, True),
-        ("standard deviation 0.2", "no", 0.04, False),
-        ("standard deviation 0.2", "not known", 0.04, False),
-        ("resolution 0.1", "not known", 0.09, False),  # the log has more than that
-    ],
-)
-def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, said, drift, variance, drifts):
-    first_order_log(tmp_path, 5, noise=white)
-    draft = draft_of(tmp_path, plant="log log.csv", noise=said, drift=drift)
-    draft.validate()
-    noise = draft.spec().noise
-    assert noise.variance == pytest.approx(variance, rel=1e-5 if "dev" in said else 0.1)
-    assert noise.drift == drifts
-    assert "the log has a variance of 0.08" in draft.text
-
-
-@pytest.mark.slow
 def test_what_speaks_against_the_model_of_a_log_is_said(tmp_path):
     first_order_log(tmp_path, 5, 300, noise=lambda rng, t: white(rng, t) + 4.0 * np.sin(t / 200.0))
     wish = "prediction within 5 % up to 0.1"
