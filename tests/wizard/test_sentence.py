@@ -366,7 +366,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("a binary signal", "signals", "two levels"),
         ("without return", "return", "no"),
         ("slow noise of 0.1 degC; 2 h", "noise", "slow, noise of 0.1 degC, noise 0.1, white"),
-        ("noise half a rad/s", "noise", "noise 0.5 rad/s, noise 0.1, white"),
+        ("noise half a rad/s", "noise", ""),
         ("rise time 440 s", "plant", "time constant 200 s"),
         ("all values approximate", "plant", "roughly"),
         ("Ms of 2 dB", "wish", "2 dB"),
