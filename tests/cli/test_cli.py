@@ -11,12 +11,9 @@ import clarabel
 import pytest
 from typer.testing import CliRunner
 
-from inputdesign_cli import questions
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, InaccurateError, InfeasibleError, OutputError, SpecError
-from inputdesign_cli.outcome.results import Results
 from tests.support.command_line import RESULT, diagnostic
-from tests.support.outcomes import typed
 
 
 @pytest.mark.parametrize("verb", ["solve", "analyse"])
@@ -44,15 +41,6 @@ def test_json_is_the_result_and_nothing_else(run, verbs, tmp_path, verb):
 def test_quiet_prints_nothing(run, verbs):
     assert run("solve", "first.yaml", "--quiet") == (0, "", "")
     assert run("validate", "first.yaml", "--quiet") == (0, "", "")
-
-
-def test_the_summary_of_a_result_with_nothing_in_it(run, verbs, monkeypatch):
-    bare = Results(typed({"format": 1, "objective": {"kind": "D", "value": 59.2, "upper_bound": 59.3}}), "")
-    monkeypatch.setattr(questions, "solve", lambda spec: bare)
-    code, out, err = run("solve", "a.yaml")
-    assert (code, err) == (0, "")
-    assert "log det M" in out
-    assert "gets above 59.3" in out
 
 
 @pytest.mark.parametrize(
@@ -221,15 +209,6 @@ def test_what_is_wrong_is_said(option, command, files):
     assert done.exit_code == 2, done.output
     assert WRONG[option] in " ".join(done.stderr.replace("│", "").split())
     assert "nope=" not in done.stderr
-
-
-def test_a_sweep_reads_standard_input(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    text = SMALL + ACCURACY + "spectrum: {type: fir, order: 3}\n"
-    command = ["sweep", "-", "--set", "spectrum.order=2,3", "--quiet"]
-    done = CliRunner().invoke(app, command, input=text)
-    assert done.exit_code == 0, done.output
-    assert json.loads((tmp_path / "runs" / "stdin-sweep" / "sweep.json").read_text())["points"] == 2
 
 
 @pytest.mark.parametrize(

@@ -101,9 +101,8 @@ WRITTEN = {
         "time_constant=262 dead_time=31 amplitude=8 max_sensitivity_db=6.0206 duration=28800"
     ),
     "PI speed loop with gain margin 2 for a 24 V drive with dry friction, around 9 V, about 20 rad/s per V "
-    "and 0.3 to 0.4 s, noise 0.5 rad/s (white), voltage may move +-3 V around 9 V, experiment up to 20 s": (
-        "gain=20 time_constant=0.35 offset=9 amplitude=3 duration=20"
-    ),
+    "and 0.3 to 0.4 s, noise half a rad/s (white), voltage may move +-3 V around 9 V, experiment up to "
+    "20 s": ("gain=20 time_constant=0.35 offset=9 amplitude=3 duration=20 variance=0.25"),
     "K=1.7, T = 262 s, L=31 s, noise 0.1 degC, valve stands at 45 % and may move 8 % up and down, PI, 8 h": (
         "gain=1.7 time_constant=262 dead_time=31 amplitude=8 max_sensitivity_db=6"
     ),
@@ -366,7 +365,6 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("a binary signal", "signals", "two levels"),
         ("without return", "return", "no"),
         ("slow noise of 0.1 degC; 2 h", "noise", "slow, noise of 0.1 degC, noise 0.1, white"),
-        ("noise half a rad/s", "noise", ""),
         ("rise time 440 s", "plant", "time constant 200 s"),
         ("all values approximate", "plant", "roughly"),
         ("Ms of 2 dB", "wish", "2 dB"),

@@ -140,13 +140,6 @@ def test_no_record_that_is_too_short_or_of_few_samples_would_do(refused):
     assert f"{lasting(500.0)} would do" in second
 
 
-def test_answers_are_keys_of_the_spec():
-    limited = draft_of(limits="rate 0.5, output 3", converter="12 bits up to 100", drift="yes").spec()
-    assert (limited.limits.rate, limited.limits.amplitude.output) == (2.5, 3.0)
-    assert (limited.signal.quantisation.bits, limited.signal.quantisation.range) == (12, 100.0)
-    assert limited.noise.drift
-
-
 def test_a_margin_that_is_kept_is_said():
     """The gain margin of a peak Ms is Ms / (Ms - 1), its phase margin 2 asin(1 / (2 Ms))."""
     spec = parse_spec(
@@ -429,12 +422,6 @@ def test_the_column_says_once_what_can_be_done():
         draft_of(plant="column", loop="PI Kp 1, Ti 60")
 
 
-def test_what_is_not_used_for_a_bode_plot_is_said():
-    draft = draft_of(wish="Bode plot within 5 % from 0.005 to 0.05", time="8 h")
-    assert any("how well the plant is known is not used" in one for one in draft.notes)
-    assert "# how well the plant is known is not used" in draft.text
-
-
 def test_a_bode_plot_that_is_refused_says_which_time_would_do():
     """Harmonics of a fifth of an hour are 2 pi/720 s = 0.0087 rad/s apart."""
     wish = "Bode plot within 5 % from 0.001 to 0.01"
@@ -482,12 +469,3 @@ def test_a_size_in_another_unit_than_the_gain_is_refused(key, text):
     with pytest.raises(SpecError, match="but the gain of the plant has") as caught:
         draft_of(plant="gain 2 degC/V, time constant 180 s", **{key: text})
     assert caught.value.diagnostics[0].key == key
-
-
-def test_the_operating_point_is_named_where_it_is_asked_and_written():
-    text = draft_of(range="valve 40 +- 5 %").text
-    assert "--operating-point u1=40" in text
-    assert "# from 35 to 45 %: not a share of 40" in text
-    with pytest.raises(SpecError) as caught:
-        draft_of(range="a kettle")
-    assert "--operating-point" in caught.value.diagnostics[0].hint
