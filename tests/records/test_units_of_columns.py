@@ -53,17 +53,6 @@ def test_times_go_by_several_names(name, log):
     )
 
 
-def test_times_may_be_dates(log):
-    moments = [datetime(2024, 2, 28, 23) + timedelta(minutes=2 * k) for k in range(200)]
-    np.testing.assert_allclose(np.diff(read(log("timestamp,u,y", moments)).time), 2.0)
-    late = [m + timedelta(minutes=5 * (k > 100)) for k, m in enumerate(moments)]
-    assert "record-cut" in codes(read(log("timestamp,u,y", late)))
-    assert (
-        code_of(read, log("timestamp,u,y", ["2024-01-01", *["yesterday"] * 199]), kind=DataError)
-        == "data-not-a-number"
-    )
-
-
 def test_another_unit_is_refused_until_the_user_states_it(log):
     assert code_of(read, log("t_ms,u,y", EVEN), kind=DataError) == "data-wrong-unit"
     path = log("t_s,u,y", [120 * k for k in range(200)])

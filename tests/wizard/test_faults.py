@@ -284,22 +284,17 @@ _TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
     [
         ('{"num": [2], "den": [0, 0]}', "all coefficients of the denominator are zero"),
         ('{"num": [0], "den": [1, 1]}', "all coefficients of the numerator are zero"),
-        ('{"num": [1, 2, 3], "den": [1, 1]}', "degree 2"),
-        ("[1]", "does not hold"),
         ('{"num": [NaN], "den": [1, 1]}', "the numerator[0] must be finite"),
         ('{"num": [1], "den": [1, Infinity]}', "the denominator[1] must be finite"),
         ('{"den": [1, 1]}', "does not hold"),
         ('{"num": [true], "den": [1, 1]}', "must be a number, not true"),
         ('{"num": [1], "den": [1, 1], "delay": "x"}', "the delay"),
-        ('{"num": [[1]], "den": [1, 1]}', "does not hold"),
-        ('{"num": 3, "den": [1, 1]}', "does not hold"),
         ("[" * 100_000, "is not JSON"),
         ('{"num": [1], "den": [1, 1], "dealy": 25}', "does not hold"),
         ('{"num": [1], "den": [1, 1], "delay": null}', "the delay has no value"),
         ('{"num": [1], "den": [1, 1], "delay": NaN}', "the delay must be finite"),
         ('{"num": [2], "den": [1, 0]}', 'write its dead time ("delay": 5), however small, or the lag'),
         ('{"num": [2], "den": [1, 0, 1], "delay": 5}', "must lie in the left half plane"),
-        ('{"num": [2], "den": [-1, 1]}', "must lie in the left half plane"),
     ],
 )
 def test_what_is_wrong_is_told(tmp_path, text, words):
