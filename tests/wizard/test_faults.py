@@ -187,19 +187,6 @@ def answered(talk, until=None):
     return talk
 
 
-def test_every_bad_answer_is_told_by_its_question_which_comes_again(tmp_path):
-    talk = Conversation({}, "x", tmp_path)
-    for key in KEYS:
-        for text in ("a kettle", "rest nothing.csv"):
-            assert talk.question.key == key
-            (told,) = talk.answer(text).diagnostics
-            assert (told.code, told.key) == ("bad-answer", key), text
-            assert talk.draft is None
-        assert talk.answer(ANSWERS[key]) is None
-    assert talk.question is None
-    assert talk.draft.spec().accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
-
-
 def test_what_only_all_answers_together_tell_leads_back_to_its_question(tmp_path):
     """The loop of Skogestad's rule has a peak of 1.59 here: 1 dB cannot be asked of it."""
     talk = answered(Conversation({"wish": "PI loop with 1 dB"}, "x", tmp_path), "names")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.wizard.composing import Conversation, compose
 from inputdesign_cli.wizard.plants import plant_of_words
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers, taken_for_granted
@@ -38,6 +37,13 @@ ROOM = (
     "noise 0.05 degC that fades in half an hour"
 )
 
+KNOWN = {
+    EXCHANGER: "gain=1.72 offset=45 amplitude=8 duration=28800 correlation_time=60 max_sensitivity_db=6",
+    MOTOR: "gain=10 offset=10 amplitude=5 duration=20 variance=1",
+    TANK: "slope=0.02 offset=50 duration=3600 standard_deviation=0.2 correlation_time=5",
+    LEVEL: "slope=0.02 offset=50 amplitude=10 correlation_time=5",
+    ROOM: "time_constant=10800 dead_time=600 amplitude=20 correlation_time=1800 relative=0.05",
+}
 
 # As engineers write who have not read the page: a motor, a tank and a room; and what the spec then holds.
 # Steps q of a sensor add q^2/12 to the variance.
@@ -146,28 +152,6 @@ def heard(sentence, folder, *more):
     return talk.draft
 
 
-@pytest.mark.parametrize(
-    ("sentence", "facts"),
-    [
-        (EXCHANGER, {"gain": 1.72, "offset": 45, "amplitude": 8, "duration": 28800, "correlation_time": 60,
-                     "max_sensitivity_db": 6, "hold": 6, "sample_time": 10}),
-        (MOTOR, {"gain": 10, "offset": 10, "amplitude": 5, "duration": 20, "variance": 1}),
-        (TANK, {"slope": 0.02, "offset": 50, "duration": 3600, "standard_deviation": 0.2,
-                "correlation_time": 5}),
-        (LEVEL, {"slope": 0.02, "offset": 50, "amplitude": 10, "correlation_time": 5}),
-        (ROOM, {"time_constant": 10800, "dead_time": 600, "amplitude": 20, "correlation_time": 1800,
-                "relative": 0.05}),
-    ],
-)  # fmt: skip
-def test_a_sentence_and_three_answers_are_a_spec(sentence, facts, tmp_path):
-    """The fastest plant cannot wait a minute."""
-    draft = heard(sentence, tmp_path, "no" if sentence is MOTOR else "1 min", "steps of 0.1", "no")
-    for name, value in facts.items():
-        assert float(re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", draft.text)[1]) == pytest.approx(value), name
-    assert parse_spec(draft.text).uncertainty.intervals
-    assert "about" in draft.notes[0]
-
-
 def written(sentence, folder):
     """The draft after a sentence alone, of which all is understood, and its text without the title."""
     found = in_sentence(sentence)
@@ -177,20 +161,21 @@ def written(sentence, folder):
     return draft, draft.text.split("\n", 2)[2]
 
 
-@pytest.mark.parametrize(("sentence", "facts"), WRITTEN.items())
+@pytest.mark.parametrize(("sentence", "facts"), (KNOWN | WRITTEN).items())
 def test_a_sentence_as_engineers_write_is_a_spec(sentence, facts, tmp_path):
     draft, text = written(sentence, tmp_path)
     for name, value in (fact.split("=") for fact in facts.split()):
         found = re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", text)
         assert (found is None) == (value == "none"), name
         assert found is None or float(found[1]) == pytest.approx(float(value), rel=1e-4), name
-    rough = re.findall(r"dry friction|stiction|sticks", sentence)
+    rough = re.findall(r"friction|stiction|sticks", sentence)
     assert sum("no linear model has it" in note for note in draft.notes) == len(rough)
     assert draft.spec() is not None
+    assert sentence not in KNOWN or any("about" in note for note in draft.notes)
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize("sentence", [*WRITTEN, EXCHANGER, MOTOR, TANK, LEVEL, ROOM])
+@pytest.mark.parametrize("sentence", [*WRITTEN, *KNOWN])
 def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
     """A strange word anywhere is refused, or said back or written; a strange number, too."""
     words = sentence.split(" ")
