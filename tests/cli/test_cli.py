@@ -211,6 +211,15 @@ def test_what_is_wrong_is_said(option, command, files):
     assert "nope=" not in done.stderr
 
 
+def test_a_sweep_reads_standard_input(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    text = SMALL + ACCURACY + "spectrum: {type: fir, order: 3}\n"
+    command = ["sweep", "-", "--set", "spectrum.order=2,3", "--quiet"]
+    done = CliRunner().invoke(app, command, input=text)
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "runs" / "stdin-sweep" / "sweep.json").read_text())["points"] == 2
+
+
 @pytest.mark.parametrize(
     ("command", "said"),
     [

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import pytest
 import scipy.stats
 
-from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
+from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.run_directory import read_curves, write_run
 from inputdesign_cli.report.render import bibtex_text, report_text
@@ -236,6 +236,15 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
         assert row[1:3] == [f"{value:.6g}", f"{deviation:.2g}"]
         limits = [scipy.stats.norm.ppf(p, value, deviation) for p in (0.025, 0.975)]
         assert [*map(float, row[3].split(" to "))] == pytest.approx(limits, abs=0.02 * deviation)
+
+
+def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):
+    found = identify(parse_spec(SPEC % ""), data)
+    write_run(found, tmp_path / "run")
+    page = parse(report_text(tmp_path / "run"))
+    assert "The model was estimated from 400 samples" in words(page)
+    assert "predicted one step ahead" in words(page)
+    assert "Further figures" not in words(page)
 
 
 @pytest.mark.slow

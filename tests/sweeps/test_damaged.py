@@ -75,6 +75,15 @@ def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
     assert run_sweep(spec, SETTINGS, directory=out).damaged == []
 
 
+def test_the_run_of_another_point_is_not_taken_for_that_of_this(swept, spec):
+    out, run = swept
+    whole = timeless_files(out)
+    shutil.rmtree(run)
+    shutil.copytree(out / rows(out)[1]["run"], run)
+    assert run_sweep(spec, SETTINGS, directory=out).computed == 1
+    assert timeless_files(out) == whole
+
+
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"status": "optimal", "code": "x"}', "null"])
 def test_a_damaged_failure_is_computed_again(content, spec, stub, tmp_path):
     out, settings = tmp_path / "out", ["experiment.samples=7,10"]

@@ -16,7 +16,7 @@ import inputdesign_cli
 from inputdesign_cli import load_spec, parse_spec, questions, sweep
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError
-from inputdesign_cli.figures.sweep_table import SweepAxis
+from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings
 from inputdesign_cli.sweeps.points import Layout
@@ -125,6 +125,13 @@ def test_an_edited_data_file_is_another_point(tmp_path, stub, monkeypatch):
     assert run_sweep(tmp_path / "t.yaml", TWO, directory=tmp_path / "file").computed == 2
     table.write_text("frequency,r_adm\n0.1,3\n3.2,1\n")
     assert run_sweep(tmp_path / "t.yaml", TWO, directory=tmp_path / "file").computed == 2
+
+
+def test_swept_texts_are_no_formulas(spec, stub, tmp_path):
+    out, titles = tmp_path / "out", ["=1+1", "+x", "-y", "@z", "-0.5", "'=1"]
+    run_sweep(spec, [f"title={','.join(titles)}"], directory=out)
+    assert column(out, "title") == ["'=1+1", "'+x", "'-y", "'@z", "-0.5", "''=1"]
+    assert read_sweep(out).columns["title"] == titles
 
 
 HOLD = """

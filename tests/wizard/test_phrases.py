@@ -103,6 +103,8 @@ def test_each_quantity_is_known_as_well_as_is_said(text, shares):
         ("noise", "0.5 degC with a memory of 2 s", "correlation_time", 2),
         ("time", "half an hour", "duration", 1800),
         ("time", "1.5 h", "duration", 5400),
+        ("limits", "output 3", "output", 3),
+        ("converter", "12 bits up to 100", "bits", 12),
         ("hold", "1 min", "hold", 12),
         ("hold", "57 s", "hold", 12),
         ("wish", "PI loop with a safe margin", "max_sensitivity_db", 6),

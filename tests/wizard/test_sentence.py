@@ -472,6 +472,8 @@ def test_words_that_matter_are_asked_for(part):
 
 @pytest.mark.parametrize("apart", ["0.5 min", "30 s", "16.6667 %"])
 def test_a_tolerance_has_a_unit_of_its_own(apart):
+    gain = plant_of_words("gain 1.5 degC/% +- 0.2, time constant 9 s").intervals["gain"]
+    assert gain == pytest.approx((1.3, 1.7))
     found = plant_of_words(f"gain 2, time constant 40 min, dead time 3 min +- {apart}")
     assert found.intervals["dead_time"] == pytest.approx((150.0, 210.0), rel=1e-5)
 

@@ -422,6 +422,12 @@ def test_the_column_says_once_what_can_be_done():
         draft_of(plant="column", loop="PI Kp 1, Ti 60")
 
 
+def test_what_is_not_used_for_a_bode_plot_is_said():
+    draft = draft_of(wish="Bode plot within 5 % from 0.005 to 0.05", time="8 h")
+    assert any("how well the plant is known is not used" in one for one in draft.notes)
+    assert "# how well the plant is known is not used" in draft.text
+
+
 def test_a_bode_plot_that_is_refused_says_which_time_would_do():
     """Harmonics of a fifth of an hour are 2 pi/720 s = 0.0087 rad/s apart."""
     wish = "Bode plot within 5 % from 0.001 to 0.01"
@@ -462,7 +468,8 @@ def test_sizes_are_in_the_units_of_the_gain(said, sizes):
 
 
 @pytest.mark.parametrize(
-    ("key", "text"), [("range", "40 +- 5 %"), ("noise", "0.2 bar"), ("limits", "output 3 V")]
+    ("key", "text"),
+    [("range", "40 +- 5 %"), ("range", "40 +- 5 stone"), ("noise", "0.2 bar"), ("limits", "output 3 V")],
 )
 def test_a_size_in_another_unit_than_the_gain_is_refused(key, text):
     """Per cents of a range cannot belong to a gain per volt."""

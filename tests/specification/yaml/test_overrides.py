@@ -176,6 +176,12 @@ def test_several_files_are_joined_key_by_key(tmp_path):
     assert (spec.experiment.samples, spec.experiment.prior.information) == (200, ((4, 0), (0, 9)))
 
 
+def test_overrides_reach_what_is_included_and_name_the_file(tmp_path):
+    path = written(tmp_path, ASKED, model=MODEL)
+    spec = load_spec(path, ["plant.F=[1, -0.9]", "include=model.yaml"])
+    assert spec.plant.F == (1, -0.9)
+
+
 def test_complaints_point_into_the_included_file(tmp_path):
     path = written(tmp_path, "include: model.yaml\n" + ASKED, model=MODEL.replace("2}", "-2}"))
     (diagnostic,) = complaints(path)

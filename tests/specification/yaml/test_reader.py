@@ -107,6 +107,15 @@ def test_alias_bombs_are_defused_before_they_go_off(monkeypatch):
     assert 150 < len(made) <= MAX_NODES + 1
 
 
+def test_an_alias_stands_for_a_whole_value():
+    spec = parse_spec(GOOD + "simulation: {plant: {B: &b [0, 2], F: [1, *h]}}\n".replace("*h", "-0.1"))
+    assert spec.simulation.plant.B == (0.0, 2.0)
+    spec = parse_spec(
+        "plant: &p {B: [0, 1], F: [1, -0.5]}\n" + GOOD.split("\n", 1)[1] + "simulation: {plant: *p}\n"
+    )
+    assert spec.simulation.plant == spec.plant
+
+
 def test_columns_count_characters():
     tree = read("été: [α, β]\n", "x")
     assert tree.places.values[("été", 1)].column == len("été: [α, ") + 1
