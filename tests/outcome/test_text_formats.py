@@ -17,7 +17,7 @@ from hypothesis import given, settings, strategies as st
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome import Outcome, OutcomeError, plain, read_plain
-from inputdesign_cli.outcome.codec import NULL, others
+from inputdesign_cli.outcome.codec import NULL, json_text, others
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.run_directory import curves_json, read_curves
 from inputdesign_cli.outcome.run_files import FIGURES
@@ -250,6 +250,10 @@ def sections(kind, seen):
 def test_a_section_has_one_field_at_most_for_keys_of_other_names():
     for section in sections(Outcome, {Outcome}):
         assert sum("others" in entry.metadata for entry in fields(section)) <= 1, section
+
+
+def test_json_keeps_the_order_of_keys_and_letters_of_all_scripts():
+    assert json_text({"z": np.bool_(True), "a": "µ"}) == '{\n "z": true,\n "a": "µ"\n}\n'
 
 
 def same(one, other):

@@ -1,5 +1,6 @@
 """Systems of python-control as plants: states become transfer functions, and wrong arguments are named."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import control
@@ -192,3 +193,9 @@ def test_keys_that_are_no_keys():
     ):
         with pytest.raises(SpecError):
             call()
+
+
+def test_names_of_files_may_be_paths():
+    prior = {"information": Path("there-is-none.csv")}
+    spec = from_control(HEATER, experiment={"prior": prior})
+    assert spec.experiment.prior.information == "there-is-none.csv"
