@@ -142,6 +142,15 @@ def test_unprintable_texts_are_refused(text):
     assert [(d.code, d.key) for d in found] == [("bad-argument", "title")]
 
 
+@pytest.mark.parametrize("value", [10**400, -(10**400), np.nan, np.inf], ids=["huge", "-huge", "nan", "inf"])
+def test_numbers_that_no_double_holds_are_refused(value):
+    """A count has a range; another number has none but that of a double."""
+    for key in ("sample_time", "experiment.samples"):
+        (found,) = refused(parse_spec(TEXT).with_, **{key: value})
+        counted = key != "sample_time" and isinstance(value, int)
+        assert (found.code, found.key) == ("out-of-range" if counted else "not-finite", key)
+
+
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\n"
 ASKED = "accuracy: {standard_deviation: {b1: 0.1}}\nexperiment: {samples: 200}\n"
 
