@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.plants import plant_of_words
 from tests.support.wishes import ENGINEER
 
 PHRASES = {
@@ -70,15 +71,10 @@ def test_a_word_that_is_not_understood_is_told(key, text):
     ],
 )
 def test_each_quantity_is_known_as_well_as_is_said(text, shares):
-    spec = written("plant", text)
-    for (name, value), share in zip(
-        (("gain", 2.0), ("time_constant", 180.0), ("dead_time", 25.0)), shares, strict=True
-    ):
-        found = re.search(rf"^    {name}: \[(.*), (.*)\]$", spec, re.M)
-        assert (found is None) == (share is None)
-        if found is not None:
-            ends = [float(found[1]), float(found[2])]
-            assert ends == pytest.approx([value * (1 - share), value * (1 + share)])
+    values = {"gain": 2.0, "time_constant": 180.0, "dead_time": 25.0}
+    stated = {name: share for name, share in zip(values, shares, strict=True) if share is not None}
+    ends = {name: (values[name] * (1 - share), values[name] * (1 + share)) for name, share in stated.items()}
+    assert plant_of_words(text).intervals == {name: pytest.approx(both) for name, both in ends.items()}
 
 
 @pytest.mark.parametrize(
