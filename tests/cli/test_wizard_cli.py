@@ -198,28 +198,10 @@ def test_answers_are_not_lost_to_the_spec(run, tmp_path):
     assert answers.read_text() == text
 
 
-_WRONG = {
-    "plant": "nonsense",
-    "wish": "PI loop with 0.1 dB",
-    "range": "5 to 1",
-    "time": ".inf",
-    "limits": "fast",
-    "noise": "rest none.csv",
-    "drift": "perhaps",
-    "loop": "PI Ti 3",
-    "signals": "square",
-    "converter": "99 bits up to 3",
-    "hold": "a while",
-    "return": "perhaps",
-    "names": "valve",
-}
-
-
 @pytest.mark.parametrize("key", KEYS)
 def test_a_wrong_answer_is_told_with_its_line(run, tmp_path, key):
     file = tmp_path / "a.yaml"
-    said = {name: text for name, text in GOOD.items() if name != key} | {key: _WRONG[key]}
-    said |= {"wish": "PI loop with 6 dB"} if key != "wish" else {}
+    said = {name: text for name, text in GOOD.items() if name != key} | {key: "a kettle"}
     file.write_text("".join(f'{name}: "{text}"\n' for name, text in said.items()))
     code, _, err = run("wizard", "--answers", file, "-o", tmp_path / "s.yaml", "--no-solve")
     assert code == 2
@@ -256,17 +238,3 @@ def test_what_a_file_leaves_open_is_told_of_the_file_and_an_option_has_no_line(r
     code, _, err = run(*command, "-a", "time=never")
     assert code == 2
     assert err.startswith("error[bad-answer] How much time is there? (time)")
-
-
-@pytest.mark.slow
-def test_an_integrator_in_open_loop_asks_for_a_controller(run, tmp_path):
-    (tmp_path / "p.json").write_text('{"num": [2], "den": [180, 1, 0], "delay": 25}')
-    said = GOOD | {"plant": "p.json", "wish": "PI loop with 6 dB"}
-    given = [part for key, text in said.items() for part in ("-a", f"{key}={text}")]
-    out = tmp_path / "s.yaml"
-    code, _, err = run("wizard", *given, "-o", out, "--no-solve")
-    assert code == 2
-    assert "(loop): the plant integrates" in err
-    assert "let a controller hold" in err
-    code, _, err = run("wizard", *given, "-a", "loop=PI Kp 0.002, Ti 900", "-o", out, "--no-solve")
-    assert code == 0, err

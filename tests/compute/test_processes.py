@@ -15,7 +15,7 @@ from inputdesign_cli.compute import interruptions
 from inputdesign_cli.compute.executor import InProcess, WorkerLostError
 from inputdesign_cli.compute.interruptions import bare_interruptions, interrupt
 from inputdesign_cli.compute.processes import Processes
-from inputdesign_cli.compute.time_limit import Counted, Round, report_progress, watching
+from inputdesign_cli.compute.time_limit import Counted, watching
 from tests.support import jobs
 from tests.support.processes import running
 
@@ -124,11 +124,6 @@ def test_what_comes_after_the_design_is_counted():
         simulate(parse_spec(f"{SPEC}{uncertain}simulation: {{runs: 120}}\n"))
     assert Counted("fresh plants", 70, 70) in told
     assert [str(one) for one in told[-2:]] == ["simulated runs: 100 of 120", "simulated runs: 120 of 120"]
-
-
-def test_nobody_has_to_watch():
-    report_progress(Round(1, 2.0, 1.0, 3))
-    assert str(Round(1, 2.0, 1.0, 3)) == "round 1: 2, proved to 5.0e-01, 3 cuts"
 
 
 def ended(number):

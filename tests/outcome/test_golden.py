@@ -48,19 +48,6 @@ def diagnostics(tmp_path, text):
     return refused(load_golden, written(tmp_path, text))
 
 
-def test_a_golden_file_is_read(tmp_path):
-    golden = load_golden(written(tmp_path, GOOD))
-    assert golden.title == "Two runs"
-    one, two = golden.runs
-    assert (one.name, one.command, one.overrides) == ("one", "solve", ())
-    assert golden.spec_of(one) == tmp_path / "a.yaml"
-    assert golden.spec_of(two) == tmp_path / "sub" / "b.yaml"
-    assert two.command == "analyse"
-    assert two.overrides == ("experiment.samples=10", "spectrum={type: white}")
-    assert [q.tolerance for q in one.quantities] == pytest.approx([1e-3, 4e-2])
-    assert [q.name for q in one.quantities] == ["objective.value", "second power"]
-
-
 def test_rows_compare_with_the_tolerance(tmp_path):
     golden = load_golden(written(tmp_path, GOOD))
     results = {

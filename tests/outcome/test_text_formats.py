@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import math
 import struct
 from collections.abc import Mapping
@@ -253,27 +252,8 @@ def test_a_section_has_one_field_at_most_for_keys_of_other_names():
         assert sum("others" in entry.metadata for entry in fields(section)) <= 1, section
 
 
-def test_json_of_numpy_and_complex_values():
-    value = {
-        "b": np.float64(0.1),
-        "a": np.arange(4).reshape(2, 2),
-        "flag": np.bool_(True),
-        "z": np.array([1 + 2j]),
-        "none": None,
-        "pair": (1, "µ"),
-    }
-    text = json_text(value)
-    assert json.loads(text) == {
-        "b": 0.1,
-        "a": [[0, 1], [2, 3]],
-        "flag": True,
-        "z": [{"re": 1.0, "im": 2.0}],
-        "none": None,
-        "pair": [1, "µ"],
-    }
-    assert list(json.loads(text)) == ["b", "a", "flag", "z", "none", "pair"]
-    assert "µ" in text
-    assert text.startswith('{\n "b": 0.1,\n')
+def test_json_keeps_the_order_of_keys_and_letters_of_all_scripts():
+    assert json_text({"z": np.bool_(True), "a": "µ"}) == '{\n "z": true,\n "a": "µ"\n}\n'
 
 
 def same(one, other):

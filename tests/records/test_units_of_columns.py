@@ -7,13 +7,11 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec
-from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records import Preparation, read_data, read_log
 from tests.support.refusals import code_of, refused
 
-STRUCTURE = "sample_time: 2\ntime_unit: min\nplant: {B: [0, 1], F: [1, -0.7]}\n"
 UNITS = Units("min", 2.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
 NAMED = replace(UNITS, channels={"u1": ("Valve", "%"), "y1": ("Level", "mm")})
 U, Y = np.random.default_rng(1).standard_normal((2, 200))
@@ -50,17 +48,6 @@ def test_times_go_by_several_names(name, log):
     np.testing.assert_array_equal(read(log(f"{name},u,y", EVEN)).time, EVEN)
     assert (
         code_of(read, log(f"{name},u,y", [3 * k for k in range(200)]), kind=DataError) == "data-not-uniform"
-    )
-
-
-def test_times_may_be_dates(log):
-    moments = [datetime(2024, 2, 28, 23) + timedelta(minutes=2 * k) for k in range(200)]
-    np.testing.assert_allclose(np.diff(read(log("timestamp,u,y", moments)).time), 2.0)
-    late = [m + timedelta(minutes=5 * (k > 100)) for k, m in enumerate(moments)]
-    assert "record-cut" in codes(read(log("timestamp,u,y", late)))
-    assert (
-        code_of(read, log("timestamp,u,y", ["2024-01-01", *["yesterday"] * 199]), kind=DataError)
-        == "data-not-a-number"
     )
 
 
@@ -157,14 +144,6 @@ def test_of_several_inputs_the_first_has_its_number(tmp_path):
     )
     record = read_data([tmp_path / "d.csv"], replace(UNITS, inputs=2), Preparation())
     np.testing.assert_array_equal(record.u.T, [np.arange(20) % 3, np.arange(20) % 5])
-
-
-def test_the_variance_of_noise_that_is_estimated_need_not_be_stated():
-    for noise in ("", "noise: {C: [1, 0.1]}\n"):
-        parse_spec(STRUCTURE + noise, design=False)
-        with pytest.raises(SpecError, match="noise"):
-            parse_spec(STRUCTURE + noise)
-    assert code_of(parse_spec, STRUCTURE + "noise: 3\n", design=False) == "wrong-shape"
 
 
 @pytest.mark.parametrize("column", ["1", "Time", "TIME [s]", "time [s]"])

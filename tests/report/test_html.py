@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shutil
-from datetime import datetime
 from functools import cache, reduce
 from importlib import resources
 from pathlib import Path
@@ -33,16 +32,11 @@ def test_the_page_of_a_run(runs, name):
     page = parse(page_of(runs / name))
     result = json.loads((runs / name / "result.json").read_text())
     headings = [element.text for element in page.iter(f"{XHTML}h2")]
-    loop = ["The loop"] if name == "closed" else []
-    assert headings == [
-        "The question", "The answer", "Accuracy", *loop, "Spectrum", "Signal", "The certificate",
-        "What was assumed", "How to reproduce it", "Methods", "All numbers",
-    ]  # fmt: skip
+    assert ("The loop" in headings) == (name == "closed")
     contents = ["".join(link.itertext()) for link in page.iter(f"{XHTML}a")]
     assert contents == headings
     said = words(page)
     for part in (
-        f"computed {datetime.now():%Y-%m-%d}",
         "90 % confidence",
         "10 % of |G|",
         f"{result['cost']:.6g}",
@@ -231,10 +225,6 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
     page, result = parse(report_text(tmp_path / "run")), found.results.result
     verdict = result["assessment"]["requirements"][0]
     assert f"model error reaches {verdict['worst_ratio']:.4g}" in words(page)
-    assert (
-        "These data meet" if met else "The experiment below is what the model of these data still needs"
-    ) in words(page)
-    assert "idesign assess spec.yaml DATA" in words(page)
     cells = rows(page)
     assert ["model error", f"{verdict['worst_ratio']:.4g}", "met" if met else "missed"] == [
         cell for i, cell in enumerate(next(r for r in cells if r[0] == "model error")) if i != 2
@@ -269,10 +259,8 @@ def test_the_page_of_a_study(tmp_path):
         assert row[1].startswith(f"{100 * entry['within_r_adm']:.1f} %")
         assert row[2].startswith(f"{100 * entry['on_design_model']['within_r_adm']:.1f} %")
         assert row[4] == f"{entry['cost']:.5g}"
-    assert "20 runs of each input" in words(page)
     share = f"{100 * inputs['design']['within_r_adm']:.1f} %"
     assert f"In 20 simulated experiments {share} of the models stayed within r_adm" in words(page)
-    assert "What the excitation alone does to the loop: white." in words(page)
     assert "Further figures" not in words(page)
 
 

@@ -120,28 +120,12 @@ def test_a_gain_alone_and_what_floats_cannot_hold():
 
 
 STATES = control.ss([[0, 1], [0, -3.5]], [[0], [10.0]], [[1, 0]], [[0]])
-
-
 HEATER = control.tf([2.1], [180, 1])
-
-
 SAMPLES = control.tf([0.1], [1, -0.8], 0.5)
-
-
 PLACES = [
-    ["a list"],
-    "d",
-    {"d": ("Q", 1, 1)},
-    {"d": (["A"], 0, 0)},
-    {"d": ("A", 5, 1)},
-    {"d": ("A", -3, 1)},
-    {"d": ("A", 1)},
-    {"d": ("A", 1.0, 1)},
-    {"d": None},
-    {"d": ("A", 1, 1), "e": ("A", -1, -1)},
-]
-
-
+    ["a list"], "d", {"d": ("Q", 1, 1)}, {"d": (["A"], 0, 0)}, {"d": ("A", 5, 1)}, {"d": ("A", -3, 1)},
+    {"d": ("A", 1)}, {"d": ("A", 1.0, 1)}, {"d": None}, {"d": ("A", 1, 1), "e": ("A", -1, -1)},
+]  # fmt: skip
 WRONG = [
     *((STATES, "parameters", {"parameters": places}) for places in PLACES),
     (HEATER, "parameters", {"parameters": {"d": ("A", 0, 0)}, "delay": 5}),

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
 import pickle
 from pathlib import Path
 
 import pydantic
 import pytest
 
-import inputdesign_cli.specification as room
 from inputdesign_cli.errors import Diagnostic, InfeasibleError, SpecError
 from inputdesign_cli.specification import load_spec, parse_spec
-from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenWhite
+from inputdesign_cli.specification.models.spectrum import GivenWhite
 
 HERE = Path(__file__).parent
 SPECS = sorted([*(HERE / "data").glob("*.yaml"), *(HERE.parents[1] / "specs").glob("*.yaml")])
@@ -37,47 +35,6 @@ def test_every_example_loads_and_survives_writing_and_pickling(path):
     copy = pickle.loads(pickle.dumps(spec))
     assert copy.model_dump() == spec.model_dump()
     assert copy.locate("plant") == spec.locate("plant")
-
-
-SAID = {
-    "first_order": {
-        "plant.B": (0.0, 3.6),
-        "plant.F_matrix": (((1.0, -0.7),),),
-        "noise.C": (1.0, -0.9),
-        "accuracy.requirements": ("model_error",),
-        "spectrum": FirSpectrum(type="fir", order=20),
-        "goal": "least_cost",
-        "signal_samples": 500,
-        "nyquist": math.pi,
-    },
-    "flexible_transmission": {
-        "closed_loop": True,
-        "accuracy.model_error.sensitivity.weight.denominator_polynomial": (1.0, -0.999455),
-        "simulation.compare": ("white",),
-    },
-    "distillation_column": {
-        "plant.shape": (2, 2),
-        "nyquist": math.pi / 2,
-        "accuracy.closed_loop_error.control.model_reference.continuous.denominator": (75.0, 1.0),
-        "goal": "best_accuracy",
-    },
-    "two_by_two": {
-        "plant.sampled": False,
-        "nyquist": math.inf,
-        "experiment.samples": 1,
-        "signal_samples": 8192,
-    },
-    "regression": {
-        "simulation.plant.parameters": (2.0, -1.0),
-        "accuracy.requirements": ("mean_squared_error",),
-    },
-}
-
-
-@pytest.mark.parametrize("name", SAID)
-def test_what_an_example_says(name):
-    spec = by_name(name)
-    assert {key: operator.attrgetter(key)(spec) for key in SAID[name]} == SAID[name]
 
 
 def test_factors_are_multiplied_and_variances_repeated():
@@ -112,11 +69,6 @@ def test_defaults_that_depend_on_the_rest():
     analysis = parse_spec("plant: {B: [0, 1]}\nnoise: {variance: 1}\n" + given)
     assert not analysis.designs
     assert analysis.spectrum.given == GivenWhite(type="white", power=1.7)
-
-
-def test_an_unstable_plant_is_allowed_in_closed_loop():
-    loop = "experiment: {controller: {numerator: [1.5]}}\n"
-    assert parse_spec("plant: {B: [0, 1], A: [1, -2]}\n" + REST + loop).plant.A == (1.0, -2.0)
 
 
 ALLOWED = """\
@@ -232,14 +184,6 @@ def test_complaints_of_other_rooms_are_placed():
     assert placed.diagnostics[1] == bare.diagnostics[1]
 
 
-def test_files_are_relative_to_the_spec(tmp_path):
-    file = tmp_path / "sub" / "s.yaml"
-    file.parent.mkdir()
-    file.write_text(GOOD)
-    assert load_spec(file).resolve_path("table.csv") == file.parent / "table.csv"
-    assert load_spec(file).resolve_path(str(tmp_path / "x.csv")) == tmp_path / "x.csv"
-
-
 def test_the_fingerprint_sees_content_only():
     spec = parse_spec(GOOD)
     lines = GOOD.replace("variance: 1}", "variance: 1.0}").splitlines()
@@ -253,8 +197,3 @@ def test_texts_that_look_like_other_things_stay_texts():
         spec = parse_spec(GOOD).to_yaml()
         spec = parse_spec(spec, overrides=["title='" + title.replace("'", "''") + "'"])
         assert parse_spec(spec.to_yaml()).title == spec.title
-
-
-def test_everything_exported_exists_and_is_documented():
-    for name in room.__all__:
-        assert getattr(room, name).__doc__, name

@@ -1,4 +1,4 @@
-"""Which texts of a spec name files, and that a spec is kept to a folder if that is asked for."""
+"""Which texts of a spec name files, from which folder, and that a spec is kept to a folder if one asks."""
 
 import os
 import re
@@ -8,10 +8,14 @@ import pytest
 from inputdesign_cli import Spec, load_spec
 from inputdesign_cli.cli.watch import _named_files as followed_files
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification import relocated
 from inputdesign_cli.specification.loading import read_template
 from inputdesign_cli.specification.schema import named_files
 from inputdesign_cli.specification.yaml.places import format_key
-from inputdesign_cli.sweeps.plan import build_plan
+from inputdesign_cli.specification.yaml.plain import to_yaml
+from inputdesign_cli.specification.yaml.reader import read
+from inputdesign_cli.sweeps.plan import build_plan, parse_settings
+from inputdesign_cli.sweeps.points import Layout
 from tests.support.refusals import code_of, refused
 
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\naccuracy: {standard_deviation: {b1: 0.1}}\n"
@@ -122,10 +126,10 @@ OUTSIDE = ["../r.csv", "{}/r.csv", "link.csv", "sub/../../r.csv", "/etc/passwd",
 )
 def test_a_spec_is_kept_to_a_folder(project, key, name):
     setting = f"{key}={NAMING[key] % name.format(project.parent)}"
-    for read in (load_spec, read_template):
+    for reading in (load_spec, read_template):
         found = {
             diagnostic.code: diagnostic
-            for diagnostic in refused(read, project / "spec.yaml", [setting], confine=project)
+            for diagnostic in refused(reading, project / "spec.yaml", [setting], confine=project)
         }
         assert found["file-outside"].key.startswith(key)
     draft = read_template(project / "spec.yaml", confine=project)
@@ -159,3 +163,47 @@ def test_a_pipe_is_not_waited_for(project):
     assert code_of(read_template, project / "spec.yaml", ["include=pipe"]) == "bad-include"
     draft = read_template(project / "spec.yaml", ["experiment.prior.information=pipe"])
     assert draft.files(draft.data) == []
+
+
+@pytest.mark.parametrize("written", ["r.csv", '"r.csv"', "sub/r.csv", "'a b.csv'"])
+def test_files_that_exist_are_named_from_the_new_folder(written, tmp_path):
+    name, there = written.strip("\"'"), tmp_path / "runs" / "one"
+    (tmp_path / "specs" / name).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / "specs" / name).touch()
+    there.mkdir(parents=True)
+    text = f"title: r.csv\naccuracy: {{model_error: {{table: {written}}}}}  # r.csv\n"
+    moved = relocated(text, tmp_path / "specs", there)
+    inner = written.replace(name, f"../../specs/{name}")
+    assert moved == text.replace(f"table: {written}", f"table: {inner}")
+    assert relocated(moved, there, tmp_path / "specs") == text
+
+
+def test_names_of_no_file_and_absolute_ones_stay(tmp_path):
+    (tmp_path / "r.csv").touch()
+    for name in ("gone.csv", str(tmp_path / "r.csv")):
+        text = f"accuracy: {{model_error: {{table: {name}}}}}\n"
+        assert relocated(text, tmp_path, tmp_path / "runs") == text
+
+
+@pytest.mark.parametrize(("key", "text"), NAMING.items())
+def test_every_key_that_names_a_file_names_the_same_one_from_a_run_and_from_a_point(key, text, tmp_path):
+    table = tmp_path / "in" / "r.csv"
+    table.parent.mkdir()
+    table.touch()
+    spec = table.parent / "spec.yaml"
+    spec.write_text(MODEL)
+    plan = build_plan(spec, [f"{key}={text % 'r.csv'}", "experiment.samples=5,6"])
+    run, point = tmp_path / "runs" / "one", Layout(tmp_path / "sweep").run(plan.key(0))
+    moved = read(relocated(to_yaml(plan.base), table.parent, run), "spec.yaml").data
+    (of_run,), (of_point,) = (
+        {name for _, name in named_files(moved)},
+        plan.names(0, tmp_path / "sweep").values(),
+    )
+    for folder, name in ((run, of_run), (point, of_point)):
+        folder.mkdir(parents=True)
+        assert (folder / name).samefile(table)
+
+
+def test_a_key_that_is_swept_has_no_other_value():
+    settings = ["experiment.samples=100,200", "experiment.samples=300"]
+    assert code_of(parse_settings, settings, kind=SpecError) == "sweep-twice"

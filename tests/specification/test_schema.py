@@ -13,7 +13,6 @@ from inputdesign_cli import parse_spec, validate
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import json_schema
 from inputdesign_cli.specification.yaml.reader import read
-from tests.support.refusals import refused
 
 HERE = Path(__file__).parent
 SPECS = sorted([*(HERE / "data").glob("*.yaml"), *(HERE.parents[1] / "specs").glob("*.yaml")])
@@ -132,12 +131,3 @@ def test_the_schema_and_the_models_take_the_same_words(plant, schema):
     assert accepts(read(text, "x").data, schema)
     spec = parse_spec(text)
     assert parse_spec(spec.to_yaml()).plant == spec.plant
-
-
-def test_a_named_parameter_is_changed_by_an_override():
-    spec = parse_spec(f"plant: {PLANTS[1]}\n{DESIGN}", overrides=["plant.parameters.p=0.5"])
-    assert spec.plant.F == (1.0, -0.5)
-
-
-def test_a_coefficient_that_is_a_word_tells_of_parameters():
-    assert "parameters: {K: 2.1}" in refused(parse_spec, f"plant: {{B: [0, K]}}\n{DESIGN}")[0].hint

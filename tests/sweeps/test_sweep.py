@@ -20,7 +20,7 @@ from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings
 from inputdesign_cli.sweeps.points import Layout
-from inputdesign_cli.sweeps.running import list_points, row_of, scalars, table_lines
+from inputdesign_cli.sweeps.running import row_of, scalars, table_lines
 from tests.support.processes import running
 from tests.support.refusals import refused
 from tests.support.sweep_files import SPEC, rows, run_sweep, timeless_files, timeless_rows
@@ -132,17 +132,6 @@ def test_swept_texts_are_no_formulas(spec, stub, tmp_path):
     run_sweep(spec, [f"title={','.join(titles)}"], directory=out)
     assert column(out, "title") == ["'=1+1", "'+x", "'-y", "'@z", "-0.5", "''=1"]
     assert read_sweep(out).columns["title"] == titles
-
-
-def test_listing_writes_nothing(spec, stub, tmp_path):
-    out = tmp_path / "out"
-    listed = list(list_points(build_plan(spec, ["experiment.samples=6,7"]), out))
-    assert [point.status for point in listed] == ["pending", "pending"]
-    assert not out.exists()
-    run_sweep(spec, ["experiment.samples=6,7"], directory=out)
-    listed = list(list_points(build_plan(spec, ["experiment.samples=6,7,8"]), out))
-    assert [point.status for point in listed] == ["done", "failed", "pending"]
-    assert (out / "points" / listed[0].key / "result.json").is_file()
 
 
 HOLD = """

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.wizard.composing import Conversation, compose
-from inputdesign_cli.wizard.grammar import Phrase
 from inputdesign_cli.wizard.plants import plant_of_words
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers, taken_for_granted
 from inputdesign_cli.wizard.sentence import in_sentence, not_understood, spread
@@ -39,191 +37,109 @@ ROOM = (
     "noise 0.05 degC that fades in half an hour"
 )
 
+KNOWN = {
+    EXCHANGER: "gain=1.72 offset=45 amplitude=8 duration=28800 correlation_time=60 max_sensitivity_db=6",
+    MOTOR: "gain=10 offset=10 amplitude=5 duration=20 variance=1",
+    TANK: "slope=0.02 offset=50 duration=3600 standard_deviation=0.2 correlation_time=5",
+    LEVEL: "slope=0.02 offset=50 amplitude=10 correlation_time=5",
+    ROOM: "time_constant=10800 dead_time=600 amplitude=20 correlation_time=1800 relative=0.05",
+}
 
-# As engineers write who have not read the page: a motor, a tank and a room.
+# As engineers write who have not read the page: a motor, a tank and a room; and what the spec then holds.
+# Steps q of a sensor add q^2/12 to the variance.
 WRITTEN = {
     "I have a DC motor with dry friction and want to tune a PI speed controller. 10 rad/s per volt, "
     "time constant roughly 0.5 s, hardly any dead time. Voltage 10 V plus minus 5 V, I have 30 seconds. "
-    "Noise about 1 rad/s.": {
-        "gain": 10,
-        "time_constant": 0.5,
-        "tau_c": 0.125,
-        "offset": 10,
-        "amplitude": 5,
-        "max_sensitivity_db": 6,
-        "duration": 30,
-        "standard_deviation": 1,
-        "correlation_time": 0.1,
-    },
+    "Noise about 1 rad/s.": (
+        "gain=10 time_constant=0.5 tau_c=0.125 offset=10 amplitude=5 max_sensitivity_db=6 duration=30 "
+        "standard_deviation=1 correlation_time=0.1"
+    ),
     "motor, gain about 10 rpm/V, lag about 500 ms, it sticks a bit at low speed, voltage 6 to 14 V, 1 "
-    "minute, noise 5 rpm white, PI with a safe margin": {
-        "gain": 10,
-        "time_constant": 0.5,
-        "offset": 10,
-        "amplitude": 4,
-        "duration": 60,
-        "variance": 25,
-    },
+    "minute, noise 5 rpm white, PI with a safe margin": (
+        "gain=10 time_constant=0.5 offset=10 amplitude=4 duration=60 variance=25"
+    ),
     "PI loop with 6 dB for a motor: 10 rad/s per V, 0.5 s lag, 0.05 s of dead time, voltage 10 V +/- 5 "
-    "V, 60 s, noise 9.549297 rpm slow, the bearing has some stiction": {
-        "dead_time": 0.05,
-        "standard_deviation": 1,
-        "correlation_time": 0.5,
-    },
+    "V, 60 s, noise 9.549297 rpm slow, the bearing has some stiction": (
+        "dead_time=0.05 standard_deviation=1 correlation_time=0.5"
+    ),
     "PI level control for a tank: level rises 1.2 cm per minute per % of valve, dead time 10 s, valve "
-    "50 +- 10 %, one hour, level noise 3 mm slowly": {
-        "slope": 0.02,
-        "L": None,
-        "amplitude": 10,
-        "standard_deviation": 0.3,
-        "correlation_time": 10,
-    },
+    "50 +- 10 %, one hour, level noise 3 mm slowly": (
+        "slope=0.02 L=none amplitude=10 standard_deviation=0.3 correlation_time=10"
+    ),
     "I want a level controller for my tank. When I open the inlet valve by 10 % the level rises by "
     "about 12 cm per minute. Delay about 10 s. The valve can go from 40 to 60 %. The level is measured "
-    "in cm with 0.2 cm noise. We have one hour.": {
-        "slope": 0.02,
-        "dead_time": 10,
-        "offset": 50,
-        "standard_deviation": 0.2,
-    },
+    "in cm with 0.2 cm noise. We have one hour.": (
+        "slope=0.02 dead_time=10 offset=50 standard_deviation=0.2"
+    ),
     "PI loop with a safe margin for a tank, level in cm: it integrates with 0.02 cm/s per %, dead time "
-    "10 s, valve 50 +- 10 %, one hour, noise 0.3 cm, slow": {"slope": 0.02, "correlation_time": 10},
+    "10 s, valve 50 +- 10 %, one hour, noise 0.3 cm, slow": ("slope=0.02 correlation_time=10"),
     "Temperature control of a room with a radiator. 10 % more valve warms the room by about 1.5 degC, "
-    "time constant about 3 h, delay 10 minutes, valve 50 % plus or minus 20 %, two days, noise 0.05 K": {
-        "gain": 0.15,
-        "time_constant": 10800,
-        "dead_time": 600,
-        "offset": 50,
-        "amplitude": 20,
-    },
+    "time constant about 3 h, delay 10 minutes, valve 50 % plus or minus 20 %, two days, noise 0.05 K": (
+        "gain=0.15 time_constant=10800 dead_time=600 offset=50 amplitude=20"
+    ),
     "I want to predict the temperature of a room with a radiator within 5 %. The radiator valve can "
     "move between 30 and 70 %. Gain 0.15 °C/%, time constant 3 hours, dead time 10 minutes. The sensor "
-    "has 0.1 °C resolution. I have two days.": {
-        "relative": 0.05,
-        "offset": 50,
-        "amplitude": 20,
-        "gain": 0.15,
-        "variance": 0.0008333333333333334,
-    },
+    "has 0.1 °C resolution. I have two days.": (
+        "relative=0.05 offset=50 amplitude=20 gain=0.15 variance=0.0008333333333333334"
+    ),
     "Room with a radiator: gain 0.15 degC per %, time constant 3 hours, dead time 10 min, valve 30-70 "
-    "%, 48 hours, noise 0.05 degC slowly varying, predict temperature within 5 % up to 0.001 rad/s": {
-        "correlation_time": 10800,
-        "amplitude": 20,
-        "duration": 172800,
-    },
+    "%, 48 hours, noise 0.05 degC slowly varying, predict temperature within 5 % up to 0.001 rad/s": (
+        "correlation_time=10800 amplitude=20 duration=172800"
+    ),
     "Heat exchanger: gain 1.7 degC/%, 262 s time constant, 31 s dead time, all within 20 %. Temperature "
     "noise 0.1 degC, fades within a minute. Steam valve around 45 %, may move by 8 %. PI, gain margin "
-    "2. 8 hours.": {
-        "gain": 1.7,
-        "time_constant": 262,
-        "dead_time": 31,
-        "gain_margin": 2,
-        "offset": 45,
-        "amplitude": 8,
-    },
+    "2. 8 hours.": ("gain=1.7 time_constant=262 dead_time=31 gain_margin=2 offset=45 amplitude=8"),
     "I want a PI speed controller for a DC motor with dry friction. I run it around 6 V and may move it by "
     "+-2 V. Speed about 80 rad/s per volt, time constant about a tenth of a second, sensor noise about 0.8 "
-    "rad/s. 20 seconds. We can sample every 10 ms.": {
-        "time_constant": 0.1,
-        "sample_time": 0.01,
-        "offset": 6,
-        "amplitude": 2,
-        "duration": 20,
-        "standard_deviation": 0.8,
-    },
+    "rad/s. 20 seconds. We can sample every 10 ms.": (
+        "time_constant=0.1 sample_time=0.01 offset=6 amplitude=2 duration=20 standard_deviation=0.8"
+    ),
     "I want a level controller for my tank. The inlet valve stands at 50 % and may go from 40 to 60 %. "
     "When I open the inlet valve by 10 % the level rises by about 12 cm per minute. Delay about 10 s. 0.15 "
-    "cm noise. At most one hour.": {"slope": 0.02, "offset": 50, "amplitude": 10, "duration": 3600},
+    "cm noise. At most one hour.": ("slope=0.02 offset=50 amplitude=10 duration=3600"),
     "PI loop with a safe margin: radiator valve in % around 40, may move +-15 %; temperature about 1.5 degC "
     "per 10 %, about an hour, 2 min dead time; sensor noise 0.04 degC that fades in 5 min, slow weather; "
-    "two days": {
-        "gain": 0.15,
-        "time_constant": 3600,
-        "offset": 40,
-        "amplitude": 15,
-        "dead_time": 120,
-        "duration": 172800,
-    },
+    "two days": ("gain=0.15 time_constant=3600 offset=40 amplitude=15 dead_time=120 duration=172800"),
     "The valve works at 40 %, it may move between 25 and 55 %. The temperature rises by about 1.5 degC when "
     "the valve opens 10 %, after about an hour. Dead time 3 min. PI with good margin. Noise 0.1 degC. 2 days "
-    "max.": {"gain": 0.15, "time_constant": 3600, "amplitude": 15, "duration": 172800},
-    "exchanger: gain 1.72 degC/%, 262 s, 31 s, noise 0.1 degC, valve (%) at 45 +- 8, max 8 h, PI loop Ms 2": {
-        "time_constant": 262,
-        "dead_time": 31,
-        "amplitude": 8,
-        "max_sensitivity_db": 6.0206,
-        "duration": 28800,
-    },
+    "max.": ("gain=0.15 time_constant=3600 amplitude=15 duration=172800"),
+    "exchanger: gain 1.72 degC/%, 262 s, 31 s, noise 0.1 degC, valve (%) at 45 +- 8, max 8 h, PI loop Ms 2": (
+        "time_constant=262 dead_time=31 amplitude=8 max_sensitivity_db=6.0206 duration=28800"
+    ),
     "PI speed loop with gain margin 2 for a 24 V drive with dry friction, around 9 V, about 20 rad/s per V "
-    "and 0.3 to 0.4 s, noise 0.5 rad/s (white), voltage may move +-3 V around 9 V, experiment up to 20 s": {
-        "gain": 20,
-        "time_constant": 0.35,
-        "offset": 9,
-        "amplitude": 3,
-        "duration": 20,
-    },
-    "K=1.7, T = 262 s, L=31 s, noise 0.1 degC, valve stands at 45 % and may move 8 % up and down, PI, 8 h": {
-        "gain": 1.7,
-        "time_constant": 262,
-        "dead_time": 31,
-        "amplitude": 8,
-        "max_sensitivity_db": 6,
-    },
+    "and 0.3 to 0.4 s, noise half a rad/s (white), voltage may move +-3 V around 9 V, experiment up to "
+    "20 s": ("gain=20 time_constant=0.35 offset=9 amplitude=3 duration=20 variance=0.25"),
+    "K=1.7, T = 262 s, L=31 s, noise 0.1 degC, valve stands at 45 % and may move 8 % up and down, PI, 8 h": (
+        "gain=1.7 time_constant=262 dead_time=31 amplitude=8 max_sensitivity_db=6"
+    ),
     "evaporator level: feed pump 60 %, +/- 5 %; integrating, 0.01 %/s per %; dead time 12 s; noise 0.3 %; "
-    "PI; 90 min": {"slope": 0.01, "dead_time": 12, "offset": 60, "amplitude": 5},
+    "PI; 90 min": ("slope=0.01 dead_time=12 offset=60 amplitude=5"),
     "flow loop: valve 40 +- 10 %, flow in m3/h, 0.8 m3/h per %, 2 s, dead time 0.5 s, noise 0.3 m3/h white, "
-    "10 min, PI with 6 dB": {"gain": 0.8, "time_constant": 2, "dead_time": 0.5, "variance": 0.09},
+    "10 min, PI with 6 dB": ("gain=0.8 time_constant=2 dead_time=0.5 variance=0.09"),
     "PI controller for a room. The radiator valve is at 40 %, it may move by +-20 %. One percent of valve "
     "gives about 0.11 degC, it reacts within about 0.7 h, dead time about 2 min. Noise 0.04 degC. The sensor "
-    "shows 0.01 degC steps. The weather drifts slowly. I have 16 hours at most, less is better.": {
-        "gain": 0.11,
-        "time_constant": 2520,
-        "dead_time": 120,
-        "offset": 40,
-        "duration": 57600,
-        "variance": 0.04**2 + 0.01**2 / 12,
-    },
+    "shows 0.01 degC steps. The weather drifts slowly. I have 16 hours at most, less is better.": (
+        "gain=0.11 time_constant=2520 dead_time=120 offset=40 duration=57600 variance=0.0016083333333333334"
+    ),
     "I've got a heat exchanger on steam. Steam valve sits at 35 %, I can swing it ±5 %. Outlet temperature "
     "responds about 0.8 °C per %, in roughly 4 minutes, after 20 seconds or so. Sensor noise ±0.1 °C. I need "
-    "a PI controller with a good margin, and I've got about 3 hours.": {
-        "gain": 0.8,
-        "time_constant": 240,
-        "dead_time": 20,
-        "offset": 35,
-        "amplitude": 5,
-        "standard_deviation": 0.1,
-        "duration": 10800,
-    },
+    "a PI controller with a good margin, and I've got about 3 hours.": (
+        "gain=0.8 time_constant=240 dead_time=20 offset=35 amplitude=5 standard_deviation=0.1 duration=10800"
+    ),
     "Level tank, inlet valve at 50 %, +/-10 % allowed, level goes up 0.5 cm/min for each % of valve, 20 s "
     "dead time, measurement noise 0.15 cm, outflow increases slowly with level, two hours available, PI "
-    "level controller": {
-        "slope": 0.00833333,
-        "dead_time": 20,
-        "offset": 50,
-        "amplitude": 10,
-        "duration": 7200,
-    },
+    "level controller": ("slope=0.00833333 dead_time=20 offset=50 amplitude=10 duration=7200"),
     "Room heating: valve around 40 % (25 to 55 %), temperature rises approximately 1.5 K for 10 % more "
-    "valve, takes about an hour, delay of a few minutes; sensor noise 0.04 K, lasts 5 min; two days; PI": {
-        "gain": 0.15,
-        "time_constant": 3600,
-        "dead_time": 210,
-        "offset": 40,
-        "amplitude": 15,
-        "duration": 172800,
-    },
-    "Servo: 12 rpm per V, settles in 2 s, no dead time, 5 V +- 2 V, noise 3 rpm, 1 minute, PI": {
-        "time_constant": 0.5,
-        "duration": 60,
-    },
+    "valve, takes about an hour, delay of a few minutes; sensor noise 0.04 K, lasts 5 min; two days; PI": (
+        "gain=0.15 time_constant=3600 dead_time=210 offset=40 amplitude=15 duration=172800"
+    ),
+    "Servo: 12 rpm per V, settles in 2 s, no dead time, 5 V +- 2 V, noise 3 rpm, 1 minute, PI": (
+        "time_constant=0.5 duration=60"
+    ),
     "Please design a test for a flow loop: running around 40 %, steps of 10 % are fine, gain 0.9 l/s per %, "
-    "time constant between 3 and 4 s, dead time 1 s, noise rms 0.2 l/s white, 5 min, parameters within 3 %": {
-        "time_constant": 3.5,
-        "offset": 40,
-        "amplitude": 10,
-        "L": None,
-        "duration": 300,
-    },
+    "time constant between 3 and 4 s, dead time 1 s, noise rms 0.2 l/s white, 5 min, parameters within 3 %": (
+        "time_constant=3.5 offset=40 amplitude=10 L=none duration=300"
+    ),
 }
 
 
@@ -236,28 +152,6 @@ def heard(sentence, folder, *more):
     return talk.draft
 
 
-@pytest.mark.parametrize(
-    ("sentence", "facts"),
-    [
-        (EXCHANGER, {"gain": 1.72, "offset": 45, "amplitude": 8, "duration": 28800, "correlation_time": 60,
-                     "max_sensitivity_db": 6, "hold": 6, "sample_time": 10}),
-        (MOTOR, {"gain": 10, "offset": 10, "amplitude": 5, "duration": 20, "variance": 1}),
-        (TANK, {"slope": 0.02, "offset": 50, "duration": 3600, "standard_deviation": 0.2,
-                "correlation_time": 5}),
-        (LEVEL, {"slope": 0.02, "offset": 50, "amplitude": 10, "correlation_time": 5}),
-        (ROOM, {"time_constant": 10800, "dead_time": 600, "amplitude": 20, "correlation_time": 1800,
-                "relative": 0.05}),
-    ],
-)  # fmt: skip
-def test_a_sentence_and_three_answers_are_a_spec(sentence, facts, tmp_path):
-    """The fastest plant cannot wait a minute."""
-    draft = heard(sentence, tmp_path, "no" if sentence is MOTOR else "1 min", "steps of 0.1", "no")
-    for name, value in facts.items():
-        assert float(re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", draft.text)[1]) == pytest.approx(value), name
-    assert parse_spec(draft.text).uncertainty.intervals
-    assert "about" in draft.notes[0]
-
-
 def written(sentence, folder):
     """The draft after a sentence alone, of which all is understood, and its text without the title."""
     found = in_sentence(sentence)
@@ -267,20 +161,21 @@ def written(sentence, folder):
     return draft, draft.text.split("\n", 2)[2]
 
 
-@pytest.mark.parametrize(("sentence", "facts"), WRITTEN.items())
+@pytest.mark.parametrize(("sentence", "facts"), (KNOWN | WRITTEN).items())
 def test_a_sentence_as_engineers_write_is_a_spec(sentence, facts, tmp_path):
     draft, text = written(sentence, tmp_path)
-    for name, value in facts.items():
+    for name, value in (fact.split("=") for fact in facts.split()):
         found = re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", text)
-        assert (found is None) == (value is None), name
-        assert found is None or float(found[1]) == pytest.approx(value, rel=1e-4), name
-    rough = re.findall(r"dry friction|stiction|sticks", sentence)
+        assert (found is None) == (value == "none"), name
+        assert found is None or float(found[1]) == pytest.approx(float(value), rel=1e-4), name
+    rough = re.findall(r"friction|stiction|sticks", sentence)
     assert sum("no linear model has it" in note for note in draft.notes) == len(rough)
     assert draft.spec() is not None
+    assert sentence not in KNOWN or any("about" in note for note in draft.notes)
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize("sentence", [*WRITTEN, EXCHANGER, MOTOR, TANK, LEVEL, ROOM])
+@pytest.mark.parametrize("sentence", [*WRITTEN, *KNOWN])
 def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
     """A strange word anywhere is refused, or said back or written; a strange number, too."""
     words = sentence.split(" ")
@@ -317,24 +212,6 @@ def test_a_size_that_is_not_understood_is_not_left_out(part, instead, refused, t
     with pytest.raises(SpecError, match=refused) as found:
         written(EXCHANGER.replace(part, instead), tmp_path)
     assert found.value.diagnostics[0].code == "bad-answer"
-
-
-@pytest.mark.parametrize(
-    ("part", "instead", "facts"),
-    [
-        ("gain about 1.72 degC/%", "temperature falls by 20 degC per 10 %", {"gain": -2}),
-        ("gain about 1.72 degC/%", "the temperature drops about 3 degC per %", {"gain": -3}),
-        ("gain about 1.72 degC/%", "gain 1.5 degC/% +- 0.2", {"gain": 1.5, "amplitude": 8}),
-        ("262 s", "180 milliseconds", {"time_constant": 0.18}),
-    ],
-)
-def test_signs_shares_and_units_are_kept(part, instead, facts, tmp_path):
-    sentence = EXCHANGER.replace(part, instead).replace("dead time 31 s, ", "")
-    draft, text = written(sentence.replace("that fades in a minute", "white"), tmp_path)
-    for name, value in facts.items():
-        assert float(re.search(rf"\b{name}: ([-+.\de]+)", text)[1]) == pytest.approx(value), name
-    if "+-" in instead:
-        assert draft.spec().uncertainty.intervals["gain"] == pytest.approx((1.3, 1.7))
 
 
 @pytest.mark.parametrize(
@@ -392,15 +269,6 @@ def test_a_time_between_two_ends_is_an_interval(said, ends):
     assert found.intervals["dead_time"] == pytest.approx(ends, rel=1e-3)
     remarks = in_sentence(f"gain 2, time constant 40 min, dead time {said}, valve 45 +- 8 %").remarks
     assert remarks == (('"a few minutes" is taken as 2 to 5 minutes',) if "few" in said else ())
-
-
-@pytest.mark.parametrize(
-    ("said", "seconds"), [("about an hour", 3600), ("half an hour", 1800), ("two minutes", 120)]
-)
-def test_times_in_words_are_those_of_a_plant(said, seconds, tmp_path):
-    plant = f"gain 2, time constant {said}, dead time 10 s"
-    spec = heard(f"PI loop with 6 dB: {plant}, 45 +- 5 %, two days, noise 0.1", tmp_path, *["no"] * 3).spec()
-    assert spec.plant.continuous.time_constant == seconds
 
 
 @pytest.mark.parametrize(
@@ -550,7 +418,8 @@ PLAIN = (
     ["minus 2 degC/%", "of negative 2 degC/%", "the temperature rises by 10 degC when the valve closes 5 %",
      "when the valve closes by 5 % the temperature rises by 10 degC",
      "closing the valve by 5 % raises the temperature by 10 degC", "10 % more valve gives 20 degC less",
-     "opening the valve by 10 % makes the temperature fall by 20 degC"],
+     "opening the valve by 10 % makes the temperature fall by 20 degC",
+     "the temperature falls by 20 degC per 10 % of valve", "the temperature drops 2 degC per % of valve"],
 )  # fmt: skip
 def test_a_gain_that_is_negative_is(gain, tmp_path):
     words = gain if "valve" in gain else f"gain {gain}"
@@ -603,6 +472,8 @@ def test_words_that_matter_are_asked_for(part):
 
 @pytest.mark.parametrize("apart", ["0.5 min", "30 s", "16.6667 %"])
 def test_a_tolerance_has_a_unit_of_its_own(apart):
+    gain = plant_of_words("gain 1.5 degC/% +- 0.2, time constant 9 s").intervals["gain"]
+    assert gain == pytest.approx((1.3, 1.7))
     found = plant_of_words(f"gain 2, time constant 40 min, dead time 3 min +- {apart}")
     assert found.intervals["dead_time"] == pytest.approx((150.0, 210.0), rel=1e-5)
 
@@ -624,23 +495,6 @@ def test_what_nobody_was_asked_is_said():
 @pytest.mark.parametrize("lag", ["settles in about 4 h", "time constant about 1 h"])
 def test_a_time_in_which_it_settles_may_be_vague(lag):
     assert plant_of_words(f"gain 2, {lag}").intervals["time_constant"] == pytest.approx((2880.0, 4320.0))
-
-
-@pytest.mark.parametrize(
-    "noise",
-    [
-        "noise half a rad/s",
-        "sensor noise sigma 0.5 rad/s",
-        "noise 0.5 rad/s with a memory of 2 s",
-        "noise +- 0.5 rad/s",
-        "standard deviation +- 0.5 rad/s",
-    ],
-)
-def test_words_of_noise(noise, tmp_path):
-    text = "PI loop with 6 dB, gain 20 rad/s per V, time constant 3 s, 9 +- 3 V, 10 min"
-    draft = heard(f"{text}, {noise}", tmp_path, *["no"] * 3)
-    assert "standard_deviation: 0.5 " in draft.text
-    assert ("correlation_time: 2 " in draft.text) == ("memory" in noise)
 
 
 def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
@@ -672,16 +526,6 @@ def test_what_is_left_out_is_said_back(tmp_path):
 def test_an_operating_point_that_is_said_twice_is_one():
     assert input_range("+-3 V around 9 V, at 9 V") == input_range("9 V +- 3 V")
     assert code_of(input_range, "+-3 V around 9 V, at 10 V") == "bad-answer"
-
-
-def test_the_question_of_the_plant_takes_what_a_sentence_may_say(tmp_path):
-    talk = Conversation({}, "x", tmp_path)
-    assert talk.answer("about 1.5 degC per 10 %, about an hour, dead time a few minutes") is None
-    assert plant_of_words(talk.answers["plant"]).values == pytest.approx(
-        {"gain": 0.15, "time_constant": 3600.0, "dead_time": 210.0}
-    )
-    assert not any(one.key in talk.answers for one in QUESTIONS if one.key != "plant")
-    assert talk.question.key == "wish"
 
 
 def test_a_sentence_may_leave_the_plant_open():
@@ -819,14 +663,6 @@ def test_the_loop_of_a_pid_is_sampled_fast_enough_for_its_derivative(lag, late, 
     assert draft.spec().sample_time <= late / 10
 
 
-def test_a_size_in_a_unit_that_the_gain_does_not_have_is_refused(tmp_path):
-    plant = {"plant": "gain 2 degC/%, time constant 180 s"}
-    for key, text in (("range", "40 +- 5 mA"), ("noise", "0.1 furlongs"), ("range", "40 +- 5 stone")):
-        with pytest.raises(SpecError) as caught:
-            compose(ENGINEER | plant | {key: text}, "x", tmp_path)
-        assert caught.value.diagnostics[0].key == key
-
-
 @pytest.mark.parametrize("step", [0.1, 0.5, 3.0])
 def test_every_level_is_a_multiple_of_the_step(step, tmp_path):
     spec = compose(ENGINEER | {"converter": f"steps of {step} %"}, "x", tmp_path).spec()
@@ -855,23 +691,6 @@ def test_a_log_in_which_the_input_moves_is_no_record_at_rest(tmp_path):
                 compose(ENGINEER | {"noise": "as in log.csv"}, "x", tmp_path)
         else:
             compose(ENGINEER | {"noise": "as in log.csv"}, "x", tmp_path)
-
-
-def test_every_refusal_names_three_answers(tmp_path):
-    for one in QUESTIONS:
-        with pytest.raises(SpecError) as caught:
-            compose(ENGINEER | {one.key: "a kettle"}, "x", tmp_path)
-        (told,) = caught.value.diagnostics
-        assert told.key == one.key
-        assert len(re.findall(r'"[^"]+"', told.hint)) >= min(3, 2 + (one.key != "return")), one.key
-
-
-@pytest.mark.parametrize(
-    ("text", "seconds"),
-    [("one shift", 28800), ("two days", 172800), ("half an hour", 1800), ("a minute", 60), ("1.5 h", 5400)],
-)
-def test_times_are_read_as_they_are_spoken(text, seconds):
-    assert Phrase(text, "time").lasting() == seconds
 
 
 def test_dwells_are_at_least_as_long_as_said(tmp_path):

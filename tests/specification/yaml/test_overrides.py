@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from inputdesign_cli.specification import Spec, load_spec, parse_spec, read_template
-from inputdesign_cli.specification.yaml import reader
+from inputdesign_cli.specification import load_spec, parse_spec, read_template
 from tests.support.refusals import refused
 
 GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
@@ -137,17 +136,19 @@ def test_places_of_other_keys_stay_and_new_values_name_their_source():
     assert (found.code, found.key, found.location.file) == ("out-of-range", "noise.variance", "the estimate")
 
 
-def test_no_text_is_parsed(monkeypatch):
-    spec = parse_spec(TEXT)
-    monkeypatch.setattr(reader, "_Loader", None)
-    assert spec.with_(**{"experiment.samples": 600}).experiment.samples == 600
-    assert Spec.from_dict(spec.content).model_dump() == spec.model_dump()
-
-
 @pytest.mark.parametrize("text", ["a\x00b", "\x1b[31m"])
 def test_unprintable_texts_are_refused(text):
     found = refused(parse_spec(TEXT).with_, title=text)
     assert [(d.code, d.key) for d in found] == [("bad-argument", "title")]
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), np.nan, np.inf], ids=["huge", "-huge", "nan", "inf"])
+def test_numbers_that_no_double_holds_are_refused(value):
+    """A count has a range; another number has none but that of a double."""
+    for key in ("sample_time", "experiment.samples"):
+        (found,) = refused(parse_spec(TEXT).with_, **{key: value})
+        counted = key != "sample_time" and isinstance(value, int)
+        assert (found.code, found.key) == ("out-of-range" if counted else "not-finite", key)
 
 
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\n"

@@ -116,14 +116,6 @@ def test_an_alias_stands_for_a_whole_value():
     assert spec.simulation.plant == spec.plant
 
 
-def test_both_lines_of_a_duplicate_are_named():
-    (diagnostic,) = refused(parse_spec, GOOD + "title: a\ntitle: b\n")
-    assert diagnostic.code == "duplicate-key"
-    assert "line 4" in diagnostic.message
-    assert "line 5" in diagnostic.message
-    assert diagnostic.location.line == 5
-
-
 def test_columns_count_characters():
     tree = read("été: [α, β]\n", "x")
     assert tree.places.values[("été", 1)].column == len("été: [α, ") + 1
