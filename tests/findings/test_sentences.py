@@ -149,16 +149,6 @@ def test_figures_are_the_numbers_of_the_case():
     assert FOUND["part-repeated"][0].figures["other"] == "plan_01.csv"
 
 
-def test_a_message_is_the_title_the_fact_and_the_remedy():
-    assert FOUND["unstable-runs"][0].message == (
-        "Controllers of some simulated runs destabilise the loop: 3 of 100 with the input design. Take more "
-        "samples or more power, or ask for a slower loop."
-    )
-    assert FOUND["record-shorter"][0].message == (
-        "A record ends before its plan: r.csv has 59 of the 60 samples of plan_01.csv."
-    )
-
-
 @pytest.mark.parametrize(
     ("severity", "decides", "trusts"),
     [

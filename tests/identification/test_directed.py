@@ -90,13 +90,6 @@ def test_an_input_that_answers_the_output_does_not_act_at_once():
     assert names == [{"b1", "delay"}, {"delay"}]
 
 
-def test_what_acts_alike_where_it_is_small_shares_a_test():
-    """Of B/F and of C/D, one coefficient more above or below spans the same polynomials over F^2 and C D."""
-    u, y = (x[0] for x in data("bj", 500, np.random.default_rng(3)))
-    found = identify(SYSTEMS["bj"], u, y, rest=True)
-    assert set(by_name(found)) == {"b3 or f3", "b0", "c2 or d2"}
-
-
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("B", "F", "first"),
@@ -116,20 +109,6 @@ def test_it_names_what_is_missing(B, F, first):
     strongest = min(found.tests.directed, key=lambda one: one.test.probability)
     assert strongest.test in found.tests.failed
     assert first in [one.phrase.removeprefix("one more ") for one in strongest.alternatives]
-
-
-@pytest.mark.parametrize("hold", [True, False])
-def test_a_dead_time_in_s_is_found(hold):
-    rng = np.random.default_rng(6)
-    u = rng.standard_normal((400, 1))
-    truth, model = lag_of([1.0], [1.0, 0.5], 0.3), lag_of([1.0], [1.0, 0.5])
-    if hold:
-        truth, model = SampledModel(truth, 0.4), SampledModel(model, 0.4)
-    y = truth.simulate(u, 0 * u, 0.4)[0] + 0.1 * rng.standard_normal((400, 1))
-    found = identify(model, u, y, 0.4)
-    test = next(one for one in found.tests.directed if "delay" in one.test.name)
-    assert test.test in found.tests.failed
-    assert test.larger.theta[test.larger.names.index("delay")] == pytest.approx(0.3, abs=0.05)
 
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"

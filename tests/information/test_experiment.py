@@ -70,13 +70,6 @@ def test_densities_are_the_definition(experiment):
     np.testing.assert_allclose(value, np.einsum("nlm,lm->n", ours, Y), rtol=1e-10)
 
 
-@pytest.mark.parametrize("experiment", [Experiment(box_jenkins(), 10), single()])
-def test_channel_powers_add_up(experiment):
-    for kind, number in (("input", experiment.model.inputs), ("output", experiment.model.outputs)):
-        parts = sum(experiment.power_density(kind, W, channel=i) for i in range(number))
-        np.testing.assert_allclose(parts, experiment.power_density(kind, W), atol=1e-14)
-
-
 def test_noise_alone_informs_about_arx_parameters_as_a_lyapunov_equation_says():
     """y_i = -a y_i(t-1) + e: E y^2 = s^2 / (1 - a^2); errors are correlated across outputs."""
     model = arx()

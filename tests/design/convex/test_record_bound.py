@@ -168,12 +168,6 @@ def test_largest_sum_is_that_of_all_records(inputs: int, length: int, samples: i
     assert _form_of(record, form) == pytest.approx(largest, rel=1e-12)
 
 
-def test_values_between_the_ends_of_the_range_gain_nothing() -> None:
-    windows, form = Windows.within(np.ones(1), 4), _random_form(4, 1, 0)
-    three = Windows(np.array([[-1.0], [0.2], [1.0]]), 4)
-    assert three.largest_sum(form, 9)[0] == pytest.approx(windows.largest_sum(form, 9)[0], rel=1e-12)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_no_cycle_has_a_larger_mean(seed: int) -> None:
     windows, form = Windows.within(np.ones(1), 3), _random_form(3, 1, seed)
@@ -207,15 +201,6 @@ def test_no_signal_exceeds_a_face() -> None:
     for _ in range(200):
         signal = polytope.windows.letters[rng.integers(4, size=int(rng.integers(1, 30)))]
         assert np.sum(weighted(face.form) * polytope.windows.lags(signal)) <= 1.0 + 1e-9
-
-
-def test_longer_windows_know_more() -> None:
-    lags = np.cos(0.4 * np.arange(8)).reshape(8, 1, 1)
-    short = LagPolytope(Windows.within(np.ones(1), 3))
-    multiple, _ = short.gauge(lags[:3])
-    longer, face = short.longer(8).gauge(lags)
-    assert longer >= multiple
-    assert face.share == pytest.approx(longer, rel=1e-4)
 
 
 def output_error_plant(rng):

@@ -8,7 +8,7 @@ import scipy.linalg
 
 from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.lift import box_limits
-from inputdesign_cli.design.regression.model import Regression, energy_bound
+from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.design.regression.structured import OutOfReachError, design_toeplitz
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from tests.support.regression import autocorrelations, general_search, mse, one_estimated_by_cvxpy
@@ -154,10 +154,6 @@ def test_weights_stay_within_their_limit():
         w = np.linalg.lstsq(allowed.D, u, rcond=None)[0]
         assert w @ w <= allowed.limit * (1 + 1e-6)
         assert allowed.least_v <= shape.v * (1 + 1e-9)
-
-
-def test_a_structure_costs_energy():
-    assert energy_bound(regression(*FOUR), 1.0) < of_four(target=1.0).bound
 
 
 def test_a_proof_that_ends_early_has_a_bound(monkeypatch):
