@@ -90,12 +90,6 @@ def test_no_result_holds_a_number_that_is_none(value):
         assert found.value.diagnostics[0].code == "beyond-precision"
 
 
-def test_nothing_asked_needs_nothing():
-    text = "plant: {B: [0, 1], F: [1, -0.7]}\nnoise: {variance: 1}\naccuracy: {information: [[0, 0], [0, 0]]}"
-    found = solve(parse_spec(text)).result
-    assert (found["status"], found["cost"]) == ("nothing_needed", 0.0)
-
-
 def test_an_input_without_power_has_none():
     text = """
 plant:

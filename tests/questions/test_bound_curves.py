@@ -32,14 +32,6 @@ def test_an_entry_is_active_where_its_own_bound_touches(design):
     assert marked >= 1
 
 
-def test_frequencies_are_told_once(design):
-    table = design.tables["bound"].columns
-    w = next(iter(table.values()))
-    assert np.all(np.diff(w) > 1e-10 * w[1:])
-    active = np.array(design.result["model_error"]["active_frequencies"])
-    assert np.all(np.diff(active) > 1e-4 * np.pi)
-
-
 def test_an_axis_ends_where_the_band_does():
     near = np.pi * (1.0 + np.array([-1e-15, -1e-12]))
     w = axis(0.0, np.pi, np.concatenate([near, [0.5, 0.5 * (1 + 1e-14)]]))

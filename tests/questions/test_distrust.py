@@ -156,14 +156,6 @@ def test_a_simulation_without_noise_is_refused(y, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("samples", [60, 120, 200, 240])
-def test_a_static_gain_without_noise_ends_in_an_answer(samples, tmp_path):
-    """Which of the two is the input no regression shows."""
-    found = explore(stored(tmp_path / "log.csv", STEPS[:samples], 2.0 * STEPS[:samples]))
-    assert "input-only-answers" in [one.code for one in found.results.outcome.findings]
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_a_log_earns_no_trust_and_its_code_says_why(name, tmp_path):
     made, code = LOGS[name]

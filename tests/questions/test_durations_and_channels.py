@@ -70,19 +70,3 @@ def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
     (needed,) = re.findall(rf"experiment\.{word}: ([0-9.]+)", caught.value.diagnostics[0].hint)
     longer = unit * round(1.15 * float(needed) / unit)
     assert solve(parse_spec(text % longer)).result["signal"]["worst_ratio"] <= 1.0 + 1e-9
-
-
-def test_entries_are_titled_by_the_names_of_their_channels():
-    names = "channels: {u1: {name: valve}, u2: {name: pump}, y1: {name: level, unit: cm}}\n"
-    text = names + (
-        "plant: {B: [[[0, 1], [0, 0.5]]], F: [[[1, -0.5], [1, -0.7]]]}\nnoise: {variance: 0.1}\n"
-        "experiment: {samples: 200}\naccuracy: {criterion: D}\nlimits: {input_power: 1}\n"
-        "spectrum: {type: fir, order: 3}\nsignal: {candidates: 1}\nsolver: {any_spectrum: false}\n"
-    )
-    panels = solve(parse_spec(text)).curves["bound"].panels
-    assert [(panel.entry, panel.names) for panel in panels] == [
-        ((0, 0), "valve → level"),
-        ((0, 1), "pump → level"),
-    ]
-    unnamed = solve(parse_spec(text.replace(", y1: {name: level, unit: cm}", ""))).curves["bound"].panels
-    assert {panel.names for panel in unnamed} == {""}

@@ -132,31 +132,3 @@ def test_what_is_no_fraction_is_refused():
     assert (told.code, "[1,1]" in told.message) == ("not-supported", True)
     sampled = CONTINUOUS.replace("[1, 1]]]}}", "[1, 1]]]}, sample: zoh}").replace("[0, 2.0]", "[0, 3.0]")
     assert code_of(validate, parse_spec(sampled, overrides=["accuracy={}", error])) == "not-supported"
-
-
-def test_a_flat_table_is_the_absolute_bound(tmp_path):
-    table = tmp_path / "r.csv"
-    table.write_text("frequency,r_adm\n0,0.1\n3.2,0.1\n", encoding="utf-8")
-    flat = arx(f"table: {table}").result
-    assert flat["cost"] == pytest.approx(arx("absolute: 0.1").result["cost"], rel=1e-6)
-
-
-@pytest.mark.slow
-def test_ellipsoid_in_continuous_time():
-    error = "accuracy: {model_error: {relative: 0.3, region: ellipsoid}}\n"
-    result = solve(parse_spec(CONTINUOUS + error)).result
-    names = result["information"]["parameters"]
-    theta = {"b0[1,1]": 2.0, "b0[1,2]": 1.0, "a0[1,1]": 1.0, "a1[1,1]": 0.6, "a0[1,2]": 1.0}
-
-    def entry(j):
-        def at(values, w):
-            p, s = dict(zip(names, values, strict=True)), 1j * w
-            if j == 1:
-                return p["b0[1,1]"] / (s**2 + p["a1[1,1]"] * s + p["a0[1,1]"])
-            return p["b0[1,2]"] / (s + p["a0[1,2]"])
-
-        return at
-
-    values = np.array([theta[name] for name in names])
-    worst = max(largest_error(entry(j), result, values, relative=True) for j in (1, 2))
-    assert worst == pytest.approx(0.3, rel=2e-4)

@@ -64,15 +64,6 @@ def test_every_plant_has_the_ratio_that_it_has_alone(text, given, tmp_path):
     )
 
 
-def test_a_plant_that_is_missed_misses_what_is_asked():
-    ratio = analysed(FIRST).result["model_error"]["worst_ratio"]
-    asked = f"accuracy.model_error.relative={0.02 * 1.1 * ratio}"
-    assert analysed(FIRST, asked).result["status"] == "met"
-    found = analysed(FIRST, asked, "uncertainty={scenarios: [{b1: 2}]}").result
-    assert found["model_error"]["worst_ratio"] == pytest.approx(1 / 1.1)
-    assert (found["status"], found["robust"]["missed"]) == ("missed", 1)
-
-
 def test_the_worst_plant_of_a_box_is_searched():
     box = {"b1": [3.0, 4.0], "f1": [-0.75, -0.65]}
     stated = f"uncertainty={{intervals: {box}, worst_case: 0.95, scenarios: 5, fresh: 20}}"
@@ -83,14 +74,6 @@ def test_the_worst_plant_of_a_box_is_searched():
     assert robust["searched"]["share"] == pytest.approx(max(corners), rel=1e-5)
     assert robust["worst_share"] <= robust["searched"]["share"]
     assert robust["fresh"]["largest"] <= robust["searched"]["share"]
-
-
-def test_the_worst_plants_are_left_out():
-    stated = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 20, fresh: 0%s}}"
-    every = np.sort(analysed(FIRST, stated % "").tables["scenarios"].columns["share"])
-    fewer = analysed(FIRST, stated % ", discard: 0.2")
-    np.testing.assert_allclose(np.sort(fewer.tables["scenarios"].columns["share"]), every[:16])
-    assert fewer.result["robust"]["discarded"] == 4
 
 
 def test_a_risk_takes_as_many_plants_as_a_series_of_trials():

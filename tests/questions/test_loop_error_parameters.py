@@ -81,20 +81,6 @@ def test_the_asymptotic_design_does_not_ask_what_is_known():
     assert known[1] < 0.6 * free[1]
 
 
-@pytest.mark.parametrize(
-    "law", ["{minimum_variance: true}", "{internal_model: {numerator: [0.5], denominator: [1, -0.5]}}"]
-)
-def test_a_gain_is_coloured_noise(law):
-    """x+ = a x + b u + k e is ARMAX with C = 1 + (k - a) q^-1, whose coefficients are as many."""
-    rest = REST.replace("{model_reference: {numerator: [0, 0, 0, 0, 0.2], denominator: [1, -0.8]}}", law)
-    states = (
-        "{parameters: {a: 0.8, b: 0.5, k: 0.3}, "
-        "state_space: {time: discrete, A: [[a]], B: [[b]], C: [[1]], K: [[k]]}}"
-    )
-    armax = rest.replace("{variance: 0.04}", "{C: [1, -0.5], variance: 0.04}")
-    assert_same([losses(states, EXACT, rest=rest), losses("{A: [1, -0.8], B: [0, 0.5]}", EXACT, rest=armax)])
-
-
 ZEROS = """
 plant: {A: [1, -0.8], B: [0, 1, -1.5]}
 noise: {variance: 0.01}
@@ -150,28 +136,3 @@ def test_records_are_as_long_as_the_signal():
     assert (found["samples"], found["simulation"]["samples"]) == (1, 1000)
     for name, entry in found["simulation"]["inputs"].items():
         assert entry["loss"] == long["simulation"]["inputs"][name]["loss"]
-
-
-MATRIX = """
-noise: {variance: [[0.04, 0.01], [0.01, 0.09]]}
-experiment: {samples: 500}
-accuracy: {closed_loop_error: {control: {internal_model: {numerator: [0, 0.3], denominator: [1, -0.7]}},
-  reference: {variance: [1, 2]}}}
-limits: {input_power: [1, 0.5]}
-spectrum: {type: pointwise}
-signal: {samples: 100, candidates: 1}
-"""
-
-
-@pytest.mark.parametrize("exact", [[], pytest.param([EXACT], marks=pytest.mark.slow)])
-def test_states_of_several_channels(exact):
-    """One input of two acts late; the same entries in s."""
-    parameters = "parameters: {k: 1.5, T: 4.0, c: 0.4}"
-    words = [
-        f"{{{parameters}, sample: zoh, state_space: {{A: [['-1/T', 0], [0, -0.5]], B: [[k/T, 0], [0, 1]], "
-        "C: [[1, c], [0.3, 1]]}}",
-        f"{{{parameters}, sample: zoh, continuous: {{numerator: [[[k], [c]], [[0.3*k], [1]]], "
-        "denominator: [[[T, 1], [1, 0.5]], [[T, 1], [1, 0.5]]]}}",
-    ]
-    # The power of lines is that of the solver, which is known to the tolerance of designs.
-    assert_same([losses(plant, *exact, rest=MATRIX) for plant in words], 1e-7 if exact else 1e-9)

@@ -9,7 +9,6 @@ import pytest
 import scipy.integrate
 
 from inputdesign_cli import load_spec, solve
-from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
 from tests.support.matrix_specs import ARX, CONTINUOUS, IN_LOOP, changed
@@ -20,15 +19,6 @@ SPECS = Path(__file__).parents[2] / "specs"
 @pytest.fixture(scope="module")
 def design():
     return solve(load_spec(SPECS / "two_by_two.yaml", ["accuracy.criterion=E", "spectrum.order=6"]))
-
-
-def test_result_is_recomputed_and_proved(design):
-    objective = design.result["objective"]
-    M = np.array(design.result["information"]["matrix"])
-    assert objective["value"] == pytest.approx(np.linalg.eigvalsh(M)[0], rel=1e-8)
-    assert objective["value"] <= objective["upper_bound"] <= objective["any_spectrum_bound"]
-    assert objective["relative_gap"] <= 1e-5
-    assert len(design.result["power"]["input"]) == len(design.result["power"]["output"]) == 2
 
 
 def test_spectrum_file_has_the_information_of_the_result(design):
@@ -159,31 +149,6 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
     assert result.gap < 1e-6
 
 
-@pytest.mark.slow
-def test_a_spectrum_of_order_zero_is_white_in_time():
-    """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
-    costs = [
-        solve(
-            changed(GAINS, f"spectrum={{{kind}}}", "signal.candidates=1", "solver.any_spectrum=false")
-        ).result["cost"]
-        for kind in ("type: fir, order: 1", "type: fir, order: 0", "type: white")
-    ]
-    assert costs[0] < costs[1] < costs[2]
-
-
-@pytest.mark.slow
-def test_free_spectra_of_unequal_limits_are_proved():
-    """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
-    spec = changed(
-        "plant: {B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]],\n"
-        "  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1, -0.8]]]}\n"
-        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
-        "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
-        "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
-    )
-    assert build_convex(spec).designed().design.result.gap < 1e-6
-
-
 LOOP = f"""{IN_LOOP}
 cost: {{input_power: 1, output_power: 0.1, excitation_power: 0.01}}
 accuracy: {{standard_deviation: {{'a1[1]': 0.002, 'b1[1,2]': 0.01}}}}
@@ -279,22 +244,6 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
         warnings.simplefilter("ignore")  # that it may be inaccurate; four digits are compared
         problem.solve(solver=cp.CLARABEL)
     assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_single_samples_of_u_are_limited():
-    """What r causes at u, by the recursion of the loop, obeys the limits; the accuracy is met still."""
-    free = solve(in_loop("signal.candidates=2")).result["signal"]
-    amplitude, rate = 0.8 * np.array(free["input_peak"]), 0.8 * np.array(free["input_move"])
-    limits = f"limits={{amplitude: {{input: {amplitude.tolist()}}}, rate: {rate.tolist()}}}"
-    spec = in_loop(limits, "signal.candidates=2")
-    outcome = solve(spec)
-    r = np.stack([outcome.tables["signal"].columns[name] for name in ("r1", "r2")], axis=1)
-    _, u = build_experiment(spec).loop.signals(r, 0.0 * r)
-    assert np.all(np.abs(u).max(axis=0) <= amplitude * (1 + 1e-10))
-    assert np.all(np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0) <= rate * (1 + 1e-10))
-    assert outcome.result["signal"]["worst_ratio"] <= 1 + 1e-9
-    assert outcome.result["signal"]["input_peak"] == pytest.approx(np.abs(u).max(axis=0))
 
 
 def test_limits_bind_what_r_causes():

@@ -156,12 +156,3 @@ def test_a_prior_that_cannot_be_read_is_refused_wherever_it_stands(ask, name, la
     with pytest.raises((SpecError, DataError)) as caught:
         ask(spec, path)
     assert {d.key for d in caught.value.diagnostics} == {"experiment.prior.information"}
-
-
-def test_the_samples_of_a_prior_do_not_count_for_an_estimate_and_are_told(lag_record, estimated, tmp_path):
-    path = lag_record("a.csv", 300, 1, power=0.5)
-    (tmp_path / "earlier.csv").write_bytes(path.read_bytes())
-    spec = parse_spec(LAG, overrides=["experiment.prior={information: earlier.csv}"], folder=tmp_path)
-    found, plain = identify(spec, path).result, estimated.result
-    assert found["identification"]["theta"] == plain["identification"]["theta"]
-    assert "prior-left-out" in codes_in(found)

@@ -14,12 +14,10 @@ from inputdesign_cli.design.convex.demands import Alternative
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.common.robust import tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
-from tests.support.refusals import code_of
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, solved
 
 
@@ -80,23 +78,6 @@ def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
     assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
 
 
-@pytest.mark.slow
-def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
-    """Cost worst: beside the accuracy the cost is promised, at the plants drawn and to most of the others."""
-    prior = "covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 30, fresh: 60"
-    found = solve(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}, cost: worst}}"])).result
-    mean = solved(LOOP, f"uncertainty={{{prior}, cost: mean}}")
-    robust = found["robust"]
-    assert robust["cost"] == "worst"
-    assert found["cost"] == pytest.approx(found["objective"]["value"], rel=1e-9)
-    assert found["cost"] > 1.05 * mean["cost"]
-    assert robust["dearest"]["cost"] == pytest.approx(found["cost"], rel=1e-6)
-    assert robust["dearest"]["scenario"] in [one["scenario"] for one in robust["active"]]
-    assert robust["fresh"]["share"] <= robust["risk"]["after"]
-    assert "dearest" not in mean["robust"]
-    assert "less" not in mean["robust"]["fresh"]
-
-
 def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     prior = "uncertainty={covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 60, cost: worst}"
     task = build_convex(parse_spec(LOOP, overrides=[prior]))
@@ -124,18 +105,6 @@ def test_leaving_out_the_dearest_plants_makes_it_cheaper():
     before, after = (found.tables["scenarios"].columns["scenario"] for found in (whole, fewer))
     gone = set(before) - set(after)
     assert whole.result["robust"]["active"][0]["scenario"] in gone
-
-
-@pytest.mark.slow
-def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
-    """The sensitivity of the scenario's own loop misses what is asked: without a floor nothing would do."""
-    text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 9}")
-    plant = "uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]%s}"
-    assert solved(text, plant % "")["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-6)
-    without = parse_spec(text, overrides=[plant % ", floor: 0"])
-    assert code_of(build_task, without) == "admissible-not-positive"
-    fixed = solved(text, plant % ", r_adm: fixed")
-    assert fixed["cost"] < solved(text, plant % "")["cost"]
 
 
 def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
@@ -434,17 +403,6 @@ def test_plants_that_are_drawn_afresh_are_counted_where_no_model_will_do():
     robust = solve(parse_spec(text, overrides=[REGION % 30, "solver.any_spectrum=false"])).result["robust"]
     beyond = np.mean([peak(b, -0.8, 0.4, 0.95) > 10 ** (7.5 / 20) for b in np.linspace(0.3, 0.9, 50)])
     assert robust["fresh"]["lost"] == pytest.approx(30 * beyond, abs=8)  # three deviations
-
-
-@pytest.mark.slow
-def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
-    text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 7.5}")
-    region = (REGION % 1).replace("fresh", "worst_case: 0.9, fresh")
-    found = solve(parse_spec(text, overrides=[region, "solver.any_spectrum=false"])).result["robust"][
-        "searched"
-    ]
-    assert found["lost"]
-    assert found["peak"] == pytest.approx(peak(found["parameters"]["b1"], -0.8, 0.4, 0.95), rel=1e-3)
 
 
 @pytest.mark.slow

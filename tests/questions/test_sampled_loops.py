@@ -43,34 +43,6 @@ plant:
     denominator: {rows(np.stack([np.ones((2, 2)), DECAY], axis=-1))}
   sample: zoh
 {REST}"""
-FORGOTTEN = np.exp(-DECAY * STEP)
-POLYNOMIAL = f"""
-sample_time: {STEP}
-plant:
-  B: {rows(np.stack([np.zeros((2, 2)), GAIN / DECAY * (1 - FORGOTTEN)], axis=-1))}
-  F: {rows(np.stack([np.ones((2, 2)), -FORGOTTEN], axis=-1))}
-{REST}"""
-
-
-def designed(text, *overrides):
-    spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
-    return build_convex(spec).designed().design.result
-
-
-@pytest.mark.first(1)
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        ("spectrum={type: multisine, lines: 5}", "cost={output_power: 1}", "limits={input_power: 77.5}"),
-        ("accuracy={model_error: {sensitivity: {max_db: 6}}}",),
-    ],
-)
-def test_what_does_not_depend_on_coordinates_is_that_of_polynomials(overrides):
-    """r_u is that of the model, whichever way first-order entries are parametrised."""
-    held, polynomial = designed(HELD, *overrides), designed(POLYNOMIAL, *overrides)
-    assert held.gap < 1e-6
-    assert held.objective == pytest.approx(polynomial.objective, rel=2e-6)
-    assert held.information.shape == (6, 6)
 
 
 def test_a_limit_on_the_output_holds_for_the_record():

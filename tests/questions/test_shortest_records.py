@@ -129,22 +129,6 @@ solver: {any_spectrum: false}
 """
 
 
-@pytest.mark.slow
-def test_a_long_shortest_record_takes_few_records_of_its_length():
-    """The work is counted in samples of records that are made, in lengths of the one that is found."""
-    made, plain = [], SignalGenerator.several
-
-    def several(self, rngs):
-        made.extend(self.samples for _ in rngs)
-        return plain(self, rngs)
-
-    with patch.object(SignalGenerator, "several", several):
-        found = solve(parse_spec(LONG + SHORTEST)).result["signal"]
-    assert found["samples"] > 4000
-    assert found["worst_ratio"] <= 1.0 + 1e-9
-    assert sum(made) <= 15 * found["samples"]
-
-
 @pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
 def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):
@@ -232,19 +216,6 @@ objective: shortest_experiment
     assert found["worst_ratio"] <= 1.0 + 1e-9
     least = shortest_of_two_levels(1.0, 0.7, 0.1, relative, 2.0)
     assert least <= found["samples"] <= least + 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
-def test_what_is_known_already_needs_a_short_record_only(share):
-    """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""
-    text = LAG + SHORTEST
-    known = np.array(solve(parse_spec(text)).result["information"]["matrix"])
-    prior = f"experiment: {{prior: {{information: {(share * known).tolist()}}}}}\n"
-    found = solve(parse_spec(text + prior)).result
-    assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
-    whole = solve(parse_spec(text)).result["signal"]["samples"]
-    assert found["samples"] <= found["signal"]["samples"] < whole
 
 
 @pytest.mark.first(1)

@@ -61,23 +61,6 @@ def test_the_power_of_the_design_on_request():
     assert outcome.result["signal"]["power"][0] == pytest.approx(outcome.result["cost"], rel=1e-12)
 
 
-@pytest.mark.slow
-def test_a_record_that_is_too_short_names_one_that_is_not():
-    with pytest.raises(InfeasibleError) as error:
-        solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2, type: filtered_noise}\n"))
-    (diagnostic,) = error.value.diagnostics
-    assert diagnostic.code == "limits-too-tight"
-    assert diagnostic.location is not None
-    length = samples_in(diagnostic.hint)
-    assert length > 500
-    spec = parse_spec(
-        BASE.replace("500", str(length)) + "limits: {amplitude: 0.65}\nsignal: {candidates: 8}\n"
-    )
-    signal = solve(spec).result["signal"]
-    assert signal["worst_ratio"] <= 1 + 1e-9
-    assert signal["peak"][0] <= 0.65
-
-
 def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
     found = solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2}\n")).result
     assert found["signal"]["type"] != "filtered_noise"
@@ -129,22 +112,6 @@ def test_a_missed_accuracy_is_noted():
     assert outcome.result["signal"]["peak"] == [pytest.approx(0.4)]
     assert outcome.result["signal"]["worst_ratio"] > 1
     assert "record-misses-accuracy" in codes_in(outcome.result)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("offset", [0.37, 0.3, -0.1])
-def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(offset):
-    """Steps of 0.25: the record swings about the nearest value, within the limit from the offset."""
-    found = solve(
-        parse_spec(
-            BASE.replace("500", "900") + "limits: {amplitude: 0.75}\n"
-            f"signal: {{type: binary, candidates: 2, offset: {offset},"
-            " quantisation: {bits: 4, range: 2}}\n"
-        )
-    )
-    u = np.array(found.tables["signal"].columns["u1"])
-    np.testing.assert_allclose(u / 0.25, np.rint(u / 0.25), atol=1e-9)
-    assert np.abs(u - offset).max() <= 0.75 + 1e-12
 
 
 @pytest.mark.slow

@@ -1,14 +1,11 @@
 """What follows an estimate: another experiment, or none, about the operating point of the record."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, parse_spec
-from inputdesign_cli.cli import app
 from inputdesign_cli.findings.designed_records import level_notes
 from tests.support.heater import HEATER, STRUCTURE
 
@@ -62,26 +59,6 @@ def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, he
     assert "model.yaml" in found.results.files
 
 
-@pytest.mark.slow
-def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
-    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
-    asked = (
-        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
-    )
-    spec.write_text(STRUCTURE + asked)
-    out = tmp_path / "run"
-    options = ["-o", str(out), "--no-figures", "--operating-point", "u1=40,y1=52.3"]
-    run = CliRunner().invoke(app, ["assess", str(spec), str(path), *options])
-    assert run.exit_code == 1, run.output
-    result = json.loads((out / "result.json").read_text())
-    assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
-    assert result["signal"]["operating_point"] == [40.0]
-    (levels,) = [one for one in result["findings"] if one["code"] == "about-an-operating-point"]
-    assert levels["figures"] == {"levels": [40.0]}
-    u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
-    assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
-
-
 @pytest.mark.parametrize(
     ("levels", "point", "means", "expected"),
     [
@@ -103,33 +80,6 @@ def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
 def test_each_input_has_its_level(levels, point, means, expected):
     found = level_notes(levels, point, None if means is None else np.array(means), np.ones(2))
     assert {one.code: one.figures for one in found} == expected
-
-
-@pytest.mark.slow
-def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):
-    """With the second record alone it judges what the first spec judges with both."""
-    monkeypatch.chdir(tmp_path)
-    asked = "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0004}}\n"
-    Path("spec.yaml").write_text(STRUCTURE + asked + "signal: {candidates: 1}\n")
-    first, second = (heater_record(name, 300, seed) for name, seed in (("1.csv", 2), ("2.csv", 3)))
-
-    def ran(*arguments):
-        options = [*map(str, arguments), "--no-figures", "--json"]
-        return json.loads(CliRunner().invoke(app, ["assess", *options]).stdout)
-
-    ran("spec.yaml", first, "-o", "a")
-    joint, known = ran("spec.yaml", first, second, "-o", "b"), ran("a/spec.yaml", second, "-o", "c")
-    alone = ran("spec.yaml", second, "-o", "d")
-    ratio, by_prior, single = (
-        run["assessment"]["requirements"][0]["worst_ratio"] for run in (joint, known, alone)
-    )
-    assert by_prior == pytest.approx(ratio, rel=0.05)
-    assert ratio < 0.9 * single
-    copied = tmp_path / "copied.csv"
-    copied.write_bytes(first.read_bytes())
-    for given in (first, copied):
-        (error,) = ran("a/spec.yaml", given, second, "-o", "e")["errors"]
-        assert error["code"] == "data-repeated"
 
 
 def test_an_estimate_outside_of_the_intervals_is_topped_up(tmp_path):

@@ -90,32 +90,6 @@ def test_an_experiment_that_is_too_short_says_what_it_buys():
     assert solve(parse_spec(loosened + limits.format(400))).result["samples"] == 400
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("limits", "keys"),
-    [
-        ("amplitude: {}", {"amplitude.input": 0.1}),
-        ("amplitude: {}, input_power: {}", {"amplitude.input": 0.1, "input_power": 0.009}),
-        ("amplitude: {}, output_power: {}", {"amplitude.input": 0.1, "output_power": 0.02}),
-    ],
-)
-def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
-    """Several limits that are exhausted together: who raises each as told has a spectrum, no less does."""
-    text = TWO.replace("input_power: [1.0, 0.02]", "LIMITS").replace("signal: {candidates: 1}\n", "")
-    text += WITHIN.format(0.3)
-    message = refused(text.replace("LIMITS", limits.format(*keys.values()))).message
-
-    def raised(share):
-        times = {key: message.split(f"limits.{key} would have to be ")[1] for key in keys}
-        told = {key: float(text.split(" times")[0]) for key, text in times.items()}
-        bounds = [share * bound * told[key] for key, bound in keys.items()]
-        return text.replace("LIMITS", limits.format(*bounds))
-
-    assert "no change of a single limit is enough" in message
-    refused(raised(1.0 + 1e-4), "limits-too-tight")  # a spectrum does; a record takes more, as is told
-    refused(raised(1.0 - 1e-2), "infeasible")
-
-
 DEAR_OUTPUT = """
 sample_time: 5
 plant: {B: [0, 0, 0.05], F: [1, -0.9]}
@@ -126,17 +100,6 @@ limits: {%s}
 accuracy: {model_error: {relative: 0.25, band: [0.001, 0.2]}}
 spectrum: {type: fir, order: 20}
 """
-
-
-@pytest.mark.first(1)
-@pytest.mark.parametrize("amplitude", [5.0, 3.5])
-def test_a_peak_limits_the_power_of_the_design(amplitude):
-    """Without the limit implied, input power of 24 to 27 left no record of this length."""
-    found = solve(parse_spec(DEAR_OUTPUT % f"amplitude: {amplitude}"))
-    u = np.array(found.tables["signal"].columns["u1"])
-    assert found.result["power"]["input"][0] <= amplitude**2 * (1 + 1e-9)
-    assert np.abs(u).max() <= amplitude
-    assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
 def test_the_peak_is_the_limit_that_its_square_is():
