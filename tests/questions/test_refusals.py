@@ -292,7 +292,8 @@ coarse-converter limits.rate | signal.quantisation={bits: 4, range: 9} | limits.
 """),
     "two_by_two_given": (None, """
 unknown-parameter report.ellipses[0][0] | report={ellipses: [[b1, f1]]}
-
+not-supported limits.spectrum | limits={spectrum: 5}
+not-supported limits.energy | limits={energy: 5}
 not-supported signal.phases | signal.phases=schroeder
 """),
     "first_order": (None, """
@@ -339,10 +340,6 @@ not-supported CONTROL.minimum_variance | plant.B=[[[0, 1], [0, 0]], [[0, 0], [0,
 conflicting-keys signal.periods | signal.periods=3
 unsuitable-key signal.order | signal={type: multisine, order: 4}
 not-supported signal.type | signal={type: filtered_noise} | accuracy.closed_loop_error.covariance=parametric
-"""),
-    "first_order_given": (None, """
-not-supported limits.spectrum | limits={spectrum: 5}
-not-supported limits.energy | limits={energy: 5}
 """),
     "regression_fir": (None, """
 wrong-shape SQUARED.estimated | SQUARED.estimated=[1, 2]
