@@ -55,6 +55,14 @@ def test_closed_form_of_one_cosine():
     np.testing.assert_allclose([sd["b1"], sd["f1"]], np.sqrt(np.diag(np.linalg.inv(expected))), rtol=1e-9)
 
 
+def test_without_a_requirement_there_is_still_an_answer():
+    asked = "accuracy: {model_error: {relative: 0.01, alpha: 1}}\n"
+    outcome = analyse(spec_of(WHITE, BASE.replace(asked, "")))
+    assert outcome.result["status"] == "given"
+    assert "r_adm" not in outcome.tables["bound"].columns
+    assert outcome.result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)))
+
+
 def test_closed_loop_excitation_adds_to_what_the_noise_tells(flexible):
     spec = load_spec("specs/flexible_transmission.yaml", ["spectrum={given: {type: white, power: 7.663650}}"])
     outcome = analyse(spec)

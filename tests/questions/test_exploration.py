@@ -258,6 +258,15 @@ def test_what_another_spec_asks_for_is_kept():
     assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"
 
 
+@pytest.mark.parametrize(
+    ("head", "stated"), [("Valve [%]", ("Valve", "%")), ("u", None), ("level " * 8, None)]
+)
+def test_the_spec_calls_its_channels_as_the_log_does(head, stated):
+    log = SimpleNamespace(**{**vars(LOG), "names": {"u1": head, "y1": "y"}})
+    channels = parse_spec(spec_text(log, FOUND, [Path("a.csv")])).channels or {}
+    assert [(one.name, one.unit) for one in channels.values()] == ([stated] if stated else [])
+
+
 @pytest.mark.parametrize("loop", [False, True])
 @pytest.mark.parametrize("reasons", [(), ("the record\nis too short: see #3", "y wanders " * 30)])
 def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
@@ -266,6 +275,7 @@ def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
     doubted = "On a model that deserves no trust: " if reasons else ""
     assert spec.title == f'{doubted}The next experiment after title: "odd".csv'
     assert (spec.sample_time, spec.limits.input_power.max, spec.signal.offset) == (1e-5, 0.666667, 100001.0)
+    assert spec.limits.amplitude.input == 1.0  # half of the range of the log
     head = text.partition("\ntitle:")[0].splitlines()
     assert all(line.startswith("#") and len(line) <= 110 for line in head)
     words = " ".join(line.lstrip("# ") for line in head)

@@ -76,6 +76,14 @@ def test_the_worst_plant_of_a_box_is_searched():
     assert robust["fresh"]["largest"] <= robust["searched"]["share"]
 
 
+def test_the_worst_plants_are_left_out():
+    stated = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 20, fresh: 0%s}}"
+    every = np.sort(analysed(FIRST, stated % "").tables["scenarios"].columns["share"])
+    fewer = analysed(FIRST, stated % ", discard: 0.2")
+    np.testing.assert_allclose(np.sort(fewer.tables["scenarios"].columns["share"]), every[:16])
+    assert fewer.result["robust"]["discarded"] == 4
+
+
 def test_a_risk_takes_as_many_plants_as_a_series_of_trials():
     robust = analysed(FIRST, f"uncertainty={{covariance: {COVARIANCE}, risk: 0.2, fresh: 0}}").result[
         "robust"

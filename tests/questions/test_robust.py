@@ -89,7 +89,9 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     ]
     less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
     dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
-    told = robust_result(done, done.plants).entry.fresh
+    entry = robust_result(done, done.plants).entry
+    assert entry.dearest.cost == pytest.approx(done.design.result.objective, rel=1e-6)
+    told = entry.fresh
     assert (told.less, told.dearer, told.missed) == (len(less), len(dearer), len(less | dearer))
     assert less > dearer > set()
 

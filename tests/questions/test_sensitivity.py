@@ -6,6 +6,7 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
+from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Sensitivity
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix
 from inputdesign_cli.questions.least_cost.build import build_convex
@@ -139,3 +140,10 @@ def test_the_norm_of_the_error_against_a_plain_program():
         expected = program.solve(solver=cp.CLARABEL)
     assert problem.experiment.model.names == ("a1", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]")
     assert found.objective == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_norm_is_reported():
+    outcome = solve(parse_spec(OPEN))
+    assert outcome.result["requirements"][0]["norm"] == "frobenius"
+    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)

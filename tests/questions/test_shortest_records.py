@@ -129,6 +129,22 @@ solver: {any_spectrum: false}
 """
 
 
+@pytest.mark.slow
+def test_a_long_shortest_record_takes_few_records_of_its_length():
+    """The work is counted in samples of records that are made, in lengths of the one that is found."""
+    made, plain = [], SignalGenerator.several
+
+    def several(self, rngs):
+        made.extend(self.samples for _ in rngs)
+        return plain(self, rngs)
+
+    with patch.object(SignalGenerator, "several", several):
+        found = solve(parse_spec(LONG + SHORTEST)).result["signal"]
+    assert found["samples"] > 4000
+    assert found["worst_ratio"] <= 1.0 + 1e-9
+    assert sum(made) <= 15 * found["samples"]
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
 def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):

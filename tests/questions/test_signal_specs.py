@@ -115,6 +115,22 @@ def test_a_missed_accuracy_is_noted():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("offset", [0.37, 0.3, -0.1])
+def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(offset):
+    """Steps of 0.25: the record swings about the nearest value, within the limit from the offset."""
+    found = solve(
+        parse_spec(
+            BASE.replace("500", "900") + "limits: {amplitude: 0.75}\n"
+            f"signal: {{type: binary, candidates: 2, offset: {offset},"
+            " quantisation: {bits: 4, range: 2}}\n"
+        )
+    )
+    u = np.array(found.tables["signal"].columns["u1"])
+    np.testing.assert_allclose(u / 0.25, np.rint(u / 0.25), atol=1e-9)
+    assert np.abs(u - offset).max() <= 0.75 + 1e-12
+
+
+@pytest.mark.slow
 def test_the_share_of_each_limit_that_single_samples_take():
     """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
     limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"

@@ -11,6 +11,7 @@ import scipy.stats
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage
+from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.identification import identify as first_order
 from inputdesign_cli.outcome.design import Coverage as Reached
@@ -151,6 +152,25 @@ def test_stated_errors_grow_by_what_simulated_records_show(tmp_path):
     stated = np.array(results.result["information"]["covariance"])
     times = np.array([factor, of_noise, factor])  # b1, d1, f1
     assert stated == pytest.approx(np.outer(times, times) * plain.covariance, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_no_error_is_stated_more_sharply_than_by_theory(tmp_path):
+    """Also where noise and plant scatter differently, and where hardly anything can be estimated."""
+    judged = 0
+    for samples, seed in ((9, 0), (12, 2), (12, 5)):
+        data = recorded(tmp_path / f"{samples}_{seed}.csv", samples, seed)
+        try:
+            results = identify(spec(), data)
+        except IdesignError:
+            continue
+        _, u, y = np.loadtxt(data, delimiter=",", skiprows=1).T
+        plain = first_order(build_model(spec()), u[:, None], y[:, None])
+        stated = np.diag(results.result["information"]["covariance"])
+        assert np.all(np.isfinite(stated))
+        assert np.all(stated >= np.diag(plain.covariance) * (1 - 1e-9))
+        judged += "short-record" in codes(results)
+    assert judged >= 2
 
 
 @pytest.mark.slow

@@ -90,6 +90,32 @@ def test_an_experiment_that_is_too_short_says_what_it_buys():
     assert solve(parse_spec(loosened + limits.format(400))).result["samples"] == 400
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("limits", "keys"),
+    [
+        ("amplitude: {}", {"amplitude.input": 0.1}),
+        ("amplitude: {}, input_power: {}", {"amplitude.input": 0.1, "input_power": 0.009}),
+        ("amplitude: {}, output_power: {}", {"amplitude.input": 0.1, "output_power": 0.02}),
+    ],
+)
+def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
+    """Several limits that are exhausted together: who raises each as told has a spectrum, no less does."""
+    text = TWO.replace("input_power: [1.0, 0.02]", "LIMITS").replace("signal: {candidates: 1}\n", "")
+    text += WITHIN.format(0.3)
+    message = refused(text.replace("LIMITS", limits.format(*keys.values()))).message
+
+    def raised(share):
+        times = {key: message.split(f"limits.{key} would have to be ")[1] for key in keys}
+        told = {key: float(text.split(" times")[0]) for key, text in times.items()}
+        bounds = [share * bound * told[key] for key, bound in keys.items()]
+        return text.replace("LIMITS", limits.format(*bounds))
+
+    assert "no change of a single limit is enough" in message
+    refused(raised(1.0 + 1e-4), "limits-too-tight")  # a spectrum does; a record takes more, as is told
+    refused(raised(1.0 - 1e-2), "infeasible")
+
+
 DEAR_OUTPUT = """
 sample_time: 5
 plant: {B: [0, 0, 0.05], F: [1, -0.9]}
