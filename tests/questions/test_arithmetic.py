@@ -11,7 +11,7 @@ import pytest
 from inputdesign_cli import parse_spec, solve, validate
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.questions import finite, most_extreme, sound_arithmetic
+from inputdesign_cli.questions import finite, sound_arithmetic
 from tests.support.first_order_specs import PLANT as WHOLE
 from tests.support.outcomes import typed
 from tests.support.refusals import refusal
@@ -69,12 +69,6 @@ def test_what_arithmetic_cannot_hold_names_the_most_extreme_number(fault):
     assert (diagnostic.code, diagnostic.key) == ("beyond-precision", "noise.variance")
 
 
-def test_the_most_extreme_number_is_the_farthest_from_one():
-    data = {"a": [1.0, {"b": 1e-9}], "c": 1e7, "d": 0.0, "e": True, "f": "1e99"}
-    assert most_extreme(data) == ("a[1].b", pytest.approx(9.0))
-    assert most_extreme({}) == ("", 0.0)
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_no_result_holds_a_number_that_is_none(value):
     good = Results(
@@ -129,15 +123,6 @@ def test_a_record_that_is_asked_for_has_to_fit():
     found = refused(f"{PLANT}{ASKED}experiment: {{samples: {10**15}}}\nsignal: {{seed: 1}}")
     assert found.key == "experiment.samples"
     assert "signal.samples: 1000000" in found.hint
-
-
-def test_the_record_of_a_shortest_experiment_may_be_too_long():
-    text = (
-        f"{PLANT}{ASKED}objective: shortest_experiment\nlimits: {{input_power: 1.0e-9}}\nsignal: {{seed: 1}}"
-    )
-    found = solve(parse_spec(text)).result
-    assert found["samples"] > 10**9
-    assert "signal" not in found
 
 
 def test_a_model_of_many_parameters_is_refused_with_what_fits():

@@ -183,23 +183,6 @@ def saved(path, rows, header):
 
 
 @pytest.mark.slow
-def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_path):
-    named = saved(tmp_path / "named.csv", rows, "u,y,SP")
-    plain = saved(tmp_path / "plain.csv", rows, "u,y,r")
-    by_name = explore([named], Preparation(columns={"r1": "SP"})).results
-    told = by_name.result["exploration"]["frequency_response"]
-    assert told["excitation"] == "r"
-    assert "caveat" not in told
-    table = by_name.tables["frequency_response"].columns
-    w, G = table["frequency_rad_per_s"], table["G_re"] + 1j * table["G_im"]
-    z, pole = np.exp(1j * w), np.exp(-1.0 / 6.0)
-    inside = np.abs(G - 2.0 * (1.0 - pole) / (z - pole)) <= table["radius"]
-    assert np.mean(inside) > 0.85
-    np.testing.assert_array_equal(read_log(plain, Preparation()).r, rows[:, 2:])
-    assert read_log(named, Preparation()).r is None
-
-
-@pytest.mark.slow
 def test_an_input_behind_a_reference_is_not_taken_for_late(rows, tmp_path, monkeypatch):
     """It answers the output, whose noise it therefore seems to follow."""
     late = [Finding("input-logged-late", REFUTED, "early")]

@@ -195,13 +195,6 @@ def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, write):
         assert "input-logged-late" not in codes(assess(spec, write({"u": moved, "y": y})).results)
 
 
-def test_the_same_input_applied_twice_counts_twice(write):
-    first, second = lag(3), lag(4)
-    second["y"] += scipy.signal.lfilter([0, 3.6], [1, -0.7], first["u"] - second["u"])
-    files = [write(first, "a.csv"), write({**second, "u": first["u"]}, "b.csv")]
-    assert assess(parse_spec(LAG), files).verdict == "met"
-
-
 def emptied(record, every):
     y = record["y"].copy()
     y[::every] = np.nan

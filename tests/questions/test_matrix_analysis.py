@@ -93,13 +93,6 @@ def test_white_of_each_channel_is_a_sum_over_the_circle():
 NAMES = ["a1[1]", "a1[2]"] + [f"b{lag}[{i},{j}]" for i in (1, 2) for j in (1, 2) for lag in (1, 2)]
 
 
-def test_a_power_is_spread_evenly_over_the_channels():
-    even = analyse(changed("spectrum={given: {type: white, power: 8}}")).result
-    each = analyse(changed("spectrum={given: {type: white, power: [4, 4]}}")).result
-    assert even["power"]["input"] == each["power"]["input"] == pytest.approx([4.0, 4.0])
-    assert even["information"]["matrix"] == pytest.approx(np.asarray(each["information"]["matrix"]))
-
-
 def by_finite_differences(names, lines):
     """M (12, 12) of 50 samples for power matrices (2, 2) at frequencies, in the order of the names."""
     low = {"b0[1,1]": 3.125, "b0[1,2]": 3.188, "b0[2,1]": 5.313, "b0[2,2]": 1.563}

@@ -42,6 +42,15 @@ experiment: {{samples: 2500}}
 accuracy: {{frequency_response: {{relative: 0.05, band: [0.05, 2.5], lines: 20, transient: 1}}}}
 signal: {{periods: 5, phases: schroeder}}
 """
+OPTIMISED = """
+plant: {F: [1, -0.94], B: [0, 0, 0, 0.12]}
+noise: {D: [1, -0.8], variance: 0.01}
+experiment: {samples: 5010}
+accuracy: {frequency_response: {relative: 0.05, band: [0.02, 2.0], lines: 60, detection: 4}}
+signal: {periods: 5, phases: optimised}
+"""
+
+
 RELATIVE = "accuracy.frequency_response.relative"
 
 
@@ -273,6 +282,23 @@ def test_a_nonlinearity_that_changes_little_is_told_and_met(write):
     odd = found.results.result["frequency_response"]["nonlinearity"]["odd"]
     assert 0.3 * change < odd["worst_ratio"] < 0.5
     assert codes(found.results)["nonlinear-response"].severity == "note"
+
+
+@pytest.mark.slow
+def test_of_optimised_phases_the_change_is_told_as_large_as_it_is(write):
+    spec, question, u = asked(OPTIMISED)
+    u = np.tile(u[:1002], (16, 1))
+    scale = 0.001 * 2.5 / changed(question, u, before=lambda x: x + 0.001 * x**3)
+    curve = {"before": lambda x: x + scale * x**3}
+    assert changed(question, u, **curve) == pytest.approx(2.5, rel=0.02)
+    told = []
+    for seed in range(5):
+        found = assess(spec, write(table(u, answer(question.model, u, seed, **curve))))
+        assert found.verdict == "undecided"
+        odd = found.results.result["frequency_response"]["nonlinearity"]["odd"]
+        assert odd["cubed"] == "u1"
+        told.append(odd["worst_ratio"])
+    assert np.median(told) == pytest.approx(2.5, rel=0.3)
 
 
 def judged(write, y, **more):

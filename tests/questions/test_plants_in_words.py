@@ -156,13 +156,6 @@ def test_the_words_of_a_process_that_was_found_in_a_log_are_read_back(order, zer
     check_words(process_models(rows, thetas, np.diag(rng.uniform(0.5, 1.0, outputs))))
 
 
-def test_an_unstable_plant_under_a_controller():
-    states = "{time: discrete, A: [[a]], B: [[b]], C: [[1]], K: [[0.9]]}"
-    plant = f"{{parameters: {{a: 1.1, b: 0.5}}, state_space: {states}}}"
-    rest = REST.replace("{samples: 300}", "{samples: 300, controller: {numerator: [0.8]}}")
-    assert solve(spec_of(plant, rest)).result["status"] == "optimal"
-
-
 @pytest.mark.parametrize("given", [True, False])
 def test_an_output_that_no_input_reaches_has_no_power(given):
     """The inputs drive one mode, x2 = 2 x1, and output 2 reads 2 x1 - x2: zero but for rounding."""

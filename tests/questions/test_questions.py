@@ -119,16 +119,6 @@ def test_a_weight_in_s_is_sampled():
     assert costs[0] == pytest.approx(costs[1], rel=1e-9)
 
 
-def test_band_of_a_multisine():
-    result = run(ERROR + "spectrum: {type: multisine, lines: 60}\nlimits: {band: [0.3, 1.0]}\n")
-    frequencies = np.asarray(result["spectrum"]["frequencies"])
-    assert np.all((frequencies >= 0.3) & (frequencies <= 1.0))
-    free = run(ERROR + "spectrum: {type: free}\nlimits: {band: [0.3, 1.0]}\n")
-    assert free["cost"] <= result["cost"] * (1 + 1e-6)
-    assert free["cost"] > 0.1925467
-    assert np.min(free["spectrum"]["frequencies"]) >= 0.3 - 1e-12
-
-
 def test_density_limits_from_numbers_tables_and_filters(tmp_path):
     """The same level in three forms gives the same design, which keeps to it everywhere."""
     loose = ERROR.replace("0.01", "0.015")

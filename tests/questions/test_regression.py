@@ -124,13 +124,6 @@ def test_examples_2_and_3(path, mean):
     assert white["energy"] == pytest.approx(design["energy"])
 
 
-def test_a_study_repeats_with_its_seed():
-    few = ("experiment.samples=50", "simulation.runs=20", "simulation.compare=[white, binary]")
-    one = result(FIR, *few, verb=simulate)["simulation"]
-    assert result(FIR, *few, verb=simulate)["simulation"] == one
-    assert result(FIR, *few, "simulation.seed=2", verb=simulate)["simulation"] != one
-
-
 def test_estimates_are_least_squares():
     rng = np.random.default_rng(0)
     Phi, theta = rng.standard_normal((30, 4)), np.array([1.0, 2.0, 3.0, 4.0])

@@ -234,6 +234,19 @@ objective: shortest_experiment
     assert least <= found["samples"] <= least + 1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
+def test_what_is_known_already_needs_a_short_record_only(share):
+    """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""
+    text = LAG + SHORTEST
+    known = np.array(solve(parse_spec(text)).result["information"]["matrix"])
+    prior = f"experiment: {{prior: {{information: {(share * known).tolist()}}}}}\n"
+    found = solve(parse_spec(text + prior)).result
+    assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
+    whole = solve(parse_spec(text)).result["signal"]["samples"]
+    assert found["samples"] <= found["signal"]["samples"] < whole
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize("more", [1e-6, 0.05, 3.0])
 @pytest.mark.parametrize("text", [LAG, TWO], ids=["lag", "two inputs"])

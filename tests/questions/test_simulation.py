@@ -73,16 +73,6 @@ def test_the_flexible_transmission_keeps_its_promise_on_its_model_only(flexible)
         assert simulation[name]["power"]["excitation"][0] == pytest.approx(designed, rel=1e-12)
 
 
-def test_every_input_to_compare_with_has_the_power_of_the_design():
-    compare = "simulation={runs: 12, compare: [white, prbs, multisine, binary]}"
-    result = simulated(FIRST, compare, "spectrum.order=3").result
-    inputs = result["simulation"]["inputs"]
-    assert set(inputs) == {"design", "white", "prbs", "multisine", "binary", "white_that_suffices"}
-    for name in ("white", "prbs", "multisine", "binary"):
-        assert inputs[name]["power"]["excitation"][0] == pytest.approx(result["power"]["excitation"][0])
-        assert 0.5 < np.mean(inputs[name]["covariance_eigenvalues"]) < 2.0
-
-
 PLANT = """
 plant: {B: [0, 1, 0.4], F: [1, -0.7]}
 noise: {variance: 0.5}
@@ -256,12 +246,6 @@ def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
     if not loop:  # y is noise of mean square 0.5 (1 + 0.8^2) about what the input causes
         added = np.subtract(found[0]["total_power"]["output"], found[0]["power"]["output"])
         np.testing.assert_allclose(added, 0.82, rtol=0.3)
-
-
-def test_prior_information_narrows_the_estimates():
-    prior = "experiment.prior={information: [[1.0e+5]], parameters: ['a1[1]']}"
-    design = of_design(ARX, "spectrum={given: {type: white, power: 5}}", "simulation={runs: 150}", prior)
-    assert all(0.8 < ratio < 1.2 for ratio in design["rms_over_theory"].values())
 
 
 @pytest.mark.first(1)

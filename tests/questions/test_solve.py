@@ -9,7 +9,6 @@ from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.questions import execute
-from inputdesign_cli.questions.least_cost.sought import GridMethod
 from tests.support.first_order_specs import ERROR, PLANT
 from tests.support.outcomes import codes_in
 from tests.support.refusals import refusals
@@ -34,28 +33,6 @@ def test_golden_files(name):
     rows = compare(golden, {run.name: execute(golden, run) for run in golden.runs})
     assert rows
     assert [row for row in rows if not row.passed] == []
-
-
-def test_result_is_consistent():
-    outcome = solve(spec_of(SMALL))
-    result = outcome.result
-    c = np.asarray(result["spectrum"]["coefficients"])
-    assert result["status"] == "optimal"
-    assert result["objective"]["value"] == pytest.approx(c[0])  # input power alone costs
-    assert result["objective"]["relative_gap"] <= 1e-7
-    bounds = [result["objective"][key] for key in ("any_spectrum_bound", "lower_bound", "value")]
-    assert bounds == sorted(bounds)
-    M, P = np.asarray(result["information"]["matrix"]), np.asarray(result["information"]["covariance"])
-    np.testing.assert_allclose(M @ P, np.eye(3), atol=1e-8)
-    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-7)
-    signal = outcome.tables["signal"].columns
-    assert list(signal) == ["time_s", "u1"]
-    power = np.mean(signal["u1"] ** 2)
-    assert power == pytest.approx(c[0] * (1 + result["signal"]["extra_power"]))
-    assert result["signal"]["worst_ratio"] == pytest.approx(1.0, abs=1e-8)  # at the least power for that
-    bound = outcome.tables["bound"].columns
-    assert np.all(bound["r_u"] <= bound["r_adm"] * (1 + 1e-7))
-    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
 
 
 def test_sample_time_scales_frequencies_and_nothing_else():
@@ -85,15 +62,6 @@ def test_grid_method_reports_itself_honestly():
     assert told["figures"]["grid"] == 60
     assert told["figures"]["worst_ratio"] == pytest.approx(1.0, abs=1e-2)
     assert outcome.result["cost"] == pytest.approx(solve(spec_of(SMALL)).result["cost"], rel=1e-5)
-
-
-@pytest.mark.parametrize("lo", [0.0, 1e-4, 0.02, 1.0])
-@pytest.mark.parametrize("lines", [2, 3, 50])
-def test_the_grid_runs_from_one_end_of_the_band_to_the_other(lo, lines):
-    grid = GridMethod(lines, "gram").frequencies(lo, 2.5)
-    assert grid.size == lines
-    assert (grid[0], grid[-1]) == pytest.approx((lo, 2.5), rel=1e-14)
-    assert np.all(np.diff(grid) > 0.0)
 
 
 def test_the_grid_method_keeps_the_accuracy_at_the_low_end_of_the_band():

@@ -59,18 +59,6 @@ def test_the_gradient_is_that_of_plants_nearby(name):
     np.testing.assert_allclose(gradient, slope, atol=1e-6 * np.abs(slope).max())
 
 
-@pytest.mark.parametrize("name", PLANTS)
-def test_parameters_elsewhere_do_not_change_what_a_plant_consists_of(name):
-    """Through zero and back."""
-    far, zero = (build_model(spec_at(name, value)) for value in (2.5, 2.0))
-    moved = far.at(zero.theta).at(far.theta)
-    w = np.linspace(0.05, 3.1, 7)
-    np.testing.assert_allclose(moved.plant_gradient(w), far.plant_gradient(w), rtol=1e-12)
-    np.testing.assert_allclose(
-        far.at(zero.theta).plant_gradient(w), zero.plant_gradient(w), rtol=1e-9, atol=1e-9
-    )
-
-
 DESIGN = "noise: {variance: 0.04}\nexperiment: {samples: 300}\nspectrum: {type: fir, order: 4}\n"
 
 
