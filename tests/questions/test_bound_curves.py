@@ -15,6 +15,23 @@ from tests.support.pages import LOOP, SPEC
 SPECS = Path(__file__).parents[2] / "specs"
 
 
+@pytest.fixture(
+    scope="module", params=["first_order", pytest.param("two_by_two_loop", marks=pytest.mark.slow)]
+)
+def design(request):
+    return solve(load_spec(SPECS / f"{request.param}.yaml"))
+
+
+def test_an_entry_is_active_where_its_own_bound_touches(design):
+    marked = 0
+    for panel in design.curves["bound"].panels:
+        ratio = panel.r_u / panel.r_adm
+        assert np.all(np.interp(panel.active, panel.frequency, ratio) > 0.999)
+        marked += panel.active.size
+        assert (panel.active.size > 0) == (ratio.max() > 0.9999)
+    assert marked >= 1
+
+
 def test_an_axis_ends_where_the_band_does():
     near = np.pi * (1.0 + np.array([-1e-15, -1e-12]))
     w = axis(0.0, np.pi, np.concatenate([near, [0.5, 0.5 * (1 + 1e-14)]]))
@@ -148,3 +165,15 @@ def test_the_output_is_that_of_the_plant_from_rest_with_noise_about_it(more, noi
         np.testing.assert_allclose(table.columns["u1_noise_deviation"], 0.1 * deviation, rtol=1e-12)
     last = deviation[-1:] if rtol > 0.01 else deviation
     np.testing.assert_allclose(last, np.broadcast_to(expected, last.shape), rtol=rtol)
+
+
+@pytest.mark.parametrize(("offset", "levels"), [("40", True), ("0", False), (None, False)])
+def test_only_an_operating_point_makes_the_input_stand_at_levels(offset, levels):
+    """Nor does a design without a loop or within limits show what it does not have."""
+    limited = ["objective=best_accuracy", "limits={input_power: 0.7}"]
+    found = solve(
+        parse_spec(SPEC % "", overrides=[*limited, *([f"signal.offset={offset}"] if offset else [])])
+    )
+    assert found.curves["signal"].levels == levels
+    assert not {"nyquist", "ellipses"} & found.curves.keys()
+    assert "r_u_equal" not in found.bound

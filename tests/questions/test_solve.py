@@ -9,6 +9,7 @@ from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.questions import execute
+from inputdesign_cli.questions.least_cost.sought import GridMethod
 from tests.support.first_order_specs import ERROR, PLANT
 from tests.support.outcomes import codes_in
 from tests.support.refusals import refusals
@@ -62,6 +63,15 @@ def test_grid_method_reports_itself_honestly():
     assert told["figures"]["grid"] == 60
     assert told["figures"]["worst_ratio"] == pytest.approx(1.0, abs=1e-2)
     assert outcome.result["cost"] == pytest.approx(solve(spec_of(SMALL)).result["cost"], rel=1e-5)
+
+
+@pytest.mark.parametrize("lo", [0.0, 1e-4, 0.02, 1.0])
+@pytest.mark.parametrize("lines", [2, 3, 50])
+def test_the_grid_runs_from_one_end_of_the_band_to_the_other(lo, lines):
+    grid = GridMethod(lines, "gram").frequencies(lo, 2.5)
+    assert grid.size == lines
+    assert (grid[0], grid[-1]) == pytest.approx((lo, 2.5), rel=1e-14)
+    assert np.all(np.diff(grid) > 0.0)
 
 
 def test_the_grid_method_keeps_the_accuracy_at_the_low_end_of_the_band():
