@@ -8,6 +8,7 @@ import pytest
 from inputdesign_cli import identify, parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import figure
+from inputdesign_cli.outcome.units import Units
 
 HEATER = """
 sample_time: 4.76
@@ -47,6 +48,12 @@ def test_names_and_units_are_shown(tmp_path):
     data.write_text("\n".join(["u1 heating (%),y1 (degC)", *rows]))
     fitted = identify(spec.with_(**{"plant.known": ["time_constant", "dead_time"]}), data)
     assert fitted.curves["fit"].panels[0].label == "(degC)"
+
+
+def test_an_excitation_has_the_unit_of_its_input():
+    units = Units("s", 1.0, True, True, 2, 1, {"u1": ("valve", "%"), "u2": ("", "V"), "y1": ("level", "")})
+    assert [units.label(name) for name in ("r1", "u1", "r2", "y1")] == ["(%)", "valve (%)", "(V)", "level"]
+    assert units.header("r2") == "r2 (V)"
 
 
 @pytest.mark.parametrize("lengths", [("duration", 0.5), pytest.param(("samples", 1), marks=pytest.mark.slow)])

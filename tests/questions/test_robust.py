@@ -12,6 +12,7 @@ from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.compute.time_limit import stoppable
 from inputdesign_cli.design.convex.demands import Alternative
 from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.building.uncertainty import build_plants
@@ -165,6 +166,22 @@ def test_the_record_serves_every_plant_by_its_own_samples(asked):
     assert max(ratios) > ratios[0]
     if not asked:
         assert max(ratios) <= 1.0 + 1e-9
+
+
+@pytest.mark.slow
+def test_the_fan_shows_every_plant_and_names_those_that_bind():
+    found = solve(
+        parse_spec(TWO, overrides=["uncertainty={scenarios: [{'b1[1,1]': 0.8}, {'b1[1,1]': 1.1}]}"])
+    )
+    curves, columns = found.curves["fan"], found.tables["fan"].columns
+    assert curves.ratios.shape == (2, curves.frequency.size)
+    np.testing.assert_allclose(columns["largest"], np.maximum(curves.ratios.max(axis=0), curves.nominal))
+    assert columns["largest"].max() == pytest.approx(1.0, abs=1e-3)
+    numbers = {item["scenario"] for item in found.result["robust"]["active"] if item["scenario"]}
+    named = [label.split(", ") for label in curves.active]
+    assert {label[0] for label in named} == {f"plant {number}" for number in numbers}
+    assert all(f"b1[1,1] {(0.8, 1.1)[int(label[0][-1]) - 1]}" in label for label in named)
+    assert draw_all(found)["fan.png"].startswith(b"\x89PNG")
 
 
 @pytest.mark.slow

@@ -29,6 +29,21 @@ signal: {{candidates: 1}}
 """
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("samples", "each"), [(12, 1), (200, 20)])
+def test_short_records_differ_so_much_that_each_has_one_run(monkeypatch, samples, each):
+    """Twenty runs of each of five records of 8 samples told of these five: it cost 1.7 times too much."""
+    seen, genuine = set(), confidence.Reapplied
+
+    def noted(excitation, times):
+        seen.add(times)
+        return genuine(excitation, times)
+
+    monkeypatch.setattr(confidence, "Reapplied", noted)
+    solve(parse_spec(SPEC.format(samples=samples)))
+    assert seen == {each}
+
+
 def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
     seen = []
 

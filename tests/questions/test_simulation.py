@@ -248,6 +248,12 @@ def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
         np.testing.assert_allclose(added, 0.82, rtol=0.3)
 
 
+def test_prior_information_narrows_the_estimates():
+    prior = "experiment.prior={information: [[1.0e+5]], parameters: ['a1[1]']}"
+    design = of_design(ARX, "spectrum={given: {type: white, power: 5}}", "simulation={runs: 150}", prior)
+    assert all(0.8 < ratio < 1.2 for ratio in design["rms_over_theory"].values())
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("spec", "signal"),
