@@ -76,14 +76,6 @@ def test_the_discs_touch_the_circle_that_is_to_be_kept_and_no_more():
     assert left.min() == pytest.approx(10 ** (-6 / 20), rel=1e-6)
 
 
-def test_the_loop_of_the_experiment_has_discs_of_its_own_error():
-    found = solve(parse_spec(SPEC % LOOP))
-    table, bound = found.tables["nyquist"].columns, found.bound
-    assert "distance_kept" not in table
-    radius = np.interp(bound["frequency_rad_per_s"], table["frequency_rad_per_s"], table["radius"])
-    np.testing.assert_allclose(radius, 0.1 * bound["r_u"], rtol=1e-3)
-
-
 def shown(outcome):
     return [pair.names for pair in outcome.curves["ellipses"].pairs]
 

@@ -96,17 +96,6 @@ def simulated(*overrides):
     return simulate(parse_spec(ZEROS, overrides=list(overrides))).result
 
 
-@pytest.mark.parametrize("true", ["{A: [1, -0.8], B: [0, 1, -1.5]}", "{A: [1, -0.7], B: [0, 1, -2.5]}"])
-def test_runs_with_a_zero_outside_are_stable_and_as_theory_says(true):
-    """The second plant is not the one of the spec: its own zero is kept, by both controllers."""
-    found = simulated(f"simulation.plant={true}")
-    for entry in found["simulation"]["inputs"].values():
-        assert entry["unstable"] == 0
-        exact = entry["exact"]["squared"]
-        assert exact["mean"] == pytest.approx(entry["theory"]["value"], abs=4 * exact["standard_error"])
-    assert "notes" not in found
-
-
 def test_unstable_loops_are_said():
     found = simulated("noise.variance=10", "experiment.samples=60")
     inputs = found["simulation"]["inputs"]

@@ -9,10 +9,9 @@ import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.frequency_responses import silent_lines_answer
 from inputdesign_cli.identification.periodic_response import Periods, excited_lines
 from inputdesign_cli.questions.frequency_response.build import build_measurement
-from inputdesign_cli.questions.frequency_response.measure import Counted, judge_lines, silent_of
+from inputdesign_cli.questions.frequency_response.measure import Counted, judge_lines
 from inputdesign_cli.records import Preparation, Record
 from tests.support.refusals import refusal
 
@@ -105,14 +104,6 @@ def test_the_discs_hold_the_true_response(write, text):
     assert not {"samples-before-periods", "inputs-do-not-repeat"} & codes(results).keys()
 
 
-def test_without_lines_in_the_spec_the_data_say_which_they_are(write):
-    _, u, y = recorded(TEXT, 1)
-    plain = parse_spec(TEXT.replace("accuracy", "# accuracy").replace("signal", "# signal"), design=False)
-    results = identify(plain, write(table(u, y)), frequency_response=True)
-    assert results.result["frequency_response"]["frequencies"] == 12
-    assert "deviations" not in results.tables
-
-
 def test_records_that_repeat_count_together(write):
     spec, u, first = recorded(TEXT, 1)
     _, _, second = recorded(TEXT, 2)
@@ -167,21 +158,6 @@ def test_silent_lines_tell_the_degree_of_a_nonlinearity(write, curve, speaks):
     assert {kind for kind, entry in told.items() if entry["probability"][0] < 0.01} == ({speaks} - {""})
     found = [one.where for one in results.outcome.findings or () if one.code == "silent-lines-answer"]
     assert found == ([speaks] if speaks else [])
-
-
-def test_of_noise_alone_the_probability_is_uniform():
-    """And a linear plant is hardly ever doubted: four of a hundred are expected."""
-    _, question, u = asked(SHIPPED, 1.6)
-    silent = [
-        silent_of(question.terms, counted(question.terms, u, answer(question.model, u, seed)))
-        for seed in range(100)
-    ]
-    found = np.array([one["even"].probability[0] for one in silent])
-    assert np.mean(found) == pytest.approx(0.5, abs=0.1)
-    assert 0.02 < np.mean(found < 0.1) < 0.2
-    assert sum(bool(silent_lines_answer(one)) or one["odd"].probability[0] < 0.04 for one in silent) <= 7
-    lines = [one for each in silent for one in each.values() if one.probability.min() < 0.05]
-    assert all(np.all(one.rms > 0.0) for one in lines)
 
 
 @pytest.mark.parametrize(

@@ -70,29 +70,6 @@ def test_the_error_of_one_spectrum_is_the_same_in_all_words(words, noise):
     np.testing.assert_allclose(found, np.broadcast_to(found[0], np.shape(found)), rtol=1e-9)
 
 
-def test_drift_is_a_known_root_of_one():
-    """In two words; d1 has the value of the root, and no row of the information."""
-    plant = WORDS["in s and in q"][0]
-    noises = "{drift: true, variance: 0.1}", "{D: [1, -1], known: [d1], variance: 0.1}"
-    models = [build_model(spec_of(plant, noise=noise)) for noise in noises]
-    w = np.array([0.1, 1.0])
-    np.testing.assert_allclose(*(input_gradients([model], w)[0] for model in models), rtol=1e-12)
-    assert models[0].names == models[1].names == ("b0", "a0")
-    # (1 - q^-1) G u of a constant u is zero.
-    assert np.abs(input_gradients([models[0]], np.array([0.0]))[0]).max() == pytest.approx(0.0, abs=1e-9)
-
-
-def test_outputs_have_noise_of_their_own():
-    plant = "{B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1], [1, -0.8]]]}"
-    noise = "{C: [[1, 0.3], [1]], D: [[1], [1, -1]], known: ['d1[2]'], drift: [true, false], variance: 0.1}"
-    model = build_model(spec_of(plant, noise=noise, design=False))
-    assert [name for name in model.names if name[0] in "cd"] == ["c1[1]"]
-    gradient = input_gradients([model], np.array([0.0]))[0]
-    np.testing.assert_allclose(gradient, 0.0, atol=1e-12)  # both outputs are differenced
-    white = spec_of(plant, noise=noise, overrides=["spectrum={given: {type: white, power: 1}}"])
-    assert "c1[1]" in analyse(white).result["information"]["standard_deviation"]
-
-
 def test_a_gain_is_coloured_noise():
     """x+ = a x + b u + k e is ARMAX: A = 1 - a q^-1, C = 1 + (k - a) q^-1."""
     states = (

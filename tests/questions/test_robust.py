@@ -23,32 +23,6 @@ from tests.support.refusals import code_of
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, solved
 
 
-@pytest.mark.first(3)
-@pytest.mark.parametrize(
-    ("text", "asked"),
-    [
-        (FIRST, ()),
-        (FIRST, ("limits={output_power: 1}", "objective=best_accuracy")),
-        (FIRST, ("limits={output_power: 1}", "objective=shortest_experiment")),
-        (FIRST, ("accuracy={criterion: D, standard_deviation: {f1: 0.02}}", "limits={input_power: 1}")),
-        (LOOP, ()),
-        (LOOP, ("accuracy={model_error: {sensitivity: {max_db: 9}}}", "uncertainty.cost=mean")),
-        (TWO, ("limits={output_power: [200, 200]}",)),
-        (TWO, ("accuracy={criterion: A, scale: relative}", "limits={input_power: [1, 2]}")),
-    ],
-)
-def test_copies_of_the_plant_change_nothing(text, asked):
-    """Whatever is asked, in a loop and with several channels."""
-    (name, value) = ("f1", -0.8) if text is LOOP else ("f1", -0.7) if text is FIRST else ("b1[1,1]", 1.0)
-    scenarios = f"uncertainty={{scenarios: [{{'{name}': {value}}}, {{'{name}': {value}}}]}}"
-    robust = [one for one in asked if one.startswith("uncertainty")]
-    once = solved(text, *(one for one in asked if one not in robust))
-    again = solved(text, scenarios, *asked)
-    assert again["objective"]["value"] == pytest.approx(once["objective"]["value"], rel=1e-6)
-    assert again["cost"] == pytest.approx(once["cost"], rel=1e-5)
-    assert again["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-3)  # a whole number of samples
-
-
 def test_limits_on_powers_bind_design_and_record_at_every_plant():
     """The output answers most at the slower plant; records of several seeds, of the power of the design."""
     asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
@@ -419,15 +393,3 @@ def test_plants_that_are_drawn_afresh_are_counted_where_no_model_will_do():
     robust = solve(parse_spec(text, overrides=[REGION % 30, "solver.any_spectrum=false"])).result["robust"]
     beyond = np.mean([peak(b, -0.8, 0.4, 0.95) > 10 ** (7.5 / 20) for b in np.linspace(0.3, 0.9, 50)])
     assert robust["fresh"]["lost"] == pytest.approx(30 * beyond, abs=8)  # three deviations
-
-
-@pytest.mark.slow
-def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
-    found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
-    robust = found["robust"]
-    assert robust["worst_share"] == pytest.approx(1.0, abs=1e-6)
-    assert robust["fresh"]["draws"] == 120
-    low, high = robust["fresh"]["limits"]
-    assert low <= robust["fresh"]["share"] <= high
-    assert robust["fresh"]["share"] <= robust["risk"]["after"] <= robust["risk"]["before"]
-    assert found["cost"] > 1.05 * solved(FIRST)["cost"]

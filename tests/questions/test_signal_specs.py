@@ -56,11 +56,6 @@ def test_the_record_meets_the_accuracy(text, most):
         assert signal[key][0] <= value
 
 
-def test_the_power_of_the_design_on_request():
-    outcome = solve(parse_spec(BASE + "signal: {scale: design}\n"))
-    assert outcome.result["signal"]["power"][0] == pytest.approx(outcome.result["cost"], rel=1e-12)
-
-
 def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
     found = solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2}\n")).result
     assert found["signal"]["type"] != "filtered_noise"
