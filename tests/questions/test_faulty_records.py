@@ -227,9 +227,8 @@ def test_a_part_with_empty_cells_leaves_the_verdict_open(write):
     for name, copied in emptied(first, 25).items():
         second[name][200:400] = copied[100:300]
     judged = assess(parse_spec(LAG), [write(first, "a.csv"), write(second, "b.csv")])
-    (told,) = [one for one in judged.results.outcome.findings if one.code == "samples-repeated"]
     assert judged.verdict == "undecided"
-    assert "192 of 492 samples of b.csv" in told.message
+    assert "samples-repeated" in codes(judged.results)
 
 
 def test_rests_and_coarse_steps_come_again_by_themselves():

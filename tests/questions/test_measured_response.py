@@ -100,7 +100,6 @@ def test_the_discs_hold_the_true_response(write, text):
         assert np.median(error / columns[f"radius{name}"]) < 0.7
     response = results.result["frequency_response"]
     assert response["worst_ratio_limits"][0] < 1.0 < response["worst_ratio_limits"][1]
-    assert results.result["status"] == "measured"
     assert not {"samples-before-periods", "inputs-do-not-repeat"} & codes(results).keys()
 
 

@@ -54,7 +54,6 @@ def test_what_is_delivered_meets_everything_and_its_bounds_hold(slow_solver, tex
         assert (status == "gap_open") == (found.get("relative_gap", 1.0) > 1e-5)
         if status == "gap_open":
             assert result["solver"]["ended_by"] == "solver.time_limit"
-            assert "ended the design" in result["notes"][0]
             assert "no-record-in-time" in [one["code"] for one in result["findings"]]
         if status == "optimal" and "signal" in result and "any_spectrum_bound" in found:
             assert "notes" not in result or "came before" not in " ".join(result["notes"])
@@ -82,7 +81,6 @@ def test_an_interrupt_is_as_the_end_of_the_time():
     with stoppable() as stop, watching(lambda done: stop()):
         result = solve(parse_spec(PLANT + SPECS["cost"])).result
     assert (result["status"], result["solver"]["ended_by"]) == ("gap_open", "the interrupt")
-    assert "the interrupt ended the design" in result["notes"][0]
 
 
 MOMENTS = """
