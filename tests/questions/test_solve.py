@@ -36,6 +36,26 @@ def test_golden_files(name):
     assert [row for row in rows if not row.passed] == []
 
 
+def test_sample_time_scales_frequencies_and_nothing_else():
+    """The same discrete plant sampled ten times as fast: frequencies times ten, costs unchanged."""
+    slow, fast = solve(spec_of(SMALL)), solve(spec_of(SMALL, sample_time=0.1))
+    assert fast.result["cost"] == pytest.approx(slow.result["cost"], rel=1e-9)
+    ratio = (
+        fast.tables["bound"].columns["frequency_rad_per_s"]
+        / slow.tables["bound"].columns["frequency_rad_per_s"]
+    )
+    np.testing.assert_allclose(ratio, 10.0)
+    assert fast.tables["signal"].columns["time_s"][1] == pytest.approx(0.1)
+
+
+def test_equal_seeds_give_equal_signals():
+    one, two, other = (
+        solve(spec_of(SMALL, signal__seed=seed)).tables["signal"].columns["u1"] for seed in (4, 4, 5)
+    )
+    np.testing.assert_array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
 def test_grid_method_reports_itself_honestly():
     outcome = solve(spec_of(SMALL, solver="{method: lmi, grid: 60}"))
     assert outcome.result["status"] == "optimal_on_grid"

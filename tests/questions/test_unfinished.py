@@ -63,17 +63,15 @@ def test_what_is_delivered_meets_everything_and_its_bounds_hold(slow_solver, tex
     assert "out-of-time" not in statuses[statuses.index("gap_open") :]
 
 
-def test_nothing_is_simulated_without_a_record(slow_solver):
-    spec = parse_spec(f"{PLANT}{SPECS['cost']}solver: {{time_limit: 1}}\nsimulation: {{runs: 2}}")
-    with pytest.raises(InaccurateError) as ended:
-        simulate(spec)
-    assert ended.value.diagnostics[0].code == "out-of-time"
+EXACT = SPECS["cost"].replace("alpha: 2.45", "confidence: {exact: 0.9, draws: 200}")
 
 
-def test_an_exact_confidence_is_not_claimed_of_an_unfinished_design(slow_solver):
-    text = SPECS["cost"].replace("alpha: 2.45", "confidence: {exact: 0.9, draws: 200}")
+@pytest.mark.parametrize(
+    ("verb", "text"), [(simulate, SPECS["cost"] + "simulation: {runs: 2}\n"), (solve, EXACT)]
+)
+def test_without_a_record_nothing_is_simulated_and_no_exact_confidence_claimed(slow_solver, verb, text):
     with pytest.raises(InaccurateError) as ended:
-        solve(parse_spec(f"{PLANT}{text}solver: {{time_limit: 1}}"))
+        verb(parse_spec(f"{PLANT}{text}solver: {{time_limit: 1}}"))
     assert ended.value.diagnostics[0].code == "out-of-time"
 
 
