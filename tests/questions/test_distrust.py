@@ -109,6 +109,13 @@ def test_the_steps_of_a_coarse_sensor_are_said_to_decide_and_fine_ones_are_not(s
         assert ("sensor-too-coarse" in codes, bool(found.reasons)) == (blamed, blamed)
 
 
+def test_an_input_that_is_a_share_of_the_output_says_only_that(tmp_path):
+    """Neither the fit nor the noise of such a model says anything."""
+    found = explore(stored(tmp_path / "log.csv", *a_share()))
+    (reason,) = found.reasons
+    assert "-0.6 y" in reason
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_double_integrator_is_no_error_of_a_spec_that_nobody_wrote(seed, tmp_path):
     rng = RNG(seed)

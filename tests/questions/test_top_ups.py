@@ -4,8 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, parse_spec
+from inputdesign_cli.cli import app
 from inputdesign_cli.findings.designed_records import level_notes
 from tests.support.heater import HEATER, STRUCTURE
 
@@ -57,6 +59,26 @@ def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, he
     )
     assert {"fit", "residuals"} <= set(found.results.tables)
     assert "model.yaml" in found.results.files
+
+
+@pytest.mark.slow
+def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    spec.write_text(STRUCTURE + asked)
+    out = tmp_path / "run"
+    options = ["-o", str(out), "--no-figures", "--operating-point", "u1=40,y1=52.3"]
+    run = CliRunner().invoke(app, ["assess", str(spec), str(path), *options])
+    assert run.exit_code == 1, run.output
+    result = json.loads((out / "result.json").read_text())
+    assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
+    assert result["signal"]["operating_point"] == [40.0]
+    (levels,) = [one for one in result["findings"] if one["code"] == "about-an-operating-point"]
+    assert levels["figures"] == {"levels": [40.0]}
+    u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
+    assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from inputdesign_cli.findings.far_from_nominal import far_from_nominal, from_nom
 from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.building.system import build_model
-from tests.support.heater import HEATER, SLOW, covariance_of, heater
+from tests.support.heater import HEATER, LAG, SLOW, covariance_of, heater
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
 
@@ -61,6 +61,22 @@ def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(he
     path.write_text("\n".join([f"{lines[0]},u2", *(f"{line},0.5" for line in lines[1:])]))
     findings = assess(parse_spec(HEATER), path).results.outcome.findings
     assert ["u2"] in [one.figures["columns"] for one in findings if one.code == "columns-unused"]
+
+
+@pytest.mark.slow
+def test_beside_an_undecided_model_stands_what_the_data_say_without_one(heater_record):
+    found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True))
+    table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
+    G = table["G_re"] + 1j * table["G_im"]
+    q = np.exp(-5j * table["frequency_rad_per_s"])
+    gain = 2.35 * (1 - SLOW) * (1 - LAG)
+    truth = gain * (0.4 * q**6 + 0.6 * q**7) / ((1 - SLOW * q) * (1 - LAG * q))
+    assert np.mean(np.abs(G - truth) < table["radius"]) > 0.85
+    assert told["frequency_response"]["model_outside"] > 0.2
+    assert "frequency_response" in found.results.curves
+    assert (
+        "frequency_response" not in assess(parse_spec(HEATER), heater_record("b.csv", 720, 1)).results.tables
+    )
 
 
 @pytest.mark.slow
