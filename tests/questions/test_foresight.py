@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli import assess, load_spec, parse_spec, simulate, solve
+from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.identification import Rival
 from inputdesign_cli.questions.building.system import build_model
@@ -237,3 +237,14 @@ def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
     assert "rivals" not in identification
     assert identification["ruled_out"][0]["theta"]["L"] == pytest.approx(HEATER[2] + PERIOD * H, abs=20.0)
     assert "The uncertainty excludes another minimum" in said(found.results)
+
+
+@pytest.mark.slow
+def test_what_is_foreseen_heeds_it_too(tmp_path):
+    u = np.tile(0.17 * ONCE, 25)
+    path = tmp_path / "u.csv"
+    np.savetxt(path, np.column_stack([H * np.arange(u.size), u]), delimiter=",", header="t,u", comments="")
+    given = (f"spectrum={{given: {{signal: {path}}}}}", "signal={}", f"experiment.samples={u.size}")
+    free, known = (analyse(heater(*given, *more)).result["foreseen"] for more in ((), (WITHIN,)))
+    assert free["rivals"][0]["theta"]["L"] == pytest.approx(HEATER[2] + PERIOD * H, abs=20.0)
+    assert known["rivals"] == []

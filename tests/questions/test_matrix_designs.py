@@ -118,6 +118,19 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
     assert result.gap < 1e-6
 
 
+@pytest.mark.slow
+def test_free_spectra_of_unequal_limits_are_proved():
+    """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
+    spec = changed(
+        "plant: {B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]],\n"
+        "  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1, -0.8]]]}\n"
+        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
+        "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
+        "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
+    )
+    assert build_convex(spec).designed().design.result.gap < 1e-6
+
+
 LOOP = f"""{IN_LOOP}
 cost: {{input_power: 1, output_power: 0.1, excitation_power: 0.01}}
 accuracy: {{standard_deviation: {{'a1[1]': 0.002, 'b1[1,2]': 0.01}}}}

@@ -393,3 +393,14 @@ def test_plants_that_are_drawn_afresh_are_counted_where_no_model_will_do():
     robust = solve(parse_spec(text, overrides=[REGION % 30, "solver.any_spectrum=false"])).result["robust"]
     beyond = np.mean([peak(b, -0.8, 0.4, 0.95) > 10 ** (7.5 / 20) for b in np.linspace(0.3, 0.9, 50)])
     assert robust["fresh"]["lost"] == pytest.approx(30 * beyond, abs=8)  # three deviations
+
+
+@pytest.mark.slow
+def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
+    text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 7.5}")
+    region = (REGION % 1).replace("fresh", "worst_case: 0.9, fresh")
+    found = solve(parse_spec(text, overrides=[region, "solver.any_spectrum=false"])).result["robust"][
+        "searched"
+    ]
+    assert found["lost"]
+    assert found["peak"] == pytest.approx(peak(found["parameters"]["b1"], -0.8, 0.4, 0.95), rel=1e-3)
