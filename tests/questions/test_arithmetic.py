@@ -11,7 +11,7 @@ import pytest
 from inputdesign_cli import parse_spec, solve, validate
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.questions import finite, sound_arithmetic
+from inputdesign_cli.questions import finite, most_extreme, sound_arithmetic
 from tests.support.first_order_specs import PLANT as WHOLE
 from tests.support.outcomes import typed
 from tests.support.refusals import refusal
@@ -67,6 +67,12 @@ def test_what_arithmetic_cannot_hold_names_the_most_extreme_number(fault):
         fault()
     (diagnostic,) = found.value.diagnostics
     assert (diagnostic.code, diagnostic.key) == ("beyond-precision", "noise.variance")
+
+
+def test_the_most_extreme_number_is_the_farthest_from_one():
+    data = {"a": [1.0, {"b": 1e-9}], "c": 1e7, "d": 0.0, "e": True, "f": "1e99"}
+    assert most_extreme(data) == ("a[1].b", pytest.approx(9.0))
+    assert most_extreme({}) == ("", 0.0)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
