@@ -110,6 +110,15 @@ def test_every_limit_that_an_excitation_breaks_is_found(spec, limits, broken):
             )
 
 
+def test_a_record_longer_than_allowed_is_found(tmp_path):
+    (tmp_path / "u.csv").write_text("u\n" + "1\n-1\n1\n" * 40)
+    given = f"spectrum={{given: {{signal: {tmp_path / 'u.csv'}}}}}"
+    spec = load_spec(SHIPPED, [given, "limits={samples: 100}", "experiment.samples=100"])
+    (found,) = limits_not_kept(spec)
+    assert found.where == "limits.samples"
+    assert dict(found.figures) == {"value": 120, "limit": 100}
+
+
 SPECS = Path(__file__).parents[2] / "specs"
 # Those whose design is a density that just meets what is asked.
 DENSITIES = {

@@ -208,6 +208,25 @@ def test_noise_from_before_the_record_is_no_start_in_motion(write, seed, samples
         assert abs(start.figures["first_residual"]) > 3.0 * start.figures["noise"]
 
 
+@pytest.mark.parametrize("others", [(), pytest.param((False, True), marks=pytest.mark.slow)])
+def test_an_operating_point_does_not_move_the_estimate(write, others):
+    """Known, unknown, or its means removed: the same model, within a standard deviation."""
+    columns = record(load_spec(SPEC), seed=3)
+    plain = identify(load_spec(SPEC), write(columns)).result["identification"]
+    gain = 3.6 / 0.3
+    moved = {**columns, "u1": columns["u1"] + 40.0, "y1": columns["y1"] + 52.3}
+    spec = load_spec(SPEC, ["signal.offset=40"])
+    ways = [
+        identify(spec, write(moved), operating_point={"y1": 52.3}),
+        identify(spec, write({**moved, "y1": moved["y1"] + 40.0 * gain})),
+        *(identify(load_spec(SPEC), write(moved), remove_means=removed) for removed in others),
+    ]
+    for n, found in enumerate(way.result["identification"] for way in ways):
+        for name, value in plain["theta"].items():
+            assert abs(found["theta"][name] - value) < plain["standard_deviation"][name], (n, name)
+    assert ways[0].result["identification"]["theta"] == pytest.approx(plain["theta"], rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("change", "code", "named"),
     [

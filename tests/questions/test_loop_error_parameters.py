@@ -81,6 +81,20 @@ def test_the_asymptotic_design_does_not_ask_what_is_known():
     assert known[1] < 0.6 * free[1]
 
 
+@pytest.mark.parametrize(
+    "law", ["{minimum_variance: true}", "{internal_model: {numerator: [0.5], denominator: [1, -0.5]}}"]
+)
+def test_a_gain_is_coloured_noise(law):
+    """x+ = a x + b u + k e is ARMAX with C = 1 + (k - a) q^-1, whose coefficients are as many."""
+    rest = REST.replace("{model_reference: {numerator: [0, 0, 0, 0, 0.2], denominator: [1, -0.8]}}", law)
+    states = (
+        "{parameters: {a: 0.8, b: 0.5, k: 0.3}, "
+        "state_space: {time: discrete, A: [[a]], B: [[b]], C: [[1]], K: [[k]]}}"
+    )
+    armax = rest.replace("{variance: 0.04}", "{C: [1, -0.5], variance: 0.04}")
+    assert_same([losses(states, EXACT, rest=rest), losses("{A: [1, -0.8], B: [0, 0.5]}", EXACT, rest=armax)])
+
+
 ZEROS = """
 plant: {A: [1, -0.8], B: [0, 1, -1.5]}
 noise: {variance: 0.01}

@@ -103,6 +103,14 @@ def test_the_discs_hold_the_true_response(write, text):
     assert not {"samples-before-periods", "inputs-do-not-repeat"} & codes(results).keys()
 
 
+def test_without_lines_in_the_spec_the_data_say_which_they_are(write):
+    _, u, y = recorded(TEXT, 1)
+    plain = parse_spec(TEXT.replace("accuracy", "# accuracy").replace("signal", "# signal"), design=False)
+    results = identify(plain, write(table(u, y)), frequency_response=True)
+    assert results.result["frequency_response"]["frequencies"] == 12
+    assert "deviations" not in results.tables
+
+
 def test_records_that_repeat_count_together(write):
     spec, u, first = recorded(TEXT, 1)
     _, _, second = recorded(TEXT, 2)

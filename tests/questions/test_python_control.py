@@ -1,5 +1,7 @@
 """Systems of python-control there and back, specs from plain data, results as arrays."""
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
@@ -120,6 +122,17 @@ def test_results_are_arrays():
     power = lines.spectrum(np.array([0.2, 0.3, 0.5]))[:, 0, 0].real
     assert power[1] == 0.0
     assert power.sum() == pytest.approx(lines.result["cost"], rel=1e-6)
+
+
+def test_what_a_run_does_not_have_is_no_attribute_of_it():
+    found = solve(Spec.from_dict(DATA))
+    assert [one.message for one in found.findings] == list(found.result.get("notes", []))
+    bare = replace(found, curves={}, tables={})
+    for name in ("signal", "bound"):
+        with pytest.raises(AttributeError, match=name):
+            getattr(bare, name)
+    with pytest.raises(AttributeError, match="spectrum"):
+        _ = bare.spectrum
 
 
 def test_the_power_of_a_line_is_found_by_the_digits_that_people_write():
