@@ -331,6 +331,19 @@ def test_a_model_without_a_sample_time_is_named(tmp_path):
     assert (told.code, told.key, "sample_time: 0.5" in told.hint) == ("data-not-uniform", "sample_time", True)
 
 
+def test_an_output_that_never_changes_is_refused_as_without_a_model(tmp_path):
+    path = lag_log(tmp_path / "stuck.csv")
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *(f"{row.rsplit(',', 1)[0]},5" for row in rows)]))
+    told = []
+    for model in (None, load_spec(stored(tmp_path), design=False)):
+        with pytest.raises(DataError) as caught:
+            explore(path, model=model)
+        told += [(one.code, one.message, one.location) for one in caught.value.diagnostics]
+    assert told[0] == told[1]
+    assert told[0][0] == "constant-output"
+
+
 @pytest.mark.slow
 def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
     rng = np.random.default_rng(2)
