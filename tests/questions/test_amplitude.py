@@ -222,3 +222,17 @@ def test_the_hold_that_is_chosen_is_a_tenth_of_the_slowest_time_constant(pole, s
     assert build_convex(spec).record.settings.hold == hold
     coloured = spec.revised({"noise": {"variance": 1.0, "D": [1, -0.995]}})
     assert build_convex(coloured).record.settings.hold == hold
+
+
+def test_the_cheapest_record_of_few_moves_is_as_high_as_it_must_be():
+    limits, accuracy = (
+        "{amplitude: 3, moves: 12}",
+        "{model_error: {relative: 0.4, band: [0.02, 2.5], alpha: 3}}",
+    )
+    least = solve(asked(objective="least_cost", cost="{input_power: 1}", limits=limits, accuracy=accuracy))
+    best = solve(asked(limits=limits, accuracy=accuracy))
+    u = least.signal[:, 0]
+    assert moves(u) <= 12
+    assert ratio(u, 0.4) == pytest.approx(1.0, abs=1e-5)
+    needed = 9.0 * best.result["signal"]["worst_ratio"] ** 2
+    assert np.mean(u**2) == pytest.approx(needed, rel=0.1)
