@@ -90,12 +90,6 @@ def test_no_result_holds_a_number_that_is_none(value):
         assert found.value.diagnostics[0].code == "beyond-precision"
 
 
-def test_nothing_asked_needs_nothing():
-    text = "plant: {B: [0, 1], F: [1, -0.7]}\nnoise: {variance: 1}\naccuracy: {information: [[0, 0], [0, 0]]}"
-    found = solve(parse_spec(text)).result
-    assert (found["status"], found["cost"]) == ("nothing_needed", 0.0)
-
-
 def test_an_input_without_power_has_none():
     text = """
 plant:
@@ -128,22 +122,12 @@ def test_samples_scale_information_and_need_no_room():
     assert many.result["cost"] * 10**15 == pytest.approx(few.result["cost"] * 500, rel=1e-6)
     assert "signal" in few.result
     assert "signal" not in many.result
-    assert "signal.samples" in " ".join(many.result["notes"])
 
 
 def test_a_record_that_is_asked_for_has_to_fit():
     found = refused(f"{PLANT}{ASKED}experiment: {{samples: {10**15}}}\nsignal: {{seed: 1}}")
     assert found.key == "experiment.samples"
     assert "signal.samples: 1000000" in found.hint
-
-
-def test_the_record_of_a_shortest_experiment_may_be_too_long():
-    text = (
-        f"{PLANT}{ASKED}objective: shortest_experiment\nlimits: {{input_power: 1.0e-9}}\nsignal: {{seed: 1}}"
-    )
-    found = solve(parse_spec(text)).result
-    assert found["samples"] > 10**9
-    assert "signal" not in found
 
 
 def test_a_model_of_many_parameters_is_refused_with_what_fits():

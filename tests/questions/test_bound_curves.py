@@ -32,14 +32,6 @@ def test_an_entry_is_active_where_its_own_bound_touches(design):
     assert marked >= 1
 
 
-def test_frequencies_are_told_once(design):
-    table = design.tables["bound"].columns
-    w = next(iter(table.values()))
-    assert np.all(np.diff(w) > 1e-10 * w[1:])
-    active = np.array(design.result["model_error"]["active_frequencies"])
-    assert np.all(np.diff(active) > 1e-4 * np.pi)
-
-
 def test_an_axis_ends_where_the_band_does():
     near = np.pi * (1.0 + np.array([-1e-15, -1e-12]))
     w = axis(0.0, np.pi, np.concatenate([near, [0.5, 0.5 * (1 + 1e-14)]]))
@@ -82,14 +74,6 @@ def test_the_discs_touch_the_circle_that_is_to_be_kept_and_no_more():
     left = np.abs(1.0 + loop) - table["radius"]
     np.testing.assert_allclose(table["distance_kept"], 10 ** (-6 / 20))
     assert left.min() == pytest.approx(10 ** (-6 / 20), rel=1e-6)
-
-
-def test_the_loop_of_the_experiment_has_discs_of_its_own_error():
-    found = solve(parse_spec(SPEC % LOOP))
-    table, bound = found.tables["nyquist"].columns, found.bound
-    assert "distance_kept" not in table
-    radius = np.interp(bound["frequency_rad_per_s"], table["frequency_rad_per_s"], table["radius"])
-    np.testing.assert_allclose(radius, 0.1 * bound["r_u"], rtol=1e-3)
 
 
 def shown(outcome):

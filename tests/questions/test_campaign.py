@@ -287,20 +287,6 @@ def test_no_estimate_makes_a_part_dearer_than_the_cap(name, block, cost):
         assert spent <= 0.7 * wide * first.cost * (1 + 1e-6)
 
 
-@pytest.mark.first(2)
-@pytest.mark.parametrize("cost", ["{input_power: 1}", "{input_power: 1, output_power: 0.1}"])
-@pytest.mark.parametrize("cap", [0.05, 0.7, 1.0])
-def test_the_first_part_keeps_the_cap_as_well(cap, cost):
-    text = [f"campaign.power_cap={cap}", f"cost={cost}", "campaign.pilot=20", "campaign.last=nominal"]
-    plan = planner(SPEC, *text).plan(build_rules(parse_spec(SPEC, overrides=text)), None, 0, 1, None)
-    part = plan.applied[:, 0]
-    spent = np.mean(part**2)
-    if "output" in cost:
-        spent += 0.1 * np.mean(lfilter([0, 3.6], [1, -0.7], part) ** 2)
-    assert plan.part_cost == pytest.approx(spent, rel=1e-9)
-    assert spent <= cap * plan.cost * (1 + 1e-9)
-
-
 IN_A_LOOP = """
 plant: {A: [1, -0.9], B: [0, 0.5]}
 noise: {variance: 1}

@@ -7,7 +7,6 @@ import pytest
 
 from inputdesign_cli import identify, parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.figures.plots import figure
 from inputdesign_cli.outcome.units import Units
 
 HEATER = """
@@ -38,8 +37,6 @@ def test_names_and_units_are_shown(tmp_path):
     spec = parse_spec(f"{HEATER}{CHANNELS}experiment: {{samples: 120}}\n")
     found = solve(spec)
     assert list(found.tables["signal"].columns) == ["time_s", "u1 heating (%)"]
-    page = figure(found, "signal")
-    assert page.axes[0].get_ylabel() == "heating (%)"
     u = np.array(found.tables["signal"].columns["u1 heating (%)"])
     y = 2.1 * np.convolve(u, np.exp(-np.arange(200) / 38.0) / 38.0)[: u.size]
     y += 0.01 * np.random.default_rng(0).standard_normal(u.size)
@@ -70,19 +67,3 @@ def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
     (needed,) = re.findall(rf"experiment\.{word}: ([0-9.]+)", caught.value.diagnostics[0].hint)
     longer = unit * round(1.15 * float(needed) / unit)
     assert solve(parse_spec(text % longer)).result["signal"]["worst_ratio"] <= 1.0 + 1e-9
-
-
-def test_entries_are_titled_by_the_names_of_their_channels():
-    names = "channels: {u1: {name: valve}, u2: {name: pump}, y1: {name: level, unit: cm}}\n"
-    text = names + (
-        "plant: {B: [[[0, 1], [0, 0.5]]], F: [[[1, -0.5], [1, -0.7]]]}\nnoise: {variance: 0.1}\n"
-        "experiment: {samples: 200}\naccuracy: {criterion: D}\nlimits: {input_power: 1}\n"
-        "spectrum: {type: fir, order: 3}\nsignal: {candidates: 1}\nsolver: {any_spectrum: false}\n"
-    )
-    panels = solve(parse_spec(text)).curves["bound"].panels
-    assert [(panel.entry, panel.names) for panel in panels] == [
-        ((0, 0), "valve → level"),
-        ((0, 1), "pump → level"),
-    ]
-    unnamed = solve(parse_spec(text.replace(", y1: {name: level, unit: cm}", ""))).curves["bound"].panels
-    assert {panel.names for panel in unnamed} == {""}

@@ -91,15 +91,6 @@ def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spe
     assert endless == ("no-bound-over-spectra" in codes_in(result))
 
 
-@pytest.mark.parametrize(("seed", "criterion"), [(1, "D"), (2, "T")])
-def test_a_free_spectrum_without_an_end_is_refused(seed, criterion):
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(Plant(seed).text(criterion, "limits: {input_power: 1}\nspectrum: {type: free}")))
-    (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == ("needs-limits", "limits")
-    assert "at 0 rad/s" in found.message
-
-
 @pytest.mark.first(4)
 @pytest.mark.parametrize("criterion", "DAET")
 @pytest.mark.parametrize(
@@ -233,15 +224,6 @@ def test_what_is_only_approached_is_said_also_where_digits_end_on_the_way(monkey
     (told,) = caught.value.diagnostics
     assert told.code == "internal-disagreement"
     assert all(remedy in told.hint for remedy in ("cost.output_power", "limits.band", "ask for less"))
-
-
-@pytest.mark.slow
-def test_a_band_that_leaves_out_what_is_only_approached_has_an_optimum():
-    """It costs a little more than what no design gets below."""
-    bound = solve(parse_spec(APPROACHED)).result["objective"]["lower_bound"]
-    found = solve(parse_spec(APPROACHED + "limits: {band: [0.0314, 3.14159]}\n")).result
-    assert found["status"] == "optimal"
-    assert bound < found["cost"] < 1.001 * bound
 
 
 TWO_INPUTS = """

@@ -1,7 +1,6 @@
 """From a raw log to a model and a spec that solves, and verdicts on models by other data."""
 
 import json
-import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -52,7 +51,6 @@ def test_the_plant_of_a_log_is_found_and_trusted(run):
 
 def test_the_spec_that_is_written_solves_at_once(run):
     text = (run / "spec.yaml").read_text()
-    assert "#" in text
     spec = parse_spec(text, overrides=["signal=null", "spectrum.order=5"])
     assert {channel: one.name for channel, one in (spec.channels or {}).items()} == {
         "u1": "input",
@@ -81,10 +79,6 @@ def test_a_damping_above_one_is_said_as_two_lags(tmp_path):
 
 def test_the_model_is_judged_on_other_data(run, tmp_path):
     other = lag_log(tmp_path / "other.csv", seed=1)
-    command = ["explore", str(other), "--validate", str(run / "model.yaml"), "--no-output"]
-    told = CliRunner().invoke(app, command)
-    assert told.exit_code == 0, told.output
-    assert "simulation explains" in told.stdout
     judged = explore(other, model=load_spec(run / "model.yaml", design=False))
     validation = judged.results.result["validation"]
     _, u, y = np.loadtxt(other, delimiter=",", skiprows=1).T
@@ -102,35 +96,6 @@ def test_a_real_record_without_a_header_whose_times_jitter():
     assert found.results.result["validation"]["simulation_fit_percent"] > 90.0
     assert parse_spec(found.results.resolved_spec).sample_time == pytest.approx(1.0, abs=0.05)
     parse_spec(found.results.files["model.yaml"].decode(), design=False)
-
-
-@pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="the search does not settle: its last steps gain too little")
-def test_two_heaters_are_told_by_their_first_half(tmp_path):
-    """ARX models by least squares, orders and delays to 8, chosen on that half, reach 89.0 and 91.1 %."""
-    columns = {"u1": "Heater 1", "u2": "Heater 2", "y1": "Temperature 1", "y2": "Temperature 2"}
-    head, *rows = STEP.with_name("two_heaters.txt").read_text().splitlines()
-    for name, part in (("first", rows[:100]), ("second", rows[100:])):
-        (tmp_path / f"{name}.csv").write_text("\n".join([head, *part]))
-    found = explore(tmp_path / "first.csv", Preparation(columns=columns))
-    model = tmp_path / "model.yaml"
-    model.write_bytes(found.results.files["model.yaml"])
-    assert found.results.result["identification"]["converged"]
-    judged = explore(
-        tmp_path / "second.csv", Preparation(columns=columns), model=load_spec(model, design=False)
-    )
-    first, second = judged.results.result["validation"]["simulation_fit_percent"]
-    assert first > 89.0 - 2.0
-    assert second > 91.1 - 2.0
-
-
-@pytest.mark.slow
-def test_an_input_without_effect_earns_no_trust(tmp_path):
-    """The best of many structures explains 22 % of the noise of these 20 unseen samples."""
-    path = lag_log(tmp_path / "log.csv", gain=0.0, samples=50, seed=1)
-    told = CliRunner().invoke(app, ["explore", str(path), "--no-output"])
-    assert told.exit_code == 1, told.output
-    assert "no trust" in told.stdout
 
 
 @pytest.fixture
@@ -160,22 +125,6 @@ def test_an_integrator_earns_no_trust_until_somebody_says_that_it_is_one(integra
         assert theta["L"] < 0.2
     design = solve(parse_spec(stated.results.resolved_spec, overrides=["spectrum.lines=20"]))
     assert design.outcome.status == "optimal"
-
-
-@pytest.mark.parametrize(
-    ("text", "code"),
-    [
-        ("a,b\n1,2\n3,4\n", "data-missing-column"),
-        ("u,y\n" + "1,2\n" * 100, "constant-input"),
-        ("u,y\n" + "1,2\n2,1\n" * 5, "too-few-samples"),
-        ("time,u,y\n" + "".join(f"{9 - i},{i % 2},{i}\n" for i in range(9)), "data-not-uniform"),
-        ("u,y\n" + "nan,2\n" * 40, "data-not-a-number"),
-    ],
-)
-def test_logs_that_tell_nothing_are_refused(text, code, tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text(text)
-    assert code_of(explore, path, kind=DataError) == code
 
 
 @pytest.mark.parametrize("samples", [1, 2, 40])
@@ -209,38 +158,6 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
         assert code_of(read, path, kind=DataError) == "data-unreadable"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("head", "channels"),
-    [
-        ("Valve [%];Level (cm)", {"u1": ("Valve", "%"), "y1": ("Level", "cm")}),
-        ("u;y", {}),
-        (f"Valve;{'level ' * 8}", {"u1": ("Valve", None)}),
-    ],
-)
-def test_the_spec_calls_its_channels_as_the_log_does(head, channels, tmp_path):
-    log = lag_log(tmp_path / "log.csv", samples=120)
-    rows = log.read_text().replace(",", ";").split("\n", 1)[1]
-    log.write_text(f"time_min;{head}\n{rows}")
-    columns = dict(zip(("time", "u1", "y1"), ("1", "2", "3"), strict=True))
-    spec = parse_spec(explore(log, Preparation(columns=columns)).results.resolved_spec)
-    assert {name: (one.name, one.unit) for name, one in (spec.channels or {}).items()} == channels
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("inputs", [1, 2])
-def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
-    rng = np.random.default_rng(3)
-    u = 1e5 + np.repeat(rng.choice([0.0, 1.0, 5.0], (60, inputs), p=[0.6, 0.3, 0.1]), 5, axis=0)
-    y = scipy.signal.lfilter([0, 1], [1, -0.8], (u - 1e5).sum(axis=1)) + 0.1 * rng.standard_normal(300)
-    log = tmp_path / "log.csv"
-    head = [*(f"u{j + 1}" for j in range(inputs)), "y"]
-    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header=",".join(head), comments="", fmt="%.10g")
-    allowed = parse_spec(explore(log, Preparation(sample_time=1.0)).results.resolved_spec)
-    half, level = (np.atleast_1d(one) for one in (allowed.limits.amplitude.input, allowed.signal.offset))
-    np.testing.assert_allclose([level - half, level + half], [u.min(axis=0), u.max(axis=0)], atol=1e-4)
-
-
 @pytest.fixture(scope="module")
 def rows():
     """A lag of gain 2 and 6 samples with strong noise, in a loop with u = 0.8 (r - y)."""
@@ -257,23 +174,6 @@ def rows():
 def saved(path, rows, header):
     np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.10g")
     return path
-
-
-@pytest.mark.slow
-def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_path):
-    named = saved(tmp_path / "named.csv", rows, "u,y,SP")
-    plain = saved(tmp_path / "plain.csv", rows, "u,y,r")
-    by_name = explore([named], Preparation(columns={"r1": "SP"})).results
-    told = by_name.result["exploration"]["frequency_response"]
-    assert told["excitation"] == "r"
-    assert "caveat" not in told
-    table = by_name.tables["frequency_response"].columns
-    w, G = table["frequency_rad_per_s"], table["G_re"] + 1j * table["G_im"]
-    z, pole = np.exp(1j * w), np.exp(-1.0 / 6.0)
-    inside = np.abs(G - 2.0 * (1.0 - pole) / (z - pole)) <= table["radius"]
-    assert np.mean(inside) > 0.85
-    np.testing.assert_array_equal(read_log(plain, Preparation()).r, rows[:, 2:])
-    assert read_log(named, Preparation()).r is None
 
 
 @pytest.mark.slow
@@ -335,6 +235,15 @@ def test_what_another_spec_asks_for_is_kept():
     assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"
 
 
+@pytest.mark.parametrize(
+    ("head", "stated"), [("Valve [%]", ("Valve", "%")), ("u", None), ("level " * 8, None)]
+)
+def test_the_spec_calls_its_channels_as_the_log_does(head, stated):
+    log = SimpleNamespace(**{**vars(LOG), "names": {"u1": head, "y1": "y"}})
+    channels = parse_spec(spec_text(log, FOUND, [Path("a.csv")])).channels or {}
+    assert [(one.name, one.unit) for one in channels.values()] == ([stated] if stated else [])
+
+
 @pytest.mark.parametrize("loop", [False, True])
 @pytest.mark.parametrize("reasons", [(), ("the record\nis too short: see #3", "y wanders " * 30)])
 def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
@@ -343,6 +252,7 @@ def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
     doubted = "On a model that deserves no trust: " if reasons else ""
     assert spec.title == f'{doubted}The next experiment after title: "odd".csv'
     assert (spec.sample_time, spec.limits.input_power.max, spec.signal.offset) == (1e-5, 0.666667, 100001.0)
+    assert spec.limits.amplitude.input == 1.0  # half of the range of the log
     head = text.partition("\ntitle:")[0].splitlines()
     assert all(line.startswith("#") and len(line) <= 110 for line in head)
     words = " ".join(line.lstrip("# ") for line in head)
@@ -390,7 +300,6 @@ def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
     model = stored(tmp_path, MODEL.replace("0.2", "-0.2"))
     told = CliRunner().invoke(app, ["explore", str(log), "--validate", str(model), "--no-output"])
     assert told.exit_code == 1
-    assert "less than 5 % is nothing" in re.sub(r"\s+", " ", told.stdout)
     judged = explore(log, model=load_spec(model, design=False))
     assert judged.results.result["validation"]["reasons"] == list(judged.reasons)
     assert len(judged.reasons) == 1

@@ -9,9 +9,6 @@ import scipy.signal
 from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.other_systems import shared
-from inputdesign_cli.identification import identify as estimate
-from inputdesign_cli.identification.response_chance import perhaps_zero
-from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions import explore
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.records import Preparation
@@ -198,31 +195,6 @@ def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, write):
         assert "input-logged-late" not in codes(assess(spec, write({"u": moved, "y": y})).results)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("gain", "share"), [(0.0, 1.0), (1.0, 0.0)])
-def test_an_output_that_no_input_moves_is_told_from_one_that_some_moves(gain, share):
-    """By the statistic of Wald, at one in a thousand; the first of two inputs has the gain."""
-    ones = np.ones(1)
-    B = (np.array([0.0, 0.1]), np.array([0.0, 0.1]))
-    F = (np.array([1.0, -0.5]), np.array([1.0, -0.5]))
-    model = PolynomialModel((B,), (ones,), (F,), (ones,), (ones,), np.eye(1))
-    found = []
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        u, e = rng.standard_normal((300, 2)), rng.standard_normal((300, 1))
-        y = e + gain * scipy.signal.lfilter([0.0, 1.0], [1.0, -0.5], u[:, :1], axis=0)
-        one = estimate(model, u, y)
-        found.append(perhaps_zero(model.at(one.theta, one.noise), one))
-    assert np.mean([len(each) for each in found]) == share
-
-
-def test_the_same_input_applied_twice_counts_twice(write):
-    first, second = lag(3), lag(4)
-    second["y"] += scipy.signal.lfilter([0, 3.6], [1, -0.7], first["u"] - second["u"])
-    files = [write(first, "a.csv"), write({**second, "u": first["u"]}, "b.csv")]
-    assert assess(parse_spec(LAG), files).verdict == "met"
-
-
 def emptied(record, every):
     y = record["y"].copy()
     y[::every] = np.nan
@@ -255,9 +227,8 @@ def test_a_part_with_empty_cells_leaves_the_verdict_open(write):
     for name, copied in emptied(first, 25).items():
         second[name][200:400] = copied[100:300]
     judged = assess(parse_spec(LAG), [write(first, "a.csv"), write(second, "b.csv")])
-    (told,) = [one for one in judged.results.outcome.findings if one.code == "samples-repeated"]
     assert judged.verdict == "undecided"
-    assert "192 of 492 samples of b.csv" in told.message
+    assert "samples-repeated" in codes(judged.results)
 
 
 def test_rests_and_coarse_steps_come_again_by_themselves():

@@ -81,7 +81,6 @@ accuracy: {model_error: {relative: 0.1, band: [0.01, 3]}}
 def test_what_another_excitation_could_tell_is_not_called_impossible():
     told = refusals(lambda: solve(parse_spec(NEAR)), InaccurateError)[0]
     assert told.code == "numerically-singular"
-    assert "limits.band" in told.hint
     lines = ["limits={band: [0.01, 3.14]}", "spectrum={type: multisine, lines: 20}"]
     result = solve(parse_spec(NEAR, overrides=lines)).result
     assert result["status"] == "optimal"

@@ -27,10 +27,7 @@ def test_what_a_shortest_experiment_says_is_of_its_whole_samples():
     np.testing.assert_allclose(table["r_u"], r_u, rtol=1e-7)
     assert result["model_error"]["worst_ratio"] == pytest.approx((r_u / table["r_adm"]).max(), rel=1e-7)
     assert result["model_error"]["worst_ratio"] < 0.999
-    objective = result["objective"]
-    assert (objective["kind"], result["samples"]) == ("shortest_experiment", np.ceil(objective["value"]))
-    assert objective["lower_bound"] <= objective["value"]
-    assert result["signal"]["samples"] == result["samples"]
+    assert result["signal"]["samples"] == result["samples"] == np.ceil(result["objective"]["value"])
 
 
 @pytest.mark.parametrize("samples", [100, 1000])
@@ -98,18 +95,6 @@ def test_an_earlier_record_is_prior_information(tmp_path):
     assert free["cost"] == pytest.approx(0.5 * 0.1925467, rel=1e-2)
 
 
-def test_standard_deviations_are_reached():
-    result = run("accuracy: {standard_deviation: {b1: 0.01, f1: 0.002}}\n" + FIR)
-    sd = result["information"]["standard_deviation"]
-    assert sd["b1"] <= 0.01 * (1 + 1e-7)
-    assert sd["f1"] <= 0.002 * (1 + 1e-7)
-    assert max(sd["b1"] / 0.01, sd["f1"] / 0.002) == pytest.approx(1.0, abs=1e-6)
-    assert [r["name"] for r in result["requirements"]] == [
-        "standard_deviation of b1",
-        "standard_deviation of f1",
-    ]
-
-
 def test_information_target_by_name_in_any_order():
     by_name = run(
         "accuracy: {information: {matrix: [[1.0e+6, 0], [0, 1.0e+4]], parameters: [f1, b1]}}\n" + FIR
@@ -117,16 +102,6 @@ def test_information_target_by_name_in_any_order():
     M = np.asarray(by_name["information"]["matrix"])
     slack = np.linalg.eigvalsh(M - np.diag([1e4, 0.0, 1e6]))
     assert slack[0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_requirements_combine():
-    """Both hold, and together they cost at least as much as each alone."""
-    sd = "standard_deviation: {b1: 0.008}"
-    alone = run(f"accuracy: {{{sd}}}\n" + FIR)["cost"]
-    error = run(ERROR + FIR)["cost"]
-    both = run(f"accuracy: {{model_error: {{relative: 0.01, alpha: 2.45}}, {sd}}}\n" + FIR)
-    assert both["cost"] >= max(alone, error) * (1 - 1e-7)
-    assert all(r["worst_ratio"] <= 1 + 1e-7 for r in both["requirements"])
 
 
 def test_a_weight_in_s_is_sampled():
@@ -139,16 +114,6 @@ def test_a_weight_in_s_is_sampled():
         for weight in (continuous, discrete)
     ]
     assert costs[0] == pytest.approx(costs[1], rel=1e-9)
-
-
-def test_band_of_a_multisine():
-    result = run(ERROR + "spectrum: {type: multisine, lines: 60}\nlimits: {band: [0.3, 1.0]}\n")
-    frequencies = np.asarray(result["spectrum"]["frequencies"])
-    assert np.all((frequencies >= 0.3) & (frequencies <= 1.0))
-    free = run(ERROR + "spectrum: {type: free}\nlimits: {band: [0.3, 1.0]}\n")
-    assert free["cost"] <= result["cost"] * (1 + 1e-6)
-    assert free["cost"] > 0.1925467
-    assert np.min(free["spectrum"]["frequencies"]) >= 0.3 - 1e-12
 
 
 def test_density_limits_from_numbers_tables_and_filters(tmp_path):
@@ -235,12 +200,3 @@ def test_a_command_takes_a_spec_its_file_or_its_content(tmp_path):
     with pytest.raises(SpecError) as caught:
         solve(str(tmp_path / "other.yaml"))
     assert caught.value.diagnostics[0].code == "file-missing"
-
-
-def test_relative_criteria_do_not_depend_on_units():
-    """u measured in thousandths: b scales, relative A-optimality does not."""
-    accuracy = "accuracy: {criterion: A, scale: relative}\n"
-    plain = run(accuracy + "limits: {input_power: 1}\n" + FIR)
-    spec = PLANT.replace("3.6", "0.0036") + accuracy + "limits: {input_power: 1.0e+6}\n" + FIR
-    milli = solve(parse_spec(spec)).result
-    assert milli["objective"]["value"] == pytest.approx(plain["objective"]["value"], rel=1e-6)

@@ -38,13 +38,6 @@ def result(path, *overrides, verb=solve):
     return solved(path, *overrides, verb=verb).result
 
 
-def test_numbers_for_sweeps_are_plain():
-    moments = result(FREE)["moments"]
-    assert moments["entries"].keys() == {"R_1_1", "R_1_2", "R_2_2"}
-    assert all(isinstance(float(x), float) for x in moments["entries"].values())
-    assert moments["trace"] == pytest.approx((1 + np.sqrt(5)) / 2, rel=1e-14)
-
-
 def test_what_is_reported_adds_up():
     found = result(FIR, *FOUR)
     error, objective = found["mean_squared_error"], found["objective"]
@@ -129,13 +122,6 @@ def test_examples_2_and_3(path, mean):
     assert design["mse_standard_error"] == pytest.approx(np.sqrt(2) / 100, rel=0.1)
     assert abs(white["mse"] - white["theory"]["mse"]) < 4 * white["mse_standard_error"]
     assert white["energy"] == pytest.approx(design["energy"])
-
-
-def test_a_study_repeats_with_its_seed():
-    few = ("experiment.samples=50", "simulation.runs=20", "simulation.compare=[white, binary]")
-    one = result(FIR, *few, verb=simulate)["simulation"]
-    assert result(FIR, *few, verb=simulate)["simulation"] == one
-    assert result(FIR, *few, "simulation.seed=2", verb=simulate)["simulation"] != one
 
 
 def test_estimates_are_least_squares():

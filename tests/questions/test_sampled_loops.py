@@ -1,6 +1,5 @@
 """Plants in s under digital controllers, in polynomials and in the words of engineers."""
 
-import re
 import warnings
 
 import cvxpy as cp
@@ -12,7 +11,6 @@ import scipy.stats
 from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
-from tests.support.refusals import refusal
 
 MOTOR = "specs/motor_loop.yaml"
 GAIN = np.array([[2.0, -0.5], [0.0, 1.2]])
@@ -43,34 +41,6 @@ plant:
     denominator: {rows(np.stack([np.ones((2, 2)), DECAY], axis=-1))}
   sample: zoh
 {REST}"""
-FORGOTTEN = np.exp(-DECAY * STEP)
-POLYNOMIAL = f"""
-sample_time: {STEP}
-plant:
-  B: {rows(np.stack([np.zeros((2, 2)), GAIN / DECAY * (1 - FORGOTTEN)], axis=-1))}
-  F: {rows(np.stack([np.ones((2, 2)), -FORGOTTEN], axis=-1))}
-{REST}"""
-
-
-def designed(text, *overrides):
-    spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
-    return build_convex(spec).designed().design.result
-
-
-@pytest.mark.first(1)
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        ("spectrum={type: multisine, lines: 5}", "cost={output_power: 1}", "limits={input_power: 77.5}"),
-        ("accuracy={model_error: {sensitivity: {max_db: 6}}}",),
-    ],
-)
-def test_what_does_not_depend_on_coordinates_is_that_of_polynomials(overrides):
-    """r_u is that of the model, whichever way first-order entries are parametrised."""
-    held, polynomial = designed(HELD, *overrides), designed(POLYNOMIAL, *overrides)
-    assert held.gap < 1e-6
-    assert held.objective == pytest.approx(polynomial.objective, rel=2e-6)
-    assert held.information.shape == (6, 6)
 
 
 def test_a_limit_on_the_output_holds_for_the_record():
@@ -92,14 +62,6 @@ def test_a_limit_on_the_output_holds_for_the_record():
     assert entry["output_peak"][0] == pytest.approx(np.abs(y).max(), rel=1e-9)
     assert entry["input_power"][0] == pytest.approx(np.mean(u**2), rel=1e-9)
     assert entry["worst_ratio"] <= 1 + 1e-6
-
-
-def test_frequencies_of_complaints_are_in_the_unit_of_the_spec():
-    """The nominal loop peaks at 4.35 dB, at 9.54 rad/s."""
-    spec = load_spec(MOTOR, ["accuracy.model_error.sensitivity.max_db=4"])
-    told = refusal(lambda: build_convex(spec))
-    assert told.code == "admissible-not-positive"
-    assert float(re.search(r"([\d.]+) rad/s", told.message)[1]) == pytest.approx(9.54, abs=0.01)
 
 
 WORDED = """

@@ -73,16 +73,6 @@ def test_the_flexible_transmission_keeps_its_promise_on_its_model_only(flexible)
         assert simulation[name]["power"]["excitation"][0] == pytest.approx(designed, rel=1e-12)
 
 
-def test_every_input_to_compare_with_has_the_power_of_the_design():
-    compare = "simulation={runs: 12, compare: [white, prbs, multisine, binary]}"
-    result = simulated(FIRST, compare, "spectrum.order=3").result
-    inputs = result["simulation"]["inputs"]
-    assert set(inputs) == {"design", "white", "prbs", "multisine", "binary", "white_that_suffices"}
-    for name in ("white", "prbs", "multisine", "binary"):
-        assert inputs[name]["power"]["excitation"][0] == pytest.approx(result["power"]["excitation"][0])
-        assert 0.5 < np.mean(inputs[name]["covariance_eigenvalues"]) < 2.0
-
-
 PLANT = """
 plant: {B: [0, 1, 0.4], F: [1, -0.7]}
 noise: {variance: 0.5}
@@ -224,19 +214,6 @@ def test_a_loop_keeps_its_promise():
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
 
 
-@pytest.mark.slow
-def test_a_loop_around_a_held_plant_keeps_its_promise():
-    """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
-    true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
-    simulation = simulated(MOTOR, f"simulation={{runs: 80, {true}}}", "spectrum.order=8").result["simulation"]
-    within_wishart(simulation)
-    design = simulation["inputs"]["design"]
-    assert design["within_r_u_limits"][1] > 0.95
-    assert design["on_design_model"]["within_r_adm_limits"][1] > 0.95
-    mean = [design["mean_estimate"][name] for name in ("b0", "a1", "a0")]
-    np.testing.assert_allclose(mean, [2.2, 11, 20], rtol=0.01)
-
-
 def test_a_true_system_that_the_controller_does_not_hold_is_refused():
     plant = "{A: [[1, -1.1], [1, -0.6]], B: [[[0, -1.0, -0.4], [0, 0]], [[0, 0], [0, 1.2, -0.5]]]}"
     found = refusal(lambda: simulated(LOOP, f"simulation={{runs: 5, plant: {plant}}}"), SpecError)
@@ -275,15 +252,6 @@ def test_prior_information_narrows_the_estimates():
     prior = "experiment.prior={information: [[1.0e+5]], parameters: ['a1[1]']}"
     design = of_design(ARX, "spectrum={given: {type: white, power: 5}}", "simulation={runs: 150}", prior)
     assert all(0.8 < ratio < 1.2 for ratio in design["rms_over_theory"].values())
-
-
-def test_a_given_table_is_tried(write):
-    columns = {"frequency": [0.0, 3.1416], "phi_11": [9.0] * 2, "phi_12_re": [3.0] * 2}
-    table = write({**columns, "phi_12_im": [0.0] * 2, "phi_22": [4.0] * 2})
-    given = f"spectrum={{given: {{type: table, file: {table}}}}}"
-    simulation = simulated(ARX, given, "simulation={runs: 100}").result["simulation"]
-    within_wishart(simulation)
-    np.testing.assert_allclose(simulation["inputs"]["design"]["power"]["input"], [9.0, 4.0], rtol=0.01)
 
 
 @pytest.mark.first(1)
@@ -354,27 +322,3 @@ def test_the_design_reaches_the_cramer_rao_bound():
     ratios = np.array(list(simulation["inputs"]["design"]["rms_over_theory"].values()))
     # The error of one ratio of 500 runs is 3.2 %; the rms over ten parameters is within 5 %.
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
-
-
-def test_covariances_of_one_channel_lie_in_the_range_of_the_wishart_distribution():
-    overrides = ["simulation={runs: 150, seed: 2, compare: [white]}", "spectrum.order=5"]
-    result = simulate(load_spec(FIRST, overrides)).result
-    low, high = result["simulation"]["wishart_range"]
-    # Output power 1e3 times that of the noise: the linear theory holds, up to a few per cent of transients.
-    for entry in result["simulation"]["inputs"].values():
-        eigenvalues = np.array(entry["covariance_eigenvalues"])
-        assert 0.95 * low < eigenvalues.min()
-        assert eigenvalues.max() < 1.05 * high
-        assert entry["not_converged"] <= 0.01 * result["simulation"]["runs"]
-    inputs = result["simulation"]["inputs"]
-    assert inputs["white"]["within_r_adm"] < 0.9 < inputs["design"]["within_r_adm"]
-    assert inputs["white_that_suffices"]["within_r_adm"] > 0.9
-    assert "on_design_model" not in result["simulation"]["inputs"]["design"]
-
-
-@pytest.mark.slow
-def test_the_shipped_plant_in_s():
-    """r_u of the figure is that of bound.csv for one sample over the root of the length of the record."""
-    found = simulate(load_spec("specs/two_by_two.yaml", ["signal.samples=1024", "simulation.runs=2"]))
-    for panel, bound in zip(found.curves["errors_design"].panels, found.curves["bound"].panels, strict=True):
-        np.testing.assert_allclose(panel.r_u, bound.r_u / np.sqrt(1024), rtol=1e-9)

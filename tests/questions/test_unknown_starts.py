@@ -69,12 +69,6 @@ def test_a_level_that_an_integrator_keeps():
     assert done.result["signal"]["begun_anywhere"] == expected
 
 
-def test_a_plant_that_forgets_its_start_has_no_note():
-    done, notes = told(SETTLED)
-    assert notes == []
-    assert "begun_anywhere" not in done.result["signal"]
-
-
 def test_an_unknown_start_costs_what_its_information_shows():
     task = build_convex(parse_spec(SETTLED))
     record, nominal = task.delivered().record, task.simulation.nominal

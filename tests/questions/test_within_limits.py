@@ -128,32 +128,6 @@ spectrum: {type: fir, order: 20}
 """
 
 
-@pytest.mark.first(1)
-@pytest.mark.parametrize("amplitude", [5.0, 3.5])
-def test_a_peak_limits_the_power_of_the_design(amplitude):
-    """Without the limit implied, input power of 24 to 27 left no record of this length."""
-    found = solve(parse_spec(DEAR_OUTPUT % f"amplitude: {amplitude}"))
-    u = np.array(found.tables["signal"].columns["u1"])
-    assert found.result["power"]["input"][0] <= amplitude**2 * (1 + 1e-9)
-    assert np.abs(u).max() <= amplitude
-    assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
-
-
-def test_the_peak_is_the_limit_that_its_square_is():
-    """D-optimal for a peak of two: the same design as for a power of four."""
-    asked = (
-        DEAR_OUTPUT.replace("cost: {output_power: 1}\n", "")
-        .replace("model_error: {relative: 0.25, band: [0.001, 0.2]}", "criterion: D")
-        .replace("order: 20}", "order: 8}\nsolver: {any_spectrum: false}")
-    )
-    peak = solve(parse_spec(asked % "amplitude: 2")).result
-    power = solve(parse_spec(asked % "input_power: 4")).result
-    assert peak["objective"]["value"] == pytest.approx(power["objective"]["value"], abs=1e-7)
-    assert peak["objective"]["upper_bound"] == pytest.approx(power["objective"]["upper_bound"], abs=1e-7)
-    assert [limit["name"] for limit in peak["limits"]] == ["amplitude.input"]
-    assert peak["limits"][0]["max"] == 4.0
-
-
 def test_a_power_below_the_least_is_a_proof():
     least = solve(parse_spec(DEAR_OUTPUT.replace("output_power: 1", "input_power: 1") % "samples: 720"))
     least = least.result["objective"]["value"]
@@ -309,16 +283,3 @@ def test_contradictory_limits():
     limits = "limits: {input_power: 0.3, output_power: {min: 300}}\n"
     diagnostic = refused(PLANT + ERROR + FIR + limits, "contradictory-limits")
     assert all(power in diagnostic.message for power in ("output_power", "input_power"))
-
-
-def test_what_only_noise_tells_is_out_of_reach_of_any_power():
-    """Of y = G u + (1 - 0.5 q^-1) e the variance of c1 is (1 - 0.5^2) / N, whatever u is."""
-    spec = parse_spec(
-        "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.5], variance: 1.0}\n"
-        "experiment: {samples: 500}\naccuracy: {standard_deviation: {c1: 0.01}}\n"
-        "spectrum: {type: fir, order: 3}\n"
-    )
-    diagnostic = refusal(lambda: solve(spec), InfeasibleError)
-    ratio = np.sqrt((1 - 0.25) / 500) / 0.01
-    assert f"{ratio:.6g} times what is asked" in diagnostic.message
-    assert f"{ratio**2:.4g} times as many samples" in diagnostic.hint

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from inputdesign_cli.questions.campaign.acceptance import copied, matched, standing_in
+from inputdesign_cli.questions.campaign.acceptance import matched, standing_in
 
 PLANS = {"white": ([1.0], [1.0]), "slow": ([1.0], [1.0, -0.8]), "resonant": ([1.0], [1.0, -1.6, 0.94])}
 LENGTHS = (30, 120)
@@ -138,12 +138,3 @@ def test_columns_of_a_static_plant_are_not_taken_for_swapped(kind, name):
         found = standing_in(plan[:, None], 3.0 * lfilter([0.0, 1.0], [1.0, -0.5], u)[:, None], {"y1": u})
         swapped += found is not None and found[:2] == (1, "y1")
     assert swapped >= 19 or name not in ("as planned", "rounded", "with an offset")
-
-
-def test_a_copy_is_told_from_a_response():
-    rng = np.random.default_rng(1)
-    u = rng.standard_normal(60)
-    assert copied(u, u)
-    assert copied(np.round(-3.0 * u + 40.0, 5), u)
-    assert not copied(u + 1e-3 * rng.standard_normal(60), u)
-    assert not copied(np.zeros(60), u)

