@@ -21,6 +21,9 @@ accuracy: {model_error: {%s, confidence: CONFIDENCE}}
 %s
 """
 FIR = BASE % ("B: [1.0, -0.4, 0.2]", 1, 400, "absolute: 0.1", "spectrum: {type: fir, order: 4}")
+
+
+GAIN = BASE % ("B: [1.0]", 1, 200, "absolute: 0.1", "signal: {type: binary}")
 POLE = BASE % ("B: [0, 1], F: [1, -0.9]", 1, 60, "relative: 0.3, band: [0.01, 1]", "spectrum: {type: white}")
 TWO = BASE % (
     "B: [[[0.5], [0.2]], [[0.1], [0.8]]]",
@@ -101,6 +104,16 @@ def test_it_says_when_there_is_none():
         code_of(settled_alpha, lambda alpha: 2.0 * alpha, 1.0, kind=InaccurateError)
         == "confidence-not-settled"
     )
+
+
+@pytest.mark.slow
+def test_estimates_that_are_normal_at_every_length_need_no_correction():
+    """A gain and a signal of two levels: least squares is normal with variance 1 / (N p) whatever N."""
+    told = solve(spec(GAIN, "{exact: 0.95, draws: 1000, runs: 1000}", "spectrum={type: white}")).result
+    error = told["model_error"]
+    assert error["confidence"]["excess"] == pytest.approx(1.0, abs=0.13)  # 3 standard errors
+    assert error["alpha"] == pytest.approx(scipy.stats.norm.ppf(0.975), rel=0.1)
+    assert error["confidence"]["kept"] == pytest.approx(0.95, abs=0.025)
 
 
 @pytest.mark.slow

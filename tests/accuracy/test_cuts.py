@@ -113,6 +113,16 @@ def test_proofs_hold_whatever_the_multipliers(name, way, rng):
 
 
 @pytest.mark.parametrize("name", CUTS)
+def test_proofs_are_tight_at_the_optimum(name, rng):
+    """With the solver's own multipliers the inequality is an equality: strong duality."""
+    cut, _ = CUTS[name]
+    M = random_matrix(rng)
+    scale, multipliers = least_scale(cut, M)
+    Y, r = cut.proof(list(multipliers))
+    assert np.sum(Y * M) * scale == pytest.approx(r, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", CUTS)
 def test_moved_cuts_describe_the_same_set(name, rng):
     cut, _ = CUTS[name]
     M, congruence = random_matrix(rng), rng.normal(size=(K, K))

@@ -62,6 +62,16 @@ def test_error_bound_is_the_definition(model, entry):
     np.testing.assert_allclose(requirement.ratios(M, w), expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize("frequency", [0.0, 0.4, 2.0])
+def test_cut_is_equivalent_to_the_bound(first_order, frequency):
+    """M >= V V^T exactly when r_u <= r_adm: scaled to ratio one, the cut is singular."""
+    requirement = first_order_error(first_order, Relative(first_order.model, 0.01), 2.45)
+    M = information(3, 2)
+    ratio = requirement.ratios(M, np.array([frequency]))[0]
+    slack = np.linalg.eigvalsh(M * ratio**2 - requirement.cut(frequency).matrix)
+    assert abs(slack[0]) < 1e-9 * slack[-1]
+
+
 def test_error_bound_predicts_monte_carlo_of_the_first_order_expansion(first_order):
     """95 % of Gaussian theta lie within alpha = 2.4477 in the plant's two parameters, so |dG| <= r_u."""
     rng = np.random.default_rng(5)
@@ -194,6 +204,21 @@ def test_ellipsoid_bound_holds_on_the_ellipsoid_and_is_attained(model, against):
         error = np.abs(G - G0) / (np.abs(G) * 0.3 if against == "relative" else 0.4)
         assert error.max() <= 1 + 1e-9
         assert error.max() >= 0.97
+
+
+def test_ellipsoid_bound_is_the_first_order_one_in_the_limit():
+    """For a vanishing ellipsoid the linearisation is exact."""
+    model = MODELS[0]
+    experiment = Experiment(model, 500)
+    M = information(3, 9)
+    w = np.linspace(0.0, np.pi, 50)
+    exact, linear = (
+        kind(
+            experiment=experiment, band=BAND, entry=(0, 0), admissible=Relative(model, 1e-5), alpha=2.0
+        ).ratios(M, w)
+        for kind in (EllipsoidError, ModelError)
+    )
+    np.testing.assert_allclose(exact, linear, rtol=1e-4)
 
 
 @pytest.mark.parametrize(

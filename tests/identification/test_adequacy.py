@@ -121,6 +121,30 @@ def test_of_several_channels_it_names_those_that_fail():
     assert (test.output, test.source, test.lag) == (0, 1, 1)
 
 
+def test_a_drift_is_found():
+    u, y = data("oe", 600, np.random.default_rng(5))
+    found = identify(SYSTEMS["oe"], u[0], y[0] + np.linspace(0.0, 1.5, 600)[:, None])
+    assert [test.fault for test in found.tests.failed][-1] == "drift"
+
+
+@pytest.mark.slow
+def test_a_dead_time_at_zero_hides_nothing():
+    """The samples would have it negative, and the tests are those of the plant without a dead time.
+
+    Of a lag behind a hold a dead time makes q^-1 to q^-1 + b q^-2 with b > 0; here b is negative.
+    """
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal((400, 1))
+    y = scipy.signal.lfilter([0, 1, -0.4], [1, -0.7], u, axis=0) + 0.3 * rng.standard_normal((400, 1))
+    plain, late = lag_of([1.0], [1.0, 0.5]), lag_of([1.0], [1.0, 0.5], 0.3)
+    known = identify(SampledModel(plain, 1.0), u, y, start=plain.theta)
+    found = identify(SampledModel(late, 1.0), u, y, start=late.theta)
+    assert found.theta[late.names.index("delay")] < 1e-6
+    for name, test in by_name(known).items():
+        assert by_name(found)[name].statistic == pytest.approx(test.statistic, rel=1e-3)
+    assert by_name(found)["recent_inputs"].probability < 1e-12
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("pole", [1.0, 1.05, 1.2])
 def test_the_right_model_of_a_plant_that_only_its_loop_holds_is_not_refuted(pole):

@@ -111,6 +111,20 @@ def test_it_names_what_is_missing(B, F, first):
     assert first in [one.phrase.removeprefix("one more ") for one in strongest.alternatives]
 
 
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_dead_time_in_s_is_found(hold):
+    rng = np.random.default_rng(6)
+    u = rng.standard_normal((400, 1))
+    truth, model = lag_of([1.0], [1.0, 0.5], 0.3), lag_of([1.0], [1.0, 0.5])
+    if hold:
+        truth, model = SampledModel(truth, 0.4), SampledModel(model, 0.4)
+    y = truth.simulate(u, 0 * u, 0.4)[0] + 0.1 * rng.standard_normal((400, 1))
+    found = identify(model, u, y, 0.4)
+    test = next(one for one in found.tests.directed if "delay" in one.test.name)
+    assert test.test in found.tests.failed
+    assert test.larger.theta[test.larger.names.index("delay")] == pytest.approx(0.3, abs=0.05)
+
+
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 
 

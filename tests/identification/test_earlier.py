@@ -8,7 +8,8 @@ from inputdesign_cli.identification import Earlier, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant import Intersample, PolynomialModel
+from tests.support.plants import lag_of
 from tests.support.records import arx_regressors, shifted, simulated
 
 ARX = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.2, 0.5], variance=0.3)
@@ -36,6 +37,28 @@ def test_arx_with_known_noise_is_ridge_regression():
     statistic = (alone - earlier.theta) @ np.linalg.solve(both, alone - earlier.theta)
     differing = earlier.agreement(point.theta, np.linalg.cholesky(information))
     assert differing == pytest.approx(scipy.stats.chi2.sf(statistic, 4), rel=1e-6)
+
+
+def in_s(rng):
+    model = lag_of([2.0], [1.0, 0.8, 1.0])
+    u = rng.standard_normal((2, 800, 1))
+    y = np.array([model.driven(x, Intersample(0.4, hold=False)) for x in u])
+    return model, u, y + 0.3 * rng.standard_normal(y.shape)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "made", [in_s, lambda rng: (JENKINS, *simulated(JENKINS, 1500, rng, runs=2))], ids=["s", "q"]
+)
+def test_one_record_after_the_other_is_both_at_once_in_the_limit(made):
+    model, u, y = made(np.random.default_rng(3))
+    first = identify(model, u[0], y[0], 0.4, rest=True)
+    then = identify(model, u[1], y[1], 0.4, rest=True, earlier=of(first))
+    both = np.concatenate(u), np.concatenate(y)
+    joint = identify(model, *both, 0.4, rest=True, lengths=[len(u[0])] * 2)
+    deviation = np.sqrt(np.diag(joint.covariance))
+    assert np.all(np.abs(then.theta - joint.theta) < 0.15 * deviation)
+    np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)
 
 
 def test_knowing_nothing_changes_nothing():

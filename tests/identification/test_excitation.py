@@ -47,6 +47,25 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
 
 
+@pytest.mark.slow
+@settings(max_examples=2, deadline=None)
+@given(of_u=DECADES, of_y=DECADES)
+@pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_units_of_signals_change_no_answer(rest, of_u, of_y):
+    # With a level to be estimated a root of C at 0.98 runs to the circle in 400 samples: no minimum there.
+    of_noise = np.array([name == "c1" for name in SLOW.names])
+    model = SLOW if rest else SLOW.at(np.where(of_noise, -0.5, SLOW.theta))
+    u, y = simulated(model, 400, np.random.default_rng(4))
+    one = identify(model, u[0], y[0], start=model.theta, rest=rest)
+    assert one.search.converged
+    scale = np.where([name[0] == "b" for name in one.names], 10.0 ** (of_y - of_u), 1.0)
+    other = identify(model, 10.0**of_u * u[0], 10.0**of_y * y[0], start=scale * model.theta, rest=rest)
+    deviation = np.sqrt(np.diag(one.covariance))
+    np.testing.assert_allclose(other.theta / scale, one.theta, atol=1e-3 * deviation.min())
+    np.testing.assert_allclose(np.sqrt(np.diag(other.covariance)) / scale, deviation, rtol=1e-3)
+    assert [test.name for test in other.tests.failed] == [test.name for test in one.tests.failed]
+
+
 @settings(max_examples=2, deadline=None)
 @given(of_time=st.integers(-4, 4), of_y=DECADES)
 @pytest.mark.first(1)

@@ -46,6 +46,25 @@ def test_mean_and_variance_at_lines_are_those_of_theory():
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
 
 
+@pytest.mark.slow
+def test_white_noise_in_gives_the_plant_within_its_discs():
+    errors, inside = [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal(1000)
+        y = scipy.signal.lfilter(B, F, u) + 0.5 * scipy.signal.lfilter(
+            [1], [1, -0.5], rng.standard_normal(1000)
+        )
+        # a record cut out of a longer one: its start is unknown
+        found = frequency_response(u[500:, None], y[500:, None])
+        assert found.method == "local_polynomial"
+        errors.append(found.G[:, 0, 0] - plant(found.frequency))
+        inside.append(np.abs(errors[-1]) < found.radius[:, 0, 0])
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+    mean, deviation = np.mean(errors, axis=0), np.std(errors, axis=0)
+    assert np.mean(np.abs(mean) ** 2 / (deviation**2 / 20)) == pytest.approx(1.0, abs=0.35)
+
+
 @pytest.mark.parametrize("periodic", [False, True])
 def test_noise_and_coherence_are_those_of_theory(periodic):
     """White noise of variance v has the spectrum v; the coherence is |G|^2 / (|G|^2 + v) of a white input."""

@@ -77,6 +77,18 @@ def test_it_is_that_of_the_covariance_of_all_samples(model, free, lengths):
     assert found == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_its_slope_is_that_of_differences(model, free):
+    """At errors that no parameter changes much the slope of Gauss and Newton is exact to first order."""
+    rng = np.random.default_rng(4)
+    parts = [(rng.standard_normal(n), rng.standard_normal(n)) for n in (N, 30)]
+    _, records, point = ours(model, parts, free=free)
+    for k, step in enumerate(1e-6 * np.eye(model.theta.size)):
+        ends = [evaluate(records, model.theta + sign * step).cost for sign in (1.0, -1.0)]
+        assert -2.0 * point.slope[k] == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-5)
+
+
 def test_a_known_pole_on_the_circle_leaves_a_regression_of_differences():
     """y = b u(t - 1) + noise that is a sum: where it began is unknown, of its steps nothing is."""
     rng = np.random.default_rng(5)

@@ -17,7 +17,7 @@ from inputdesign_cli.specification.models.fields import check_delay_stable
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx, box_jenkins, stated
-from tests.support.records import shifted, simulated
+from tests.support.records import check_record, shifted, simulated
 from tests.support.refusals import refused
 
 
@@ -115,6 +115,11 @@ def test_a_new_kind_of_model_brings_its_estimator():
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize("model", SYSTEMS.values(), ids=SYSTEMS)
+def test_prediction_errors_at_the_truth_are_the_noise(model):
+    check_record(model, 80)
+
+
 @pytest.mark.parametrize("name", ["armax", "oe", "bj"])
 def test_a_batch_finds_what_a_plain_optimiser_finds(name):
     model = SYSTEMS[name]
@@ -153,6 +158,24 @@ def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
 
 
 MODELS = {"common": arx(per_output=False), "bj": SYSTEMS["bj"], "two bj": box_jenkins(), "two arx": arx()}
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_known_parameters_are_recovered_without_a_start(model):
+    u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))
+    found = identify(model, u, y)
+    assert found.search.converged
+    off, k = found.theta - model.theta, len(found.names)
+    # Mahalanobis distance: chi-squared with k degrees of freedom.
+    assert off @ np.linalg.solve(found.covariance, off) < k + 6 * np.sqrt(2 * k)
+    np.testing.assert_allclose(found.noise, model.covariance, atol=0.15 * model.covariance.max())
+    assert found.tests.whiteness.probability > 1e-3
+    assert found.tests.independence.probability > 1e-3
+    expected = theory(model, 3000)
+    np.testing.assert_allclose(found.information, expected, atol=0.15 * expected.max())
+
+
 MODELS |= SYSTEMS
 
 

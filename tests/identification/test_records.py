@@ -77,6 +77,24 @@ def test_lines_in_the_outputs_leave_nothing_where_they_may_drift(name):
     assert np.abs(replace(records, parts=lined, ramp=False).at(theta).errors - plain.errors).max() > 0.1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["arx", pytest.param("bj", marks=pytest.mark.slow)])
+def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(name):
+    """The mean square of the error in units of its covariance is k, over 15 pairs of records."""
+    model, rng = SYSTEMS[name], np.random.default_rng(6)
+    squares = []
+    for _ in range(15):
+        u, y = (x[0] for x in data(name, 700, rng))
+        u, y = u[100:], y[100:] + np.repeat([[3.0], [-8.0]], 300, axis=0)
+        found = identify(model, u, y, lengths=(300, 300))
+        assert found.search.converged
+        assert found.start.free
+        off = found.theta - model.theta
+        squares.append(off @ found.information @ off)
+    k = model.theta.size
+    assert np.mean(squares) == pytest.approx(k, abs=5 * np.sqrt(2 * k / 15))
+
+
 @pytest.mark.parametrize("runs", [1, 2])
 def test_arx_from_rest_is_stacked_least_squares(runs):
     u, y = (x[..., 0] for x in data("arx", 200, np.random.default_rng(8), runs=runs))
@@ -139,6 +157,18 @@ def test_of_arx_it_is_the_test_of_wald():
     apart = estimates[0] - estimates[1]
     statistic = apart @ np.linalg.solve(sum(variances), apart)
     assert found.tests.alike == pytest.approx([scipy.stats.chi2.sf(statistic, 4)] * 2, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_of_one_system_the_probability_is_uniform():
+    model = one_channel([0, 1.0, 0.5], F=[1, -1.5, 0.7])
+    found = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal((2, 250))
+        y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u) + rng.standard_normal((2, 250))
+        found.append(jointly(*zip(u, y, strict=True), model=model).tests.alike[0])
+    assert scipy.stats.kstest(found, "uniform").pvalue > 1e-3
 
 
 @pytest.mark.first(4)

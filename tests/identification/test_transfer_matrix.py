@@ -1,17 +1,24 @@
 """Transfer matrices in s from samples: simulation, gradients, estimates and their covariance."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.optimize
 import scipy.signal
 
+from inputdesign_cli import load_spec, solve
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from tests.support.plants import descending, two_by_two
 
 STEP = 0.4
+
+
+SPECS = Path(__file__).parents[2] / "specs"
 
 
 def plant(numerator, denominator, *, common=False):
@@ -121,6 +128,41 @@ def test_the_gradient_is_a_difference_quotient(name, hold):
         np.testing.assert_allclose(psi[index], expected, atol=1e-7 * max(np.abs(expected).max(), 1.0))
 
 
+@HOLDS
+@pytest.mark.parametrize("name", PLANTS)
+def test_data_without_noise_return_the_parameters(name, hold):
+    model = PLANTS[name]
+    u = excitation(300, model.inputs, np.random.default_rng(5))
+    y = model.driven(u, Intersample(STEP, hold))
+    found = fit_batch(as_sampled(model, hold), u, y[None], STEP, start=1.15 * model.theta)
+    assert np.all(found.converged)
+    np.testing.assert_allclose(found.theta[0], model.theta, atol=1e-8)
+
+
+@pytest.mark.first(2)
+@HOLDS
+@pytest.mark.parametrize(
+    "name", [name if name == "one channel" else pytest.param(name, marks=pytest.mark.slow) for name in PLANTS]
+)
+def test_parameters_are_found_without_a_start(name, hold):
+    model = PLANTS[name]
+    rng = np.random.default_rng(6)
+    u = excitation(600, model.inputs, rng)
+    y, truth = noisy(model, u, rng, hold=hold, level=0.2)
+    # The numbers of the structure are not used.
+    anything = model.at(np.ones(model.theta.size))
+    found = identify(as_sampled(anything, hold), u, y, STEP)
+    assert found.search.converged
+    assert found.names == model.names
+    off = found.theta - model.theta
+    # Mahalanobis distance: chi-squared with k degrees of freedom.
+    assert off @ found.information @ off < off.size + 4 * np.sqrt(2 * off.size)
+    np.testing.assert_allclose(found.noise, truth.covariance, atol=0.2 * truth.covariance.max())
+    assert min(found.simulation.fit) > 75.0
+    assert found.tests.whiteness.probability > 1e-3
+    assert found.tests.independence.probability > 1e-3
+
+
 def test_one_channel_has_the_estimate_of_a_plain_optimiser():
     model = PLANTS["one channel"]
     rng = np.random.default_rng(7)
@@ -177,3 +219,33 @@ def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
     y = np.cumsum(u, axis=0) ** 1.2 + rng.normal(size=(400, 1))
     found = fit_batch(as_sampled(model, True), u, y[None], STEP, start=[1.0, 0.05])
     assert not found.converged[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("criterion", "level", "covariance"),
+    [("D", 0.1, None), ("D", 0.5, 0.9), ("E", 0.1, None), ("E", 0.1, 0.9)],
+)
+@HOLDS
+def test_designed_records_reach_the_cramer_rao_bound(criterion, level, covariance, hold):
+    """Spectral design paper: noise of a tenth of the outputs, the estimate begun at the nominal plant."""
+    spec = load_spec(
+        SPECS / "two_by_two.yaml",
+        [f"accuracy.criterion={criterion}", "signal.samples=2000", f"sample_time={STEP}"],
+    )
+    columns = solve(spec).tables["signal"].columns
+    u = np.column_stack([columns["u1"], columns["u2"]])
+    full = None if covariance is None else np.array([[1.0, covariance], [covariance, 1.0]])
+    rng = np.random.default_rng(16)
+    y, truth = noisy(actual(), u, rng, hold=hold, level=level, covariance=full, runs=300)
+    found = fit_batch(as_sampled(two_by_two(), hold), u, y, STEP, start=two_by_two().theta)
+    assert np.all(found.converged)
+    experiment = Experiment(as_sampled(truth, hold), len(u))
+    information, off = FiniteRecord(experiment, len(u), STEP).information(u), found.theta - truth.theta
+    bound = np.sqrt(np.diag(np.linalg.inv(information)))
+    assert 0.9 < np.median(np.sqrt(np.mean(off**2, axis=0)) / bound) < 1.2
+    overall = np.sqrt(np.mean((off @ np.linalg.cholesky(information)) ** 2))
+    assert overall == pytest.approx(1.0, abs=0.05)
+    eigenvalues = whitened_eigenvalues(found.theta, information)
+    low, high = wishart_range(12, 300, np.random.default_rng(18))
+    assert low < eigenvalues.min() <= eigenvalues.max() < high

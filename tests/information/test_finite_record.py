@@ -43,6 +43,14 @@ def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
         np.testing.assert_allclose(found[:, k], difference, rtol=1e-4, atol=1e-6 * np.abs(found).max())
 
 
+def test_record_information_tends_to_that_of_the_spectrum(first_order):
+    """A long white record of power two has the information of the spectrum to a few per cent."""
+    N = 100_000
+    experiment = dataclasses.replace(first_order, samples=N).whitened(2.0)
+    record = np.sqrt(2.0) * np.random.default_rng(0).standard_normal(N)
+    np.testing.assert_allclose(FiniteRecord(experiment, N).information(record[:, None]), np.eye(3), atol=0.03)
+
+
 def test_information_of_a_record_is_that_of_simulated_regressors():
     """For ARX the gradient of the prediction is the regressor itself, filtered by nothing."""
     model = arx()

@@ -237,6 +237,14 @@ def test_losses_with_zeros_outside_agree_with_theory(name):
     assert found.loss.mean() == pytest.approx(found.exact.mean(), rel=0.03)
 
 
+def test_least_squares_without_noise_is_exact():
+    plant = arx(random_plant(np.random.default_rng(0), 2))
+    u = np.random.default_rng(1).standard_normal((3, 400, 2))
+    y = [sum(scipy.signal.lfilter(plant.B[i][j], plant.A[i], u[..., j]) for j in range(2)) for i in range(2)]
+    theta = least_squares(plant, u, np.stack(y, axis=-1))
+    np.testing.assert_allclose(theta, np.broadcast_to(plant.theta, theta.shape), atol=1e-9)
+
+
 def test_least_squares_is_weighted_with_the_noise():
     """Against the normal equations written out for one run with correlated noise and a common A."""
     covariance = np.array([[1.0, 0.6], [0.6, 2.0]])
@@ -249,6 +257,19 @@ def test_least_squares_is_weighted_with_the_noise():
     np.testing.assert_allclose(
         least_squares(plant, u[None], y[None])[0], np.linalg.solve(normal, rhs), rtol=1e-9
     )
+
+
+def test_the_loss_of_the_column_agrees_with_theory():
+    problem = column()
+    samples, runs = 4000, 150
+    found = study_losses(problem, {"white": even_lines(samples)}, samples=samples, runs=runs, seed=0)["white"]
+    assert found.unstable == 0
+    error = found.loss.std(ddof=1) / np.sqrt(runs)
+    assert found.loss.mean() == pytest.approx(0.002835, abs=4 * error)
+    # Each run's sample average lies near its exact H2 norm, run by run.
+    assert np.corrcoef(found.loss, found.exact)[0, 1] > 0.99
+    assert found.exact.mean() == pytest.approx(found.loss.mean(), rel=0.03)
+    np.testing.assert_allclose(found.power, 1.0, rtol=0.02)
 
 
 def test_a_study_is_repeatable_and_treats_inputs_alike():

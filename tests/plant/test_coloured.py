@@ -16,7 +16,7 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.plants import arrays, box_jenkins, in_words, known, lag_of, process
-from tests.support.records import check_record
+from tests.support.records import check_estimate, check_record
 
 W = np.concatenate([np.geomspace(1e-3, 0.1, 10), np.linspace(0.1, np.pi, 20)])
 C, D = np.array([1.0, 0.5, 0.2]), np.array([1.0, -0.7])
@@ -100,6 +100,29 @@ def test_each_output_has_its_own_drift_and_filters():
 
 def heater():
     return SampledModel(lag_of([2.0], [3.0, 1], 1.685, variance=0.01), 0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "noise",
+    [{"C": (C,), "D": (D,)}, {"drift": (True,)}, {"C": (np.array([1.0, -0.4]),), "drift": (True,)}],
+    ids=["ARMA", "random walk", "IMA"],
+)
+@pytest.mark.parametrize("feedback", [False, True])
+def test_estimates_with_coloured_and_drifting_noise(noise, feedback):
+    """Within four standard deviations of the truth from afar, in open loop and in a loop."""
+    model = Coloured(heater(), **noise)
+    rng = np.random.default_rng(7)
+    r = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
+    e = 0.1 * rng.standard_normal((800, 1))
+    if feedback:
+        loop = close_loop(model, TransferMatrix.build([[[0.4, -0.35]]], [[[1, -1]]]))
+        loop.check_stability()
+        y, u = (x[0] for x in loop.signals(r[None], e[None]))
+    else:
+        u, y = r, sum(model.simulate(r, e, 1.0))
+    far = model.theta * np.where(np.array(model.names) == "delay", 2.0, 0.5)
+    assert check_estimate(model, u, y, far, feedback=feedback, rest=True).tests.failed == ()
 
 
 def test_a_root_on_the_circle_may_be_known():

@@ -11,6 +11,7 @@ import scipy.signal
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.least_cost.build import build_convex
+from inputdesign_cli.signal.prbs import pseudo_random
 from tests.support.refusals import refusals
 
 B, F = 1.2, -0.6
@@ -45,6 +46,21 @@ def ratio(u, relative=0.2):
     parts = np.stack([slopes.real, slopes.imag], axis=1)
     spread = np.linalg.eigvalsh(parts @ covariance @ parts.transpose(0, 2, 1))[:, -1]
     return float(np.max(3 * np.sqrt(spread) / (relative * np.abs(B * q / (1 + F * q)))))
+
+
+def test_the_record_is_as_near_to_the_bound_as_stated_and_beats_every_pseudo_random_sequence():
+    results = solve(asked())
+    objective, signal, u = results.result["objective"], results.result["signal"], results.signal[:, 0]
+    assert set(np.abs(u)) == {1.0}
+    assert ratio(u) == pytest.approx(signal["worst_ratio"], rel=1e-4)
+    assert objective["any_spectrum_bound"] < objective["any_record_bound"] < signal["worst_ratio"]
+    further = signal["worst_ratio"] / objective["any_record_bound"] - 1
+    assert signal["distance_to_best"] == pytest.approx(further, abs=1e-9)
+    assert further < 0.08
+    rng = np.random.default_rng(1)
+    for clock, bits in product((1, 2, 3, 4, 6), range(2, 7)):
+        sequence = np.repeat(pseudo_random(bits, 60, rng), clock)[:60]
+        assert signal["worst_ratio"] <= ratio(sequence) * (1 + 1e-6)
 
 
 def test_a_record_of_few_held_values_is_the_best_of_all():

@@ -6,6 +6,7 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.spectrum import FirBasis, PolynomialBasis
@@ -70,6 +71,15 @@ def test_one_input_and_a_polynomial_keep_to_their_bounds():
     assert 1.15 * (1 - 1e-3) < phi.max() <= 1.15 * (1 + 1e-6)
 
 
+@pytest.mark.slow
+def test_what_white_excitation_at_the_bound_misses_every_spectrum_below_it_misses():
+    """Phi <= level I has no more information than white excitation of that level."""
+    asked = ARX + "accuracy: {model_error: {relative: 0.05}}\nspectrum: {type: fir, order: 2}\n"
+    level = designed(asked).white_power / 2
+    with pytest.raises(InfeasibleError):
+        designed(asked, f"limits.spectrum={0.99 * level}")
+
+
 @pytest.mark.parametrize(
     "basis",
     [FirBasis(1, 4), FirBasis(2, 3), PolynomialBasis(2, 3), PolynomialBasis(3, 2, (0.5, 2.0), True)],
@@ -83,3 +93,14 @@ def test_a_directed_functional_is_the_density_along_that_direction(basis):
     v = v / np.linalg.norm(v) if r > 1 else np.ones(1)
     phi = np.asarray(basis.density(x, np.array([0.7]))).reshape(1, r, r)[0]
     assert basis.directed(0.7, v) @ x == pytest.approx((v.conj() @ phi @ v).real, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_cheapest_experiment_within_a_bound_costs_more_and_is_proved():
+    asked = ARX + "accuracy: {standard_deviation: {'a1[1]': 0.001, 'b2[2,1]': 0.003}}\n"
+    asked += "spectrum: {type: fir, order: 2}\n"
+    free, bound = designed(asked), designed(asked, "limits.spectrum=600")
+    found = bound.result
+    assert found.gap < 1e-6
+    assert free.result.objective * 1.01 < found.objective < bound.white_power
+    assert np.linalg.eigvalsh(found.basis.density(found.x, GRID)).max() <= 600 * (1 + 1e-6)

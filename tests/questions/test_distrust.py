@@ -97,6 +97,9 @@ LOGS = {
 }
 
 
+STEPS = np.repeat(np.random.default_rng(5).choice([-1.0, 0.0, 1.0, 2.0], 20), 12)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_steps_of_a_coarse_sensor_are_said_to_decide_and_fine_ones_are_not(seed, tmp_path):
     """Noise of less than half a step leaves levels off by a share of it, and the gain by many deviations."""
@@ -136,6 +139,14 @@ def test_columns_that_are_perhaps_swapped_are_said_to_be(swapped, tmp_path):
     y = scipy.signal.lfilter([0, 0.2], [1, -0.9], u) + 0.1 * rng.standard_normal(400)
     found = explore(stored(tmp_path / "log.csv", *((y, u) if swapped else (u, y))))
     assert ("columns-perhaps-swapped" in [one.code for one in found.results.outcome.findings]) is swapped
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("samples", [60, 120, 200, 240])
+def test_a_static_gain_without_noise_ends_in_an_answer(samples, tmp_path):
+    """Which of the two is the input no regression shows."""
+    found = explore(stored(tmp_path / "log.csv", STEPS[:samples], 2.0 * STEPS[:samples]))
+    assert "input-only-answers" in [one.code for one in found.results.outcome.findings]
 
 
 @pytest.mark.slow

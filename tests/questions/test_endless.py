@@ -226,6 +226,15 @@ def test_what_is_only_approached_is_said_also_where_digits_end_on_the_way(monkey
     assert all(remedy in told.hint for remedy in ("cost.output_power", "limits.band", "ask for less"))
 
 
+@pytest.mark.slow
+def test_a_band_that_leaves_out_what_is_only_approached_has_an_optimum():
+    """It costs a little more than what no design gets below."""
+    bound = solve(parse_spec(APPROACHED)).result["objective"]["lower_bound"]
+    found = solve(parse_spec(APPROACHED + "limits: {band: [0.0314, 3.14159]}\n")).result
+    assert found["status"] == "optimal"
+    assert bound < found["cost"] < 1.001 * bound
+
+
 TWO_INPUTS = """
 plant: {B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]]], F: [[[1, -0.7], [1, 0.4]]]}
 noise: {variance: 1}

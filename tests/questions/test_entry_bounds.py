@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from tests.support.refusals import code_of, refused
@@ -93,6 +94,37 @@ def test_a_weight_holds_for_every_entry():
     assert ratio.max() == pytest.approx(1.0, abs=1e-4)
 
 
+def largest_error(entry, result, theta, *, relative):
+    """The largest |G - G_0| / |G| (or |G - G_0|) on the ellipsoid, by local search from random directions."""
+    root = np.linalg.cholesky(np.asarray(result["information"]["covariance"]))
+    alpha = result["model_error"]["alpha"]
+    w = result["model_error"]["worst_frequency"]
+    nominal, rng = entry(theta, w), np.random.default_rng(0)
+
+    def negative(direction):
+        there = entry(theta + alpha * root @ direction / np.linalg.norm(direction), w)
+        return -abs(there - nominal) / (abs(there) if relative else 1.0)
+
+    starts = rng.normal(size=(4, theta.size))
+    return max(-scipy.optimize.minimize(negative, start, tol=1e-10).fun for start in starts)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("error", "bound"), [("relative: 0.2", 0.2), ("absolute: 0.3", 0.3)])
+def test_no_model_of_the_ellipsoid_breaks_the_bound_and_one_reaches_it(error, bound):
+    result = arx(f"{error}, region: ellipsoid").result
+    assert result["objective"]["relative_gap"] <= 1e-6
+    at = max(result["requirements"], key=lambda item: item["worst_ratio"])["entry"]
+    i, j = int(at[1]), int(at[3])
+    worst = largest_error(
+        lambda theta, w: arx_entry(by_name(result, theta), i, j, w),
+        result,
+        np.array(list(by_name(result).values())),
+        relative="relative" in error,
+    )
+    assert worst == pytest.approx(bound, rel=2e-4)
+
+
 def test_what_is_no_fraction_is_refused():
     error = "accuracy.model_error={relative: 0.1, region: ellipsoid}"
     both = ["plant.F=[[[1, 0.1], [1]], [[1], [1]]]"]
@@ -100,3 +132,24 @@ def test_what_is_no_fraction_is_refused():
     assert (told.code, "[1,1]" in told.message) == ("not-supported", True)
     sampled = CONTINUOUS.replace("[1, 1]]]}}", "[1, 1]]]}, sample: zoh}").replace("[0, 2.0]", "[0, 3.0]")
     assert code_of(validate, parse_spec(sampled, overrides=["accuracy={}", error])) == "not-supported"
+
+
+@pytest.mark.slow
+def test_ellipsoid_in_continuous_time():
+    error = "accuracy: {model_error: {relative: 0.3, region: ellipsoid}}\n"
+    result = solve(parse_spec(CONTINUOUS + error)).result
+    names = result["information"]["parameters"]
+    theta = {"b0[1,1]": 2.0, "b0[1,2]": 1.0, "a0[1,1]": 1.0, "a1[1,1]": 0.6, "a0[1,2]": 1.0}
+
+    def entry(j):
+        def at(values, w):
+            p, s = dict(zip(names, values, strict=True)), 1j * w
+            if j == 1:
+                return p["b0[1,1]"] / (s**2 + p["a1[1,1]"] * s + p["a0[1,1]"])
+            return p["b0[1,2]"] / (s + p["a0[1,2]"])
+
+        return at
+
+    values = np.array([theta[name] for name in names])
+    worst = max(largest_error(entry(j), result, values, relative=True) for j in (1, 2))
+    assert worst == pytest.approx(0.3, rel=2e-4)

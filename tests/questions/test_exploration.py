@@ -98,6 +98,15 @@ def test_a_real_record_without_a_header_whose_times_jitter():
     parse_spec(found.results.files["model.yaml"].decode(), design=False)
 
 
+@pytest.mark.slow
+def test_an_input_without_effect_earns_no_trust(tmp_path):
+    """The best of many structures explains 22 % of the noise of these 20 unseen samples."""
+    path = lag_log(tmp_path / "log.csv", gain=0.0, samples=50, seed=1)
+    told = CliRunner().invoke(app, ["explore", str(path), "--no-output"])
+    assert told.exit_code == 1, told.output
+    assert "no trust" in told.stdout
+
+
 @pytest.fixture
 def integrating(tmp_path):
     """Return a log of y(t) - y(t-1) = 0.02 u(t-1)."""
@@ -177,6 +186,23 @@ def saved(path, rows, header):
 
 
 @pytest.mark.slow
+def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_path):
+    named = saved(tmp_path / "named.csv", rows, "u,y,SP")
+    plain = saved(tmp_path / "plain.csv", rows, "u,y,r")
+    by_name = explore([named], Preparation(columns={"r1": "SP"})).results
+    told = by_name.result["exploration"]["frequency_response"]
+    assert told["excitation"] == "r"
+    assert "caveat" not in told
+    table = by_name.tables["frequency_response"].columns
+    w, G = table["frequency_rad_per_s"], table["G_re"] + 1j * table["G_im"]
+    z, pole = np.exp(1j * w), np.exp(-1.0 / 6.0)
+    inside = np.abs(G - 2.0 * (1.0 - pole) / (z - pole)) <= table["radius"]
+    assert np.mean(inside) > 0.85
+    np.testing.assert_array_equal(read_log(plain, Preparation()).r, rows[:, 2:])
+    assert read_log(named, Preparation()).r is None
+
+
+@pytest.mark.slow
 def test_an_input_behind_a_reference_is_not_taken_for_late(rows, tmp_path, monkeypatch):
     """It answers the output, whose noise it therefore seems to follow."""
     late = [Finding("input-logged-late", REFUTED, "early")]
@@ -242,6 +268,20 @@ def test_the_spec_calls_its_channels_as_the_log_does(head, stated):
     log = SimpleNamespace(**{**vars(LOG), "names": {"u1": head, "y1": "y"}})
     channels = parse_spec(spec_text(log, FOUND, [Path("a.csv")])).channels or {}
     assert [(one.name, one.unit) for one in channels.values()] == ([stated] if stated else [])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
+    rng = np.random.default_rng(3)
+    u = 1e5 + np.repeat(rng.choice([0.0, 1.0, 5.0], (60, inputs), p=[0.6, 0.3, 0.1]), 5, axis=0)
+    y = scipy.signal.lfilter([0, 1], [1, -0.8], (u - 1e5).sum(axis=1)) + 0.1 * rng.standard_normal(300)
+    log = tmp_path / "log.csv"
+    head = [*(f"u{j + 1}" for j in range(inputs)), "y"]
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header=",".join(head), comments="", fmt="%.10g")
+    allowed = parse_spec(explore(log, Preparation(sample_time=1.0)).results.resolved_spec)
+    half, level = (np.atleast_1d(one) for one in (allowed.limits.amplitude.input, allowed.signal.offset))
+    np.testing.assert_allclose([level - half, level + half], [u.min(axis=0), u.max(axis=0)], atol=1e-4)
 
 
 @pytest.mark.parametrize("loop", [False, True])

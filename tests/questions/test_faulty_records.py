@@ -9,6 +9,9 @@ import scipy.signal
 from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.other_systems import shared
+from inputdesign_cli.identification import identify as estimate
+from inputdesign_cli.identification.response_chance import perhaps_zero
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions import explore
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.records import Preparation
@@ -193,6 +196,24 @@ def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, write):
         y = scipy.signal.lfilter([0.0] * 10 + [3.6], [1.0, -0.7], moved)
         y += scipy.signal.lfilter([1.0], [1.0, -0.7], rng.standard_normal(n))
         assert "input-logged-late" not in codes(assess(spec, write({"u": moved, "y": y})).results)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gain", "share"), [(0.0, 1.0), (1.0, 0.0)])
+def test_an_output_that_no_input_moves_is_told_from_one_that_some_moves(gain, share):
+    """By the statistic of Wald, at one in a thousand; the first of two inputs has the gain."""
+    ones = np.ones(1)
+    B = (np.array([0.0, 0.1]), np.array([0.0, 0.1]))
+    F = (np.array([1.0, -0.5]), np.array([1.0, -0.5]))
+    model = PolynomialModel((B,), (ones,), (F,), (ones,), (ones,), np.eye(1))
+    found = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        u, e = rng.standard_normal((300, 2)), rng.standard_normal((300, 1))
+        y = e + gain * scipy.signal.lfilter([0.0, 1.0], [1.0, -0.5], u[:, :1], axis=0)
+        one = estimate(model, u, y)
+        found.append(perhaps_zero(model.at(one.theta, one.noise), one))
+    assert np.mean([len(each) for each in found]) == share
 
 
 def emptied(record, every):

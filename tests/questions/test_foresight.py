@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
+from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.identification import Rival
 from inputdesign_cli.questions.building.system import build_model
@@ -135,6 +135,20 @@ def test_runs_that_begin_at_the_truth_say_how_many_would_end_elsewhere(monkeypat
     assert any(f"{searched['elsewhere']} of 5 records end" in note for note in result["notes"])
 
 
+OTHERS = {
+    "loop": "experiment={samples: 720, controller: {pid: {Kp: 0.5, Ti: 180}}}",
+    "duration": "experiment={duration: 1800}",
+    "held": "signal={type: binary, hold: 3, samples: 720, seed: 1}",
+    "shortest": "limits={input_power: 2}",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", OTHERS)
+def test_all_kinds_of_experiments_are_foreseen(kind):
+    assert "rivals" in solved(OTHERS[kind])[0]["foreseen"]
+
+
 UNCERTAIN = """
 sample_time: 5
 plant: {continuous: {gain: 2, time_constant: 180, dead_time: 25}, sample: zoh}
@@ -237,6 +251,29 @@ def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
     assert "rivals" not in identification
     assert identification["ruled_out"][0]["theta"]["L"] == pytest.approx(HEATER[2] + PERIOD * H, abs=20.0)
     assert "The uncertainty excludes another minimum" in said(found.results)
+
+
+@pytest.mark.slow
+def test_the_likeliest_of_all_is_not_taken_where_the_plant_cannot_be_that(tmp_path):
+    astray = 0
+    for seed in range(3):
+        path, _ = record(seed, tmp_path)
+        free, known = (identify(spec, path).result["identification"] for spec in (heater(), heater(WITHIN)))
+        away = abs(free["theta"]["L"] - HEATER[2]) > 60.0
+        assert abs(known["theta"]["L"] - HEATER[2]) < 4.0 * known["standard_deviation"]["L"]
+        assert away == any(one["excess"] < 0.0 for one in known.get("ruled_out", []))
+        astray += away
+    assert astray
+
+
+@pytest.mark.slow
+def test_knowledge_that_the_data_refute_rules_nothing_out(tmp_path):
+    wrong = ["plant.parameters.L=100", "uncertainty={intervals: {L: [95, 105]}, scenarios: 3, fresh: 0}"]
+    path, _ = record(6, tmp_path)
+    identification = identify(heater(*wrong), path).result["identification"]
+    assert "ruled_out" not in identification
+    assert identification["rivals"]
+    assert identification["theta"]["L"] == pytest.approx(HEATER[2], abs=10.0)
 
 
 @pytest.mark.slow

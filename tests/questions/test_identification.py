@@ -126,6 +126,16 @@ def test_a_top_up_makes_up_for_what_is_missing(write):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("relative", "enough"), [(2.0, True), (0.1, False)])
+def test_plants_in_s_are_assessed(relative, enough, write):
+    spec = parse_spec(COMMON, overrides=[*HELD, f"accuracy.model_error.relative={relative}"])
+    found = assess(spec, write(recorded_in_s(spec, 500, 1)))
+    assert found.met == enough
+    if not enough:
+        assert found.results.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.slow
 def test_a_held_input_taken_for_its_interpolation_is_told(write):
     held = recorded_in_s(parse_spec(EACH, overrides=HELD), 1500, 1)
     assert "input-taken-as-band-limited" in codes(identify(parse_spec(EACH), write(held)))
@@ -183,6 +193,19 @@ def test_the_files_hold_what_they_say(write):
         outcome.tables["residuals"].columns
     )
     assert {"r_u_12", "r_adm_12", "G_abs_21"} < set(outcome.tables["bound"].columns)
+
+
+@pytest.mark.slow
+def test_offsets_and_outliers_are_told(write):
+    columns = record(load_spec(SPEC), seed=3)
+    columns["y1"] = columns["y1"] + 100.0
+    columns["u1"][40] = 60.0
+    outcome = identify(load_spec(SPEC), write(columns))
+    assert "row 42" in " ".join(outcome.result["notes"])
+    first = codes(outcome)["start-estimated"].figures["first_residual"]
+    assert first == pytest.approx(columns["y1"][0], rel=1e-2)
+    known = identify(load_spec(SPEC), write(columns), operating_point={"y1": 100.0})
+    assert not known.result["identification"]["free_start"]
 
 
 @pytest.mark.first(1)

@@ -130,6 +130,17 @@ IN_WORDS = [
 ]
 
 
+PI = "experiment: {samples: 600, controller: {numerator: [0.5, -0.48], denominator: [1, -1]}}"
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("loop", [None, PI], ids=["open loop", "PI"])
+def test_one_tank_in_three_words_is_one_design(loop):
+    rest = TANK if loop is None else TANK.replace("experiment: {samples: 600}", loop)
+    costs = [solve(parse_spec(f"plant: {plant}{rest}")).result["cost"] for plant in IN_WORDS]
+    np.testing.assert_allclose(costs, costs[0], rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -110,6 +110,17 @@ def simulated(*overrides):
     return simulate(parse_spec(ZEROS, overrides=list(overrides))).result
 
 
+@pytest.mark.parametrize("true", ["{A: [1, -0.8], B: [0, 1, -1.5]}", "{A: [1, -0.7], B: [0, 1, -2.5]}"])
+def test_runs_with_a_zero_outside_are_stable_and_as_theory_says(true):
+    """The second plant is not the one of the spec: its own zero is kept, by both controllers."""
+    found = simulated(f"simulation.plant={true}")
+    for entry in found["simulation"]["inputs"].values():
+        assert entry["unstable"] == 0
+        exact = entry["exact"]["squared"]
+        assert exact["mean"] == pytest.approx(entry["theory"]["value"], abs=4 * exact["standard_error"])
+    assert "notes" not in found
+
+
 def test_unstable_loops_are_said():
     found = simulated("noise.variance=10", "experiment.samples=60")
     inputs = found["simulation"]["inputs"]
@@ -139,3 +150,28 @@ def test_records_are_as_long_as_the_signal():
     assert (found["samples"], found["simulation"]["samples"]) == (1, 1000)
     for name, entry in found["simulation"]["inputs"].items():
         assert entry["loss"] == long["simulation"]["inputs"][name]["loss"]
+
+
+MATRIX = """
+noise: {variance: [[0.04, 0.01], [0.01, 0.09]]}
+experiment: {samples: 500}
+accuracy: {closed_loop_error: {control: {internal_model: {numerator: [0, 0.3], denominator: [1, -0.7]}},
+  reference: {variance: [1, 2]}}}
+limits: {input_power: [1, 0.5]}
+spectrum: {type: pointwise}
+signal: {samples: 100, candidates: 1}
+"""
+
+
+@pytest.mark.parametrize("exact", [[], pytest.param([EXACT], marks=pytest.mark.slow)])
+def test_states_of_several_channels(exact):
+    """One input of two acts late; the same entries in s."""
+    parameters = "parameters: {k: 1.5, T: 4.0, c: 0.4}"
+    words = [
+        f"{{{parameters}, sample: zoh, state_space: {{A: [['-1/T', 0], [0, -0.5]], B: [[k/T, 0], [0, 1]], "
+        "C: [[1, c], [0.3, 1]]}}",
+        f"{{{parameters}, sample: zoh, continuous: {{numerator: [[[k], [c]], [[0.3*k], [1]]], "
+        "denominator: [[[T, 1], [1, 0.5]], [[T, 1], [1, 0.5]]]}}",
+    ]
+    # The power of lines is that of the solver, which is known to the tolerance of designs.
+    assert_same([losses(plant, *exact, rest=MATRIX) for plant in words], 1e-7 if exact else 1e-9)

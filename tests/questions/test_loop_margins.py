@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli import assess, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.building.controllers import Process, process_of, tuned
 from inputdesign_cli.specification.models.loop import Amigo, LoopMargin, Simc, Tuning
@@ -166,6 +166,23 @@ def test_the_cost_is_that_of_a_plain_program():
 def test_margins_are_told_as_the_peak_that_keeps_them(margin, expected):
     key, value = margin.split(": ")
     assert LoopMargin(**{key: float(value)}).peak == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
+    rng = np.random.default_rng(2)
+    u = 2.0 * np.sign(rng.standard_normal(72)).repeat(10)
+    y, a = np.zeros(720), np.exp(-H / 200.0)
+    for t in range(7, 720):
+        y[t] = a * y[t - 1] + 2.4 * (1 - a) * u[t - 6]
+    path = tmp_path / "record.csv"
+    rows = np.column_stack([u, y + 0.2 * rng.standard_normal(720)])
+    np.savetxt(path, rows, delimiter=",", header="u,y", comments="")
+    found = assess(parse_spec(TEXT), path)
+    assert found.verdict == "met"
+    (asked,) = found.results.result["assessment"]["requirements"]
+    assert asked["loop"]["Ti"] == pytest.approx(200.0, rel=0.1)
+    assert asked["loop"]["Kp"] == pytest.approx(200.0 / (2.4 * 57.5), rel=0.1)
 
 
 MARGINS = pytest.mark.parametrize("margin", ["phase_margin: 50", "max_sensitivity_db: 3", "gain_margin: 4"])

@@ -71,6 +71,17 @@ def test_samples_give_the_information_of_their_regressors(record):
     assert result["signal"]["worst_ratio"] == pytest.approx(result["model_error"]["worst_ratio"], rel=1e-9)
 
 
+def test_sinusoids_are_in_phase_and_give_what_a_long_record_gives():
+    spec = changed("signal.samples=100000")
+    outcome = analyse(spec)
+    assert outcome.result["power"]["input"] == pytest.approx([22.5, 22.5])
+    signal = outcome.tables["signal"].columns
+    u = np.stack([signal["u1"], signal["u2"]], axis=1)
+    M = by_simulation(u, 100000) / 200
+    scale = np.sqrt(np.outer(np.diag(M), np.diag(M)))
+    assert np.abs((outcome.result["information"]["matrix"] - M) / scale).max() < 2e-3
+
+
 def test_white_of_each_channel_is_a_sum_over_the_circle():
     """M = N/L sum over L points of the circle: exact for an ARX plant."""
     result = analyse(changed("spectrum={given: {type: white, power: [3.0, 5.0]}}")).result
@@ -151,6 +162,23 @@ def test_sinusoids_of_several_inputs_given_as_a_table(tmp_path):
     np.testing.assert_allclose(result["power"]["input"], [1.6, 1.6], rtol=1e-12)
     M = by_finite_differences(result["information"]["parameters"], lines)
     np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
+
+
+def test_one_sampled_channel_reads_the_column_of_one_channel(tmp_path):
+    text = """
+plant: {continuous: {numerator: [2.0], denominator: [1, 0.6, 1]}, sample: zoh}
+noise: {variance: 0.1}
+"""
+    path = tmp_path / "u.csv"
+    u = np.random.default_rng(1).normal(size=300)
+    path.write_text(
+        "time_s,u1\n" + "\n".join(f"{t},{v:.17g}" for t, v in enumerate(u)) + "\n", encoding="utf-8"
+    )
+    result = analyse(parse_spec(text, overrides=[f"spectrum={{given: {{signal: {path}}}}}"])).result
+    assert result["information"]["parameters"] == ["b0", "a0", "a1"]
+    held = scipy.signal.cont2discrete(([2.0], [1, 0.6, 1]), 1.0)
+    y = scipy.signal.lfilter(held[0].ravel(), held[1], u)
+    assert result["power"]["output"][0] == pytest.approx(np.mean(y**2), rel=1e-9)
 
 
 BAD = [

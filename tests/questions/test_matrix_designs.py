@@ -9,9 +9,10 @@ import pytest
 import scipy.integrate
 
 from inputdesign_cli import load_spec, solve
+from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
-from tests.support.matrix_specs import CONTINUOUS, IN_LOOP, changed
+from tests.support.matrix_specs import ARX, CONTINUOUS, IN_LOOP, changed
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -106,6 +107,39 @@ def test_weighted_variance_in_continuous_time_holds_for_every_entry():
     assert variance.max() == pytest.approx(0.01, rel=1e-4)
 
 
+GAINS = ARX + "accuracy: {model_error: {relative: 0.1}}\n"
+
+
+# u2 in thousandths: its coefficients are a thousand times smaller, its power 1e6 times larger.
+MILLI = "plant.B=[[[0, 1.0, 0.4], [0, -0.0005, 0.0003]], [[0, 0.6, 0.2], [0, 0.0012, -0.0005]]]"
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("spectrum", ["{type: fir, order: 4}", "{type: free}"])
+@pytest.mark.parametrize(
+    ("asked", "same"),
+    [
+        (["cost={input_power: [1, 1]}"], ["cost={input_power: [1, 1.0e-6]}"]),
+        (
+            ["limits={input_power: [2, 1]}", "objective=best_accuracy"],
+            ["limits={input_power: [2, 1.0e6]}", "objective=best_accuracy"],
+        ),
+        (
+            ["limits={input_power: [2, 1]}", "objective=shortest_experiment"],
+            ["limits={input_power: [2, 1.0e6]}", "objective=shortest_experiment"],
+        ),
+    ],
+)
+def test_the_units_of_the_inputs_do_not_matter(spectrum, asked, same):
+    found = []
+    for overrides in (asked, [*same, MILLI]):
+        spec = changed(GAINS, f"spectrum={spectrum}", *overrides)
+        found.append(build_convex(spec).designed().design)
+    assert found[1].result.objective == pytest.approx(found[0].result.objective, rel=1e-6)
+    bounds = [design.any_spectrum.certificate.bound for design in found]
+    assert bounds[1] == pytest.approx(bounds[0], rel=2e-5)
+
+
 def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
     """Input 1 may have nearly any power: what it is worth is below the accuracy of a solver."""
     spec = parse_spec(
@@ -116,6 +150,18 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
     )
     result = build_convex(spec).designed().design.result
     assert result.gap < 1e-6
+
+
+@pytest.mark.slow
+def test_a_spectrum_of_order_zero_is_white_in_time():
+    """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
+    costs = [
+        solve(
+            changed(GAINS, f"spectrum={{{kind}}}", "signal.candidates=1", "solver.any_spectrum=false")
+        ).result["cost"]
+        for kind in ("type: fir, order: 1", "type: fir, order: 0", "type: white")
+    ]
+    assert costs[0] < costs[1] < costs[2]
 
 
 @pytest.mark.slow
@@ -139,8 +185,38 @@ signal: {{candidates: 1}}
 """
 
 
+TWO_ALONE = """
+plant: {A: [[1, -1.1], [1, -0.6]], B: [[[0, 1, 0.4], [0]], [[0], [0, 0.7]]]}
+noise: {C: [[1, 0.3], [1]], variance: [[1, 0], [0, 0.5]]}
+experiment:
+  samples: 500
+  controller:
+    numerator: [[[0.3, -0.25], [0]], [[0], [0.3]]]
+    denominator: [[[1, -1], [1]], [[1], [1, -0.5]]]
+"""
+
+
 def in_loop(*overrides):
     return parse_spec(LOOP, overrides=list(overrides))
+
+
+def test_decoupled_loops_cost_as_much_as_each_alone():
+    common = "cost: {input_power: 1, output_power: 0.2}\nspectrum: {type: fir, order: 5}\n"
+    common += "accuracy: {model_error: {relative: 0.05, alpha: 3}}\n"
+    both = parse_spec(TWO_ALONE + common)
+    alone = [
+        "plant: {A: [1, -1.1], B: [0, 1, 0.4]}\nnoise: {C: [1, 0.3], variance: 1}\n"
+        "experiment: {samples: 500, controller: {numerator: [0.3, -0.25], denominator: [1, -1]}}\n",
+        "plant: {A: [1, -0.6], B: [0, 0.7]}\nnoise: {variance: 0.5}\n"
+        "experiment: {samples: 500, controller: {numerator: [0.3], denominator: [1, -0.5]}}\n",
+    ]
+    design = build_convex(both).designed().design.result
+    costs = []
+    for text in alone:
+        spec = parse_spec(text + common)
+        costs.append(build_convex(spec).designed().design.result.objective)
+    assert design.gap < 1e-6
+    assert design.objective == pytest.approx(sum(costs), rel=2e-6)
 
 
 def test_the_units_of_the_loop_do_not_make_it_algebraic():
@@ -196,6 +272,22 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
         warnings.simplefilter("ignore")  # that it may be inaccurate; four digits are compared
         problem.solve(solver=cp.CLARABEL)
     assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_single_samples_of_u_are_limited():
+    """What r causes at u, by the recursion of the loop, obeys the limits; the accuracy is met still."""
+    free = solve(in_loop("signal.candidates=2")).result["signal"]
+    amplitude, rate = 0.8 * np.array(free["input_peak"]), 0.8 * np.array(free["input_move"])
+    limits = f"limits={{amplitude: {{input: {amplitude.tolist()}}}, rate: {rate.tolist()}}}"
+    spec = in_loop(limits, "signal.candidates=2")
+    outcome = solve(spec)
+    r = np.stack([outcome.tables["signal"].columns[name] for name in ("r1", "r2")], axis=1)
+    _, u = build_experiment(spec).loop.signals(r, 0.0 * r)
+    assert np.all(np.abs(u).max(axis=0) <= amplitude * (1 + 1e-10))
+    assert np.all(np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0) <= rate * (1 + 1e-10))
+    assert outcome.result["signal"]["worst_ratio"] <= 1 + 1e-9
+    assert outcome.result["signal"]["input_peak"] == pytest.approx(np.abs(u).max(axis=0))
 
 
 def test_limits_bind_what_r_causes():

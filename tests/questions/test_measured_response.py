@@ -9,9 +9,10 @@ import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.frequency_responses import silent_lines_answer
 from inputdesign_cli.identification.periodic_response import Periods, excited_lines
 from inputdesign_cli.questions.frequency_response.build import build_measurement
-from inputdesign_cli.questions.frequency_response.measure import Counted, judge_lines
+from inputdesign_cli.questions.frequency_response.measure import Counted, judge_lines, silent_of
 from inputdesign_cli.records import Preparation, Record
 from tests.support.refusals import refusal
 
@@ -165,6 +166,21 @@ def test_silent_lines_tell_the_degree_of_a_nonlinearity(write, curve, speaks):
     assert {kind for kind, entry in told.items() if entry["probability"][0] < 0.01} == ({speaks} - {""})
     found = [one.where for one in results.outcome.findings or () if one.code == "silent-lines-answer"]
     assert found == ([speaks] if speaks else [])
+
+
+def test_of_noise_alone_the_probability_is_uniform():
+    """And a linear plant is hardly ever doubted: four of a hundred are expected."""
+    _, question, u = asked(SHIPPED, 1.6)
+    silent = [
+        silent_of(question.terms, counted(question.terms, u, answer(question.model, u, seed)))
+        for seed in range(100)
+    ]
+    found = np.array([one["even"].probability[0] for one in silent])
+    assert np.mean(found) == pytest.approx(0.5, abs=0.1)
+    assert 0.02 < np.mean(found < 0.1) < 0.2
+    assert sum(bool(silent_lines_answer(one)) or one["odd"].probability[0] < 0.04 for one in silent) <= 7
+    lines = [one for each in silent for one in each.values() if one.probability.min() < 0.05]
+    assert all(np.all(one.rms > 0.0) for one in lines)
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,28 @@ import scipy.signal
 
 from inputdesign_cli import identify as estimated, parse_spec, solve
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.identification import identify
 from inputdesign_cli.plant import input_gradients, noise_gradients
 from inputdesign_cli.questions import assess
 from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.specification import Spec
 from tests.support.outcomes import codes_in
+
+REST = """
+sample_time: 0.5
+noise: {variance: 0.1}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.1, band: [0.05, 1.5]}}
+spectrum: {type: fir, order: 8}
+solver: {tolerance: 1.0e-10}
+"""
+
+
+PROCESS = "{continuous: {gain: 2.0, time_constant: 3.0, dead_time: 1.685}, sample: zoh}"
+
+
+def spec_of(plant, rest=REST) -> Spec:
+    return parse_spec(f"plant: {plant}\n{rest}")
 
 
 def test_information_of_a_dead_time_is_that_of_the_closed_form():
@@ -24,6 +42,28 @@ def test_information_of_a_dead_time_is_that_of_the_closed_form():
     )
     power = solve(parse_spec(text)).result["cost"]
     assert power == pytest.approx(0.1 / (300 * 2.0**2 / 3.0 * 0.01**2), rel=1e-9)
+
+
+def record_of(model, samples=600, seed=0):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], (samples // 4, model.inputs)), 4, axis=0)
+    e = rng.normal(size=(samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    return u, sum(model.simulate(u, e, 1.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nominal", ["[2.0, 3.0, 1.685]", "[1.0, 8.0, 9.0]"])
+def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
+    """Within four standard deviations, whatever the nominal values."""
+    words = dict(zip(("gain", "time_constant", "dead_time"), json.loads(nominal), strict=True))
+    truth = build_model(spec_of(PROCESS))
+    start = build_model(spec_of(json.dumps({"continuous": words, "sample": "zoh"})))
+    u, y = record_of(truth)
+    found = identify(start, u, y, start=start.theta)
+    assert found.names == ("gain", "time_constant", "dead_time")
+    deviation = np.abs(found.theta - truth.theta) / np.sqrt(np.diag(found.covariance))
+    assert np.all(deviation < 4.0)
+    assert found.tests.failed == ()
 
 
 COLOURED = (

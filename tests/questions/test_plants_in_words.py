@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from inputdesign_cli import analyse, parse_spec, solve
+from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.explore.structures import Process, process_models
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import input_gradients, noise_gradients
@@ -58,6 +58,9 @@ NOISES = [
 ]
 
 
+PI = "experiment: {samples: 300, controller: {numerator: [0.5, -0.4], denominator: [1, -1]}}"
+
+
 def spec_of(plant, rest=REST, noise="{variance: 0.1}", **kwargs):
     return parse_spec(f"plant: {plant}\n{rest.replace('{variance: 0.1}', noise)}", **kwargs)
 
@@ -68,6 +71,20 @@ def test_the_error_of_one_spectrum_is_the_same_in_all_words(words, noise):
     """Without a solver in between."""
     found = [largest_errors(build_experiment(spec_of(plant, noise=noise))) for plant in words]
     np.testing.assert_allclose(found, np.broadcast_to(found[0], np.shape(found)), rtol=1e-9)
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize(
+    ("name", "noise", "loop"),
+    [("in s and in q", NOISES[1], PI), *((name, "{variance: 0.1}", None) for name in WORDS)],
+)
+def test_one_plant_in_several_words_is_one_design(name, noise, loop):
+    rest = REST if loop is None else REST.replace("experiment: {samples: 300}", loop)
+    found = [solve(spec_of(plant, rest, noise)) for plant in WORDS[name]]
+    costs = [one.result["cost"] for one in found]
+    np.testing.assert_allclose(costs, costs[0], rtol=1e-9)
+    for other in found[1:]:
+        np.testing.assert_allclose(other.bound["r_u"], found[0].bound["r_u"], rtol=1e-6)
 
 
 def test_a_gain_is_coloured_noise():
@@ -131,6 +148,16 @@ def test_the_words_of_a_process_that_was_found_in_a_log_are_read_back(order, zer
         plant = rng.uniform(0.6, 1.4, rows[-1].size - 2 * noise)
         thetas.append(np.concatenate([plant, rng.uniform(-0.3, 0.3, 2 * noise)]))
     check_words(process_models(rows, thetas, np.diag(rng.uniform(0.5, 1.0, outputs))))
+
+
+@pytest.mark.slow
+def test_a_study_estimates_the_named_parameters():
+    rest = REST.replace("samples: 60", "samples: 300") + "simulation: {runs: 40, seed: 2}\n"
+    for plant in (WORDS["first order"][0], WORDS["first order"][4]):
+        found = simulate(spec_of(plant, rest)).result["simulation"]["inputs"]["design"]
+        assert set(found["mean_estimate"]) == set(build_model(spec_of(plant)).names)
+        assert found["within_r_u"] > 0.8
+        assert 0.2 < min(found["covariance_eigenvalues"]) < max(found["covariance_eigenvalues"]) < 4.0
 
 
 @pytest.mark.parametrize("given", [True, False])

@@ -95,6 +95,18 @@ def test_an_earlier_record_is_prior_information(tmp_path):
     assert free["cost"] == pytest.approx(0.5 * 0.1925467, rel=1e-2)
 
 
+def test_standard_deviations_are_reached():
+    result = run("accuracy: {standard_deviation: {b1: 0.01, f1: 0.002}}\n" + FIR)
+    sd = result["information"]["standard_deviation"]
+    assert sd["b1"] <= 0.01 * (1 + 1e-7)
+    assert sd["f1"] <= 0.002 * (1 + 1e-7)
+    assert max(sd["b1"] / 0.01, sd["f1"] / 0.002) == pytest.approx(1.0, abs=1e-6)
+    assert [r["name"] for r in result["requirements"]] == [
+        "standard_deviation of b1",
+        "standard_deviation of f1",
+    ]
+
+
 def test_information_target_by_name_in_any_order():
     by_name = run(
         "accuracy: {information: {matrix: [[1.0e+6, 0], [0, 1.0e+4]], parameters: [f1, b1]}}\n" + FIR

@@ -23,6 +23,32 @@ from tests.support.refusals import code_of
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, solved
 
 
+@pytest.mark.first(3)
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        (FIRST, ()),
+        (FIRST, ("limits={output_power: 1}", "objective=best_accuracy")),
+        (FIRST, ("limits={output_power: 1}", "objective=shortest_experiment")),
+        (FIRST, ("accuracy={criterion: D, standard_deviation: {f1: 0.02}}", "limits={input_power: 1}")),
+        (LOOP, ()),
+        (LOOP, ("accuracy={model_error: {sensitivity: {max_db: 9}}}", "uncertainty.cost=mean")),
+        (TWO, ("limits={output_power: [200, 200]}",)),
+        (TWO, ("accuracy={criterion: A, scale: relative}", "limits={input_power: [1, 2]}")),
+    ],
+)
+def test_copies_of_the_plant_change_nothing(text, asked):
+    """Whatever is asked, in a loop and with several channels."""
+    (name, value) = ("f1", -0.8) if text is LOOP else ("f1", -0.7) if text is FIRST else ("b1[1,1]", 1.0)
+    scenarios = f"uncertainty={{scenarios: [{{'{name}': {value}}}, {{'{name}': {value}}}]}}"
+    robust = [one for one in asked if one.startswith("uncertainty")]
+    once = solved(text, *(one for one in asked if one not in robust))
+    again = solved(text, scenarios, *asked)
+    assert again["objective"]["value"] == pytest.approx(once["objective"]["value"], rel=1e-6)
+    assert again["cost"] == pytest.approx(once["cost"], rel=1e-5)
+    assert again["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-3)  # a whole number of samples
+
+
 def test_limits_on_powers_bind_design_and_record_at_every_plant():
     """The output answers most at the slower plant; records of several seeds, of the power of the design."""
     asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
@@ -52,6 +78,23 @@ def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
         paid = [sum(at.power(kind, None, s).at(x) for kind in ("input", "output")) for s in range(3)]
         assert found.design.result.objective == pytest.approx(of(paid), rel=1e-9)
     assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
+
+
+@pytest.mark.slow
+def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
+    """Cost worst: beside the accuracy the cost is promised, at the plants drawn and to most of the others."""
+    prior = "covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 30, fresh: 60"
+    found = solve(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}, cost: worst}}"])).result
+    mean = solved(LOOP, f"uncertainty={{{prior}, cost: mean}}")
+    robust = found["robust"]
+    assert robust["cost"] == "worst"
+    assert found["cost"] == pytest.approx(found["objective"]["value"], rel=1e-9)
+    assert found["cost"] > 1.05 * mean["cost"]
+    assert robust["dearest"]["cost"] == pytest.approx(found["cost"], rel=1e-6)
+    assert robust["dearest"]["scenario"] in [one["scenario"] for one in robust["active"]]
+    assert robust["fresh"]["share"] <= robust["risk"]["after"]
+    assert "dearest" not in mean["robust"]
+    assert "less" not in mean["robust"]["fresh"]
 
 
 def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
@@ -404,3 +447,15 @@ def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
     ]
     assert found["lost"]
     assert found["peak"] == pytest.approx(peak(found["parameters"]["b1"], -0.8, 0.4, 0.95), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
+    found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
+    robust = found["robust"]
+    assert robust["worst_share"] == pytest.approx(1.0, abs=1e-6)
+    assert robust["fresh"]["draws"] == 120
+    low, high = robust["fresh"]["limits"]
+    assert low <= robust["fresh"]["share"] <= high
+    assert robust["fresh"]["share"] <= robust["risk"]["after"] <= robust["risk"]["before"]
+    assert found["cost"] > 1.05 * solved(FIRST)["cost"]

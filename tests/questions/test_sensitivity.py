@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import solve
-from inputdesign_cli.accuracy import Sensitivity
+from inputdesign_cli.accuracy import Absolute, Sensitivity
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
@@ -55,6 +55,19 @@ def test_every_error_below_r_adm_keeps_the_sensitivity(design):
         changed = G + random_errors(rng, GRID.size, 2) * bound[:, None, None]
         S = np.linalg.inv(np.eye(2) + changed @ C)
         assert np.linalg.norm(S, 2, axis=(1, 2)).max() <= 10 ** (7 / 20) * (1 + 1e-9)
+
+
+def test_r_adm_is_no_smaller_than_by_the_triangle_inequality(design):
+    """Which takes s(D C) <= s(D) s(C): no model would do where only one channel has integral action."""
+    requirement = design.problem.requirements[0]
+    w = np.array([0.8])
+    G, C = responses(requirement.experiment.loop, w)
+    S = np.linalg.inv(np.eye(2) + G @ C)[0]
+    bound = requirement.admissible.at(w)[0]
+    expected = (1 - np.linalg.norm(S, 2) / 10 ** (7 / 20)) / np.linalg.norm(C[0] @ S, 2)
+    assert bound == pytest.approx(expected, rel=1e-9)
+    plain = (1 / np.linalg.norm(S, 2) - 10 ** (-7 / 20)) / np.linalg.norm(C[0], 2)
+    assert bound >= plain * (1 - 1e-12)  # never less than the bound by s(C) s(D)
 
 
 def test_models_of_the_ellipsoid_keep_the_sensitivity(design):
@@ -127,6 +140,20 @@ def test_the_norm_of_the_error_against_a_plain_program():
         expected = program.solve(solver=cp.CLARABEL)
     assert problem.experiment.model.names == ("a1", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]")
     assert found.objective == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_norm_costs_more_than_the_entries_and_is_reported():
+    entries = designed(OPEN, "accuracy.model_error.norm=entry").result.objective
+    outcome = solve(parse_spec(OPEN))
+    assert outcome.result["cost"] > entries
+    assert outcome.result["requirements"][0]["norm"] == "frobenius"
+    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    columns = outcome.tables["bound"].columns
+    assert np.all(columns["r_u"] <= columns["r_adm"] * (1 + 1e-6))
+    requirement = designed(OPEN).problem.requirements[0]
+    assert requirement.of_the_norm
+    assert isinstance(requirement.admissible, Absolute)
 
 
 @pytest.mark.slow

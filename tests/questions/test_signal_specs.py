@@ -56,6 +56,23 @@ def test_the_record_meets_the_accuracy(text, most):
         assert signal[key][0] <= value
 
 
+@pytest.mark.slow
+def test_a_record_that_is_too_short_names_one_that_is_not():
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2, type: filtered_noise}\n"))
+    (diagnostic,) = error.value.diagnostics
+    assert diagnostic.code == "limits-too-tight"
+    assert diagnostic.location is not None
+    length = samples_in(diagnostic.hint)
+    assert length > 500
+    spec = parse_spec(
+        BASE.replace("500", str(length)) + "limits: {amplitude: 0.65}\nsignal: {candidates: 8}\n"
+    )
+    signal = solve(spec).result["signal"]
+    assert signal["worst_ratio"] <= 1 + 1e-9
+    assert signal["peak"][0] <= 0.65
+
+
 def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
     found = solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2}\n")).result
     assert found["signal"]["type"] != "filtered_noise"

@@ -214,6 +214,19 @@ def test_a_loop_keeps_its_promise():
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
 
 
+@pytest.mark.slow
+def test_a_loop_around_a_held_plant_keeps_its_promise():
+    """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
+    true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
+    simulation = simulated(MOTOR, f"simulation={{runs: 80, {true}}}", "spectrum.order=8").result["simulation"]
+    within_wishart(simulation)
+    design = simulation["inputs"]["design"]
+    assert design["within_r_u_limits"][1] > 0.95
+    assert design["on_design_model"]["within_r_adm_limits"][1] > 0.95
+    mean = [design["mean_estimate"][name] for name in ("b0", "a1", "a0")]
+    np.testing.assert_allclose(mean, [2.2, 11, 20], rtol=0.01)
+
+
 def test_a_true_system_that_the_controller_does_not_hold_is_refused():
     plant = "{A: [[1, -1.1], [1, -0.6]], B: [[[0, -1.0, -0.4], [0, 0]], [[0, 0], [0, 1.2, -0.5]]]}"
     found = refusal(lambda: simulated(LOOP, f"simulation={{runs: 5, plant: {plant}}}"), SpecError)
@@ -322,3 +335,27 @@ def test_the_design_reaches_the_cramer_rao_bound():
     ratios = np.array(list(simulation["inputs"]["design"]["rms_over_theory"].values()))
     # The error of one ratio of 500 runs is 3.2 %; the rms over ten parameters is within 5 %.
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_covariances_of_one_channel_lie_in_the_range_of_the_wishart_distribution():
+    overrides = ["simulation={runs: 150, seed: 2, compare: [white]}", "spectrum.order=5"]
+    result = simulate(load_spec(FIRST, overrides)).result
+    low, high = result["simulation"]["wishart_range"]
+    # Output power 1e3 times that of the noise: the linear theory holds, up to a few per cent of transients.
+    for entry in result["simulation"]["inputs"].values():
+        eigenvalues = np.array(entry["covariance_eigenvalues"])
+        assert 0.95 * low < eigenvalues.min()
+        assert eigenvalues.max() < 1.05 * high
+        assert entry["not_converged"] <= 0.01 * result["simulation"]["runs"]
+    inputs = result["simulation"]["inputs"]
+    assert inputs["white"]["within_r_adm"] < 0.9 < inputs["design"]["within_r_adm"]
+    assert inputs["white_that_suffices"]["within_r_adm"] > 0.9
+    assert "on_design_model" not in result["simulation"]["inputs"]["design"]
+
+
+@pytest.mark.slow
+def test_the_shipped_plant_in_s():
+    """r_u of the figure is that of bound.csv for one sample over the root of the length of the record."""
+    found = simulate(load_spec("specs/two_by_two.yaml", ["signal.samples=1024", "simulation.runs=2"]))
+    for panel, bound in zip(found.curves["errors_design"].panels, found.curves["bound"].panels, strict=True):
+        np.testing.assert_allclose(panel.r_u, bound.r_u / np.sqrt(1024), rtol=1e-9)

@@ -36,6 +36,28 @@ def test_golden_files(name):
     assert [row for row in rows if not row.passed] == []
 
 
+def test_result_is_consistent():
+    outcome = solve(spec_of(SMALL))
+    result = outcome.result
+    c = np.asarray(result["spectrum"]["coefficients"])
+    assert result["status"] == "optimal"
+    assert result["objective"]["value"] == pytest.approx(c[0])  # input power alone costs
+    assert result["objective"]["relative_gap"] <= 1e-7
+    bounds = [result["objective"][key] for key in ("any_spectrum_bound", "lower_bound", "value")]
+    assert bounds == sorted(bounds)
+    M, P = np.asarray(result["information"]["matrix"]), np.asarray(result["information"]["covariance"])
+    np.testing.assert_allclose(M @ P, np.eye(3), atol=1e-8)
+    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-7)
+    signal = outcome.tables["signal"].columns
+    assert list(signal) == ["time_s", "u1"]
+    power = np.mean(signal["u1"] ** 2)
+    assert power == pytest.approx(c[0] * (1 + result["signal"]["extra_power"]))
+    assert result["signal"]["worst_ratio"] == pytest.approx(1.0, abs=1e-8)  # at the least power for that
+    bound = outcome.tables["bound"].columns
+    assert np.all(bound["r_u"] <= bound["r_adm"] * (1 + 1e-7))
+    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
+
+
 def test_sample_time_scales_frequencies_and_nothing_else():
     """The same discrete plant sampled ten times as fast: frequencies times ten, costs unchanged."""
     slow, fast = solve(spec_of(SMALL)), solve(spec_of(SMALL, sample_time=0.1))

@@ -1,6 +1,7 @@
 """What follows an estimate: another experiment, or none, about the operating point of the record."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,6 +103,33 @@ def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
 def test_each_input_has_its_level(levels, point, means, expected):
     found = level_notes(levels, point, None if means is None else np.array(means), np.ones(2))
     assert {one.code: one.figures for one in found} == expected
+
+
+@pytest.mark.slow
+def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):
+    """With the second record alone it judges what the first spec judges with both."""
+    monkeypatch.chdir(tmp_path)
+    asked = "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0004}}\n"
+    Path("spec.yaml").write_text(STRUCTURE + asked + "signal: {candidates: 1}\n")
+    first, second = (heater_record(name, 300, seed) for name, seed in (("1.csv", 2), ("2.csv", 3)))
+
+    def ran(*arguments):
+        options = [*map(str, arguments), "--no-figures", "--json"]
+        return json.loads(CliRunner().invoke(app, ["assess", *options]).stdout)
+
+    ran("spec.yaml", first, "-o", "a")
+    joint, known = ran("spec.yaml", first, second, "-o", "b"), ran("a/spec.yaml", second, "-o", "c")
+    alone = ran("spec.yaml", second, "-o", "d")
+    ratio, by_prior, single = (
+        run["assessment"]["requirements"][0]["worst_ratio"] for run in (joint, known, alone)
+    )
+    assert by_prior == pytest.approx(ratio, rel=0.05)
+    assert ratio < 0.9 * single
+    copied = tmp_path / "copied.csv"
+    copied.write_bytes(first.read_bytes())
+    for given in (first, copied):
+        (error,) = ran("a/spec.yaml", given, second, "-o", "e")["errors"]
+        assert error["code"] == "data-repeated"
 
 
 def test_an_estimate_outside_of_the_intervals_is_topped_up(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve
+from inputdesign_cli import analyse, parse_spec, solve
 from inputdesign_cli.questions.building.system import build_experiment, build_model
 from tests.support.refusals import code_of
 
@@ -57,6 +57,17 @@ def test_the_gradient_is_that_of_plants_nearby(name):
     slope = (4.0 * once - 3.0 * at - twice) / (2.0 * h)
     gradient = model.plant_gradient(w)[:, model.names.index("K")]
     np.testing.assert_allclose(gradient, slope, atol=1e-6 * np.abs(slope).max())
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize("name", ["first of B", "of A", "first of a numerator", "gain", "common delay"])
+def test_the_information_is_the_limit_of_that_nearby(name):
+    at, near = (analyse(spec_at(name, value)).result["information"] for value in (2.0, 2.0 + 1e-7))
+    assert at["parameters"] == near["parameters"]
+    size = np.sqrt(np.diag(near["matrix"]))
+    np.testing.assert_allclose(
+        at["matrix"] / np.outer(size, size), near["matrix"] / np.outer(size, size), atol=1e-5
+    )
 
 
 DESIGN = "noise: {variance: 0.04}\nexperiment: {samples: 300}\nspectrum: {type: fir, order: 4}\n"

@@ -19,6 +19,12 @@ from tests.support.heater import HEATER, LAG, SLOW, covariance_of, heater
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
 
 
+def test_a_right_model_is_met(heater_record):
+    found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1))
+    assert (found.verdict, found.results.result["status"]) == ("met", "met")
+    assert found.results.result["identification"]["failed"] == []
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("drift", "following"), [(0.0, "idesign explore {}"), (1.0, "idesign assess SPEC {} --detrend linear")]
@@ -227,3 +233,22 @@ def test_what_the_spec_is_unsure_of_is_not_another_plant(record):
     assert gap[3.0, True] == (0.0, gap[3.0, False][1] - 1)
     assert gap[-3.0, True][0] > 1.0
     assert gap[-3.0, True][1] == gap[3.0, False][1]
+
+
+@pytest.mark.slow
+def test_records_are_judged_together_by_the_number_that_is_printed(heater_record):
+    """Information of two records adds up, and the top-up counts the first as the joint verdict does."""
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"])
+    first = heater_record("a.csv", 300, 1, power=0.02, level=(40.0, 52.3), warm=1.0)
+    second = heater_record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
+    alone, both = assess(spec, first), assess(spec, [first, second])
+    assert (alone.verdict, both.verdict) == ("missed", "met")
+    result = both.results.result
+    assert result["identification"]["records"] == [300, 700]
+    assert result["samples"] == 1000
+    (listed,) = result["assessment"]["requirements"]
+    assert listed["worst_ratio"] == pytest.approx(result["model_error"]["worst_ratio"])
+    apart = np.linalg.inv(assess(spec, second).results.result["information"]["covariance"])
+    ratio = np.diag(result["information"]["matrix"]) / np.diag(apart)
+    assert np.all(ratio > 0.9)
+    assert np.array_equal(np.unique(both.results.tables["fit"].columns["record"]), [1, 2])

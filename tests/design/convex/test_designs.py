@@ -39,6 +39,29 @@ from tests.support.convex_designs import (
 from tests.support.refusals import refused
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize("case", ["first_order", "flexible"])
+def test_goals_are_inverse_to_each_other(case, request):
+    """With the least power as the limit, the best factor is one and the shortest experiment has N samples."""
+    experiment = request.getfixturevalue(case)
+    fraction, alpha = (0.01, 2.45) if case == "first_order" else (0.3, 3.55)
+    factories = relative(fraction, alpha)
+    least = solve(experiment, requirements=factories, cost={"input": 1.0})
+    limits = [PowerLimit("input", least.result.objective)]
+    best = solve(experiment, "factor", factories, limits=limits)
+    check(best)
+    assert best.result.objective == pytest.approx(1.0, abs=1e-6)
+    one = dataclasses.replace(experiment, samples=1)
+    shortest = solve(one, "samples", factories, limits=limits)
+    check(shortest)
+    assert shortest.result.objective == pytest.approx(experiment.samples, rel=1e-6)
+    if case == "first_order":  # nothing is learnt about G without excitation: N times the power is fixed
+        limits = [PowerLimit("input", 4 * least.result.objective)]
+        assert optimum(one, "samples", factories, limits=limits) == pytest.approx(
+            experiment.samples / 4, rel=1e-6
+        )
+
+
 def test_enough_prior_information_needs_no_excitation(first_order):
     known = dataclasses.replace(first_order, prior=1e9 * np.eye(3))
     solution = solve(known, requirements=relative())

@@ -5,12 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inputdesign_cli.accuracy import Absolute
+from inputdesign_cli.accuracy import Absolute, Criterion
+from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
+from inputdesign_cli.design.convex.demands import Question
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.exchange import exchange
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant import ContinuousModel, PolynomialModel
+from inputdesign_cli.spectrum import PolynomialBasis
 from tests.support.convex_designs import (
     DENSE,
     OnGrid,
@@ -23,6 +27,7 @@ from tests.support.convex_designs import (
     relative,
     solve,
 )
+from tests.support.plants import arrays, two_by_two
 from tests.support.random_plants import random_case
 
 
@@ -108,6 +113,20 @@ def test_richer_spectra_cost_less(first_order):
     assert costs[-1] >= white.any_spectrum.certificate.bound
 
 
+def test_scaling_laws(first_order):
+    """Box-Jenkins without noise information on G: cost goes as variance / N and as (alpha / fraction)^2."""
+    base = least(first_order, 6)
+    louder = dataclasses.replace(first_order.model, covariance=np.array([[4.0]]))
+    for found, times in (
+        (least(Experiment(louder, 500), 6), 4),
+        (least(Experiment(first_order.model, 1000), 6), 1 / 2),
+        (least(first_order, 6, fraction=0.02), 1 / 4),
+        (least(first_order, 6, alpha=4.9), 4),
+        (least(first_order, 6, price=3.0), 3),
+    ):
+        assert found == pytest.approx(times * base, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_sixteen_parameters():
     """An output-error plant of order 8; the face once shrank to what the last round used, and cycled."""
@@ -125,3 +144,43 @@ def test_sixteen_parameters():
     assert design.problem.demands.worst_ratio(design.result.informations).ratio <= 1.0 + 1e-9
     # Any frequencies at all make a relaxation: a plain bound by the active ones holds.
     assert design.any_spectrum.certificate.bound <= design.result.objective
+
+
+def random_plant(rng):
+    """2 x 2, entries of second order, poles within a decade of 1 rad/s."""
+    size = (2, 2)
+    numerator = [[[rng.uniform(0.5, 5.0)] for _ in range(2)] for _ in range(2)]
+    denominator = np.empty((*size, 3))
+    for index in np.ndindex(*size):
+        frequency, damping = 10 ** rng.uniform(-0.5, 0.5), rng.uniform(0.1, 1.0)
+        denominator[index] = [frequency**2, 2 * damping * frequency, 1.0]
+    return ContinuousModel.monic(arrays(numerator), arrays(denominator.tolist()), np.eye(2))
+
+
+def case(seed):
+    """The plant of the paper, or a random one: its model, band, order, criterion, whether complex."""
+    if seed is None:
+        return two_by_two(), (0.0, 2.0), 40, "E", False
+    rng = np.random.default_rng(seed)
+    low = float(rng.choice([0.0, 0.1, 0.5]))
+    band, order = (low, low + float(rng.choice([0.5, 2.0, 6.0]))), int(rng.integers(4, 31))
+    return random_plant(rng), band, order, "DAET"[seed % 4], seed % 3 == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [None, *range(12)])
+def test_plants_bands_orders_and_criteria_of_two_inputs(seed):
+    model, band, order, criterion, hermitian = case(seed)
+    question = Question(
+        Experiment(model, 1, band),
+        PolynomialBasis(2, order, band, hermitian),
+        "factor",
+        [lambda experiment: Criterion(criterion, experiment.factor)],
+        limits=[PowerLimit("input", 1000.0), PowerLimit("output", 1000.0)],
+    )
+    power = white_power(question)
+    problem = whitened_problem(question, np.full(2, power / 2))
+    found = exchange(problem, power * problem.basis.even, tolerance=1e-7)
+    assert found.gap <= (1e-6 if seed is None else 1e-5)
+    eigenvalues = np.linalg.eigvalsh(problem.basis.density(found.x, np.linspace(*band, 400)))
+    assert eigenvalues.min() >= -1e-9 * eigenvalues.max()

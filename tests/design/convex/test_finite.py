@@ -1,5 +1,7 @@
 """Finite programs: the interior-point method against Clarabel, and linear ones of lines against cvxpy."""
 
+import dataclasses
+
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -124,6 +126,22 @@ def test_multipliers_prove_the_optimum(name):
     assert reduced.min() >= -1e-6
     proved = required - svec(weight) @ part.offset - found.limit_weights @ program.limit_offset
     assert proved == pytest.approx(program.cost @ found.v, rel=1e-6)
+
+
+def test_information_in_blocks_is_the_same_program():
+    """Two plants side by side: entries of M between them are left out, and change nothing."""
+    rng = np.random.default_rng(5)
+    program = random_program(rng, "nonnegative", [MatrixCut(np.diag([1.0, 2.0, 1.0, 0.5, 1.0]))], "cost")
+    apart = np.ones((K, K))
+    apart[:2, 2:] = apart[2:, :2] = 0.0
+    kept = svec(apart) != 0
+    whole = program.matrices[0]
+    apart = dataclasses.replace(whole, gains=whole.gains * kept[:, None])
+    split = dataclasses.replace(program, matrices=[apart])
+    found, error = by_interior(split, tolerance=1e-9)
+    assert error <= 1e-6
+    reference = by_cones(split, tolerance=1e-9)
+    assert split.cost @ found.v == pytest.approx(split.cost @ reference.v, rel=1e-7)
 
 
 def random_problem(seed, *, floors):

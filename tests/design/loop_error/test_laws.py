@@ -143,6 +143,21 @@ def case(n, K, seed):
     return A, np.array(metrics), rng.uniform(0.5, 5.0, 2 * n), np.full(K, 1 / K)
 
 
+def grid_program(A, metrics, limits, weights):
+    """The textbook program: a complex matrix inequality for each frequency, in cvxpy."""
+    import cvxpy as cp
+
+    K, n, _ = A.shape
+    Phi = [cp.Variable((n, n), hermitian=True) for _ in range(K)]
+    Q = [cp.Variable((n, n), hermitian=True) for _ in range(K)]
+    root = power_of(A, 0.5)
+    constraints = [cp.bmat([[Q[k], root[k]], [root[k], Phi[k]]]) >> 0 for k in range(K)]
+    for M, limit in zip(metrics, limits, strict=True):
+        constraints.append(cp.real(sum(weights[k] * cp.trace(M[k] @ Phi[k]) for k in range(K))) <= limit)
+    value = cp.real(sum(weights[k] * cp.trace(Q[k]) for k in range(K)))
+    return cp.Problem(cp.Minimize(value), constraints).solve(solver=cp.CLARABEL)
+
+
 @pytest.mark.first(3)
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(4))
@@ -166,6 +181,14 @@ def test_the_gap_closes_and_the_certificate_holds(n, seed):
     assert np.max(design.multipliers * limits * slack) < 1e-9 * design.value
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", range(2))
+def test_the_optimum_is_that_of_the_grid_program(seed):
+    A, metrics, limits, weights = case(2, 12, seed)
+    design = design_within(A, metrics, limits, weights)
+    assert design.value == pytest.approx(grid_program(A, metrics, limits, weights), rel=2e-6)
+
+
 def test_one_total_limit_is_the_closed_form():
     A, _, _, weights = case(3, 64, 3)
     even = np.broadcast_to(np.eye(3, dtype=complex), (1, 64, 3, 3))
@@ -174,6 +197,21 @@ def test_one_total_limit_is_the_closed_form():
     total = np.trace(root, axis1=1, axis2=2).real @ weights
     np.testing.assert_allclose(design.spectrum, root * 2.5 / total, rtol=1e-10, atol=1e-12)
     assert design.value == pytest.approx(total**2 / 2.5, rel=1e-12)
+
+
+def test_the_column_with_a_limit_for_each_input_and_output():
+    limits = tuple(
+        PowerLimit(kind, bound, channel=channel)
+        for kind, bounds in (("input", (1.2, 0.6)), ("output", (1e-3, 1e-3)))
+        for channel, bound in enumerate(bounds)
+    )
+    problem = column(limits=limits)
+    design, rule, change = problem.asymptotic()
+    assert abs(design.gap) < 1e-10
+    assert change < 1e-10
+    again = problem.spectrum_at(rule.nodes, design.multipliers)
+    ratio = np.trace(design.spectrum, axis1=1, axis2=2).real / np.trace(again, axis1=1, axis2=2).real
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

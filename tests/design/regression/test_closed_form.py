@@ -5,9 +5,11 @@ from dataclasses import replace
 import cvxpy as cp
 import numpy as np
 import pytest
+import scipy.optimize
 
 from inputdesign_cli.design.regression.model import Regression, energy_bound, error_bound, least_error
 from inputdesign_cli.questions.regression.solve import sensitivity
+from tests.support.regression import mse
 
 ONE = Regression(np.array([1.0]), np.array([1.0]), 1.0, 1.0)
 
@@ -43,6 +45,37 @@ def test_figure_1_and_its_limits(alpha):
 def test_nothing_neglected_counts(second):
     R = least_energy(Regression(np.array([3.0, 4.0]), second, 2.0, 0.5), 2.0)
     assert np.trace(R) == pytest.approx(0.5 * 25 / 2.0, rel=1e-14)
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize(("m", "n"), [(1, 2), (2, 3), (1, 3), (2, 4)])
+def test_brute_force_finds_nothing_better(m, n):
+    """The original problem over all R = F F^T with F of full size: nothing below, and the same to 1e-6."""
+    rng = np.random.default_rng([m, n])
+    regression = random_regression(rng, m, n)
+    target = rng.uniform(0.3, 3.0)
+    L1, L2 = regression.estimated, regression.neglected
+    alpha, variance = regression.neglected_norm, regression.variance
+    exact = np.trace(least_energy(regression, target))
+
+    def energy(entries):
+        F = entries.reshape(n, n)
+        R = F @ F.T
+        R = R / np.trace(R) + 1e-14 * np.eye(n)
+        bias = mse(R, L1, L2, alpha, 0.0)
+        return mse(R, L1, L2, 0.0, variance) / (target - bias) if bias < 0.999 * target else 1e3 * (1 + bias)
+
+    values = []
+    for _ in range(2):
+        # Regressors close to the direction that carries the quantity leave the search a feasible start.
+        start = 0.05 * rng.standard_normal((n, n))
+        start[:, 0] += np.concatenate([L1, L2])
+        point = start.ravel()
+        for _ in range(4):  # anew from where it stops: the optimum is singular, and BFGS gets stuck
+            point = scipy.optimize.minimize(energy, point, method="BFGS", jac="3-point").x
+        values.append(energy(point))
+    assert min(values) >= exact * (1.0 - 1e-9)
+    assert min(values) == pytest.approx(exact, rel=1e-6)
 
 
 @pytest.mark.parametrize(("m", "n"), [(1, 2), (2, 4), (3, 5)])

@@ -45,6 +45,17 @@ def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
     assert code == 5, "a verdict cannot rest on a structure that is refuted"
 
 
+@pytest.mark.slow
+def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
+    until_it_ends(run, begun, tmp_path)
+    assert run("next", "c", "--withdraw", 1, "--no-figures")[0] in (0, 5)
+    result = json.loads((begun / "result.json").read_text())
+    listed = [one["figures"]["records"] for one in result["findings"] if "records" in one["figures"]]
+    assert all("record_01.csv" not in records for records in listed)
+    named = [note for note in result["notes"] if "idesign explore" in note]
+    assert not any("record_01.csv" in note or "record_??" in note for note in named)
+
+
 def test_a_record_is_not_withdrawn_and_forgiven_at_once(run, begun):
     code, _, err = run("next", "c", "--withdraw", 1, "--regardless")
     assert code == 2
@@ -72,3 +83,12 @@ def test_right_models_are_seldom_refuted_at_any_part():
             for n in range(40, 601, 20)
         )
     assert refuted <= 4
+
+
+@pytest.mark.slow
+def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
+    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 60, stop: never}"))
+    assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
+    code, result = until_it_ends(run, tmp_path / "c", tmp_path)
+    assert result["samples"] == 200
+    assert code == 5
