@@ -37,6 +37,12 @@ def test_links_lead_to_a_file_and_a_heading_and_every_table_has_a_header(page):
     assert [table for table in tables if not re.match(r".*\n\|[-|]+\n", table)] == []
 
 
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "benchmarks" / "README.md"], ids=lambda page: page.stem)
+def test_files_that_are_named_as_evidence_exist(page):
+    named = re.findall(r"\b(?:tests|benchmarks|specs|golden)/[\w./-]*\w", page.read_text(encoding="utf-8"))
+    assert [name for name in named if "NAME" not in name and not (ROOT / name).exists()] == []
+
+
 def test_every_source_cited_by_key_has_an_entry():
     cited = {key for file in FILES for key in CITATION.findall(file.read_text(encoding="utf-8"))}
     assert cited <= anchors(REFERENCES)
