@@ -281,13 +281,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a single file.
-
-    Raises:
-        OutputError: `output-not-writable`, `output-full`.
-    """
-    with output_errors(path):
-        path.write_bytes(content)
+    """Write a single file as `replace_text` does; what is no file, as a pipe or a device, is written into."""
+    if path.exists() and not path.is_file():
+        with output_errors(path):
+            path.write_bytes(content)
+    else:
+        _replace(Path(os.path.realpath(path)), [content])
 
 
 def replace_text(path: Path, text: str | Iterable[str]) -> None:
@@ -298,11 +297,15 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
     Raises:
         OutputError: `output-not-writable`, `output-full`.
     """
+    _replace(path, map(encoded, [text] if isinstance(text, str) else text))
+
+
+def _replace(path: Path, pieces: Iterable[bytes]) -> None:
     partial = path.with_name(f".{path.name}.partial-{os.getpid()}")
     with output_errors(path):
         try:
-            with partial.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
-                file.writelines([text] if isinstance(text, str) else text)
+            with partial.open("wb") as file:
+                file.writelines(pieces)
                 file.flush()
                 os.fsync(file.fileno())
             partial.replace(path)

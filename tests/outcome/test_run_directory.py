@@ -18,7 +18,7 @@ import pytest
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome.curves import OptimalityCurves, SignalCurves
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.run_directory import read_run, write_run
+from inputdesign_cli.outcome.run_directory import read_run, write_bytes, write_run
 from tests.support.outcomes import typed
 from tests.support.processes import running
 from tests.support.refusals import refused
@@ -161,6 +161,23 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, error, rais
         if raised is OutputError:
             assert caught.value.diagnostics[0].code == CODES[error.errno]
         assert names(place) == set(), step
+
+
+@pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
+def test_a_failure_at_any_step_of_a_single_file_keeps_the_old_one(tmp_path, error, raised):
+    (tmp_path / "old.csv").write_bytes(b"old")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "old.csv")
+    for step in (1, 2):
+        with pytest.raises(raised):
+            sabotaged(lambda: write_bytes(tmp_path / "link.csv", b"new"), step, error)
+        assert contents(tmp_path) == {"old.csv": b"old", "link.csv": b"old"}
+    write_bytes(tmp_path / "link.csv", b"new")
+    assert contents(tmp_path) == {"old.csv": b"new", "link.csv": b"new"}
+    os.mkfifo(tmp_path / "pipe")
+    reading = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_bytes(tmp_path / "pipe", b"new")
+    assert os.read(reading, 9) == b"new"
+    os.close(reading)
 
 
 @pytest.mark.first(2)
