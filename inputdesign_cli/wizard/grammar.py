@@ -462,7 +462,7 @@ def _middle(found: re.Match[str]) -> str:
 def _between(low: float, high: float, unit: str) -> str:
     """Return the middle of two ends, and the share to either side that reaches them."""
     share = 100.0 * (high - low) / (high + low)
-    return f"{0.5 * (low + high):.4g} {unit} within {share:.3g} % itself"
+    return f"{0.5 * (low + high):.4g} {unit} within {share:.7g} % itself"
 
 
 def unread(text: str) -> list[str]:
