@@ -145,6 +145,9 @@ def assess(
         )
     again, explores = typed(changes, levels, rows), ["idesign", "explore", "--spec", str(spec)]
     explores += typed(replace(levels, remove_means=False))  # what explore estimates itself
+    place_of_next = Path("runs") / f"{data[0].stem}_explored"
+    if spec.resolve().parent == place_of_next.resolve():  # the spec is to stay as it is
+        explores += ["-o", f"{place_of_next}_again"]
     begins = {
         "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
         # The longer beginning comes first: columns that the command has are not named twice.

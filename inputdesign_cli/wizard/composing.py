@@ -48,6 +48,7 @@ _MEANWHILE = {
 _ORDERS, _LINES = (20, 40), (60, 120, 240)
 _ENOUGH = 1.02  # of the bound over every spectrum
 _FIRST = "{type: fir, order: 20}"
+_WITHOUT_MEAN = "{type: multisine, lines: 60}"  # power at frequency 0 would move an integrator without end
 _LEAST_GAP = 1e-3  # smaller gaps are written as this
 _POSITIONS = 10  # the fewest of an input that keeps them
 _PERIODS = 5  # of a record for a Bode plot
@@ -124,14 +125,16 @@ def compose(
     plant = (plant or understand_plant(said["plant"], stem, folder)).sampled_for(said["wish"])
     span, there = input_range(said["range"], plant), Phrase(said["time"], "time", plant.clock).lasting()
     step, why = plant.sample_time, _reason_of_sampling(plant, there)
-    hold, control = dwell(said["hold"], plant), controller(said["loop"], plant)
+    hold = dwell(said["hold"], plant)
+    control = controller(said["loop"], plant, keeps=hold > 1)
     vague = plant.covariance is not None or bool(plant.intervals)
     most = _MOST_IN_LOOP if vague and control is not None else _MOST
     asked = wished(said["wish"], plant, control is not None, min(there, most * step))
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"], plant)
     made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
-    two_levels = made == "multisine" and hold > 1 and control is None and not nonparametric
+    wanders = plant.integrates and control is None
+    two_levels = made == "multisine" and hold > 1 and control is None and not (nonparametric or wanders)
     heard = [*plant.heard, *remarks, *beyond_models(", ".join(said.values()))]
     heard += _of_controller(plant, control, said["loop"], hold)
     facts = {
@@ -160,7 +163,8 @@ def compose(
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
     notes = (*heard, *against, *[_UNUSED] * unused)
-    return Draft(facts, plant.files, None if nonparametric else _FIRST, folder, said, there, notes)
+    first = None if nonparametric else _WITHOUT_MEAN if wanders else _FIRST
+    return Draft(facts, plant.files, first, folder, said, there, notes)
 
 
 def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
@@ -176,9 +180,12 @@ def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
 
 
 def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int) -> list[str]:
-    """Return remarks on the controller that is taken unasked, and on what keeps its values under it."""
+    """Return remarks on what is taken unasked: a controller, or none, and what keeps its values under it."""
     if control is None:
-        return []
+        wanders = "the plant integrates and is played in open loop, as the actuator keeps its positions: see"
+        return [
+            f"{wanders} predicted_output.csv, and limit the output (limits) or name a controller (loop)"
+        ] * (plant.integrates and said.lower() == "as the plant")
     unasked = "slope" in plant.values and said.lower() == "as the plant"
     taken = f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"
     held = "under a controller r keeps its values, and the actuator still moves at every sample"
@@ -220,7 +227,8 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     most = max(draft.spec().experiment.samples // 2, 1)
     lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
     # Each in the words of a spec and of a comment.
-    spectra = [(f"{{type: fir, order: {n}}}", f"filtered noise of order {n}") for n in _ORDERS]
+    orders = _ORDERS if draft.spectrum == _FIRST else ()
+    spectra = [(f"{{type: fir, order: {n}}}", f"filtered noise of order {n}") for n in orders]
     spectra += [(f"{{type: multisine, lines: {n}}}", f"{n} sinusoids") for n in lines]
     for words, what in spectra:
         one = replace(draft, spectrum=words, why=what)

@@ -86,6 +86,7 @@ class PlantAnswer:
     sampling: float | None = None  # time_unit between samples, where that is known already
     why_sampling: str = "as the plant is sampled"  # the reason for these
     tunable: bool = False  # whether rules of tuning know it
+    integrates: bool = False  # it has a pole at 0
     undelayed: bool = False  # one lag with hardly a dead time, whose loop these would make as fast as can be
     channels: int = 1  # the larger number of its inputs and outputs
     explored: Spec | None = None  # the model of a log, which has its noise
@@ -225,6 +226,7 @@ def _integrating(plant: PlantAnswer) -> PlantAnswer:
         ),
         slow=values.get("time_constant", late),
         controller=f"{{pid: {{{settings}}}}}",
+        integrates=True,
         sampling=plant.sampling or _round_step(late / 2.0),
         why_sampling="as you said" if plant.sampling else "half of dead time and lag, or a little less",
     )
@@ -290,6 +292,7 @@ def system_of(path: Path) -> PlantAnswer:
         sampling=None if decays.size else _round_step(late / 2.0),
         why_sampling="half the dead time, or a little less, for it has no time constant",
         tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
+        integrates=bool(integrates),
         undelayed=len(den) == 2 and not integrates and not late,
     )
 

@@ -45,6 +45,16 @@ _MATTERS = re.compile(
     r"peak\S*)\b",
     re.I,
 )
+# "avoid two levels", "no binary signal": what is not wanted answers no question.
+_LEVELS = r"(?:(?:two|three) levels|binary|ternary|on[/-]off)\b"
+_UNWANTED = re.compile(
+    r"\b(?:avoid\w*\b|(?:do not|don't|must not|should not|never|can ?not|can't)"
+    r"\s+(?:use|want|like|take|play|apply)\b"
+    rf"|(?:no|not|without|than|instead of|anything but)\s+(?:(?:an?|any|the)\s+)?(?={_LEVELS})"
+    rf"|(?={_LEVELS}(?:\s+signals?)?\s+(?:is|are)\s+(?:not|never|no|forbidden|excluded)\b))"
+    r"(?:[^,;.|]|\.(?=\d))*",
+    re.I,
+)
 # The size of a device says nothing of its dynamics.
 _RATED = re.compile(
     r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
@@ -154,6 +164,8 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
     said, named = _with_names(in_figures(text))
     left = BEYOND.sub(_taken, said)
+    unwanted = [part[0].strip() for part in _UNWANTED.finditer(left)]
+    left = _UNWANTED.sub(_taken, left)
     for key in _TURNS:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):
@@ -169,7 +181,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     if "wish" in found and any(wishes.PRECISE.search(said) for _, said in found["wish"]):  # "of a flow loop"
         found["wish"] = [one for one in found["wish"] if not wishes.NAMES_A_LOOP.fullmatch(one[1])]
     parts = [part.strip() for clause in _ENDS.split(left) for part in clause.split("|") if unread(part)]
-    unclear = [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
+    unclear = unwanted + [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
     beside = [part for part in beside if part.lower() not in " ".join(answers.values()).lower()]

@@ -162,9 +162,13 @@ def limited(text: str, plant: PlantAnswer) -> tuple[float | None, float | None]:
     return rate, output
 
 
-def controller(text: str, plant: PlantAnswer) -> str | None:
-    """Return the controller of the experiment as YAML; None in open loop."""
-    known = {"as the plant": plant.controller, "open": None}
+def controller(text: str, plant: PlantAnswer, *, keeps: bool = False) -> str | None:
+    """Return the controller of the experiment as YAML; None in open loop.
+
+    Args:
+        keeps: whether the actuator keeps positions, as it does under no controller.
+    """
+    known = {"as the plant": None if keeps else plant.controller, "open": None}
     if text.lower() in known:
         return known[text.lower()]
     if plant.channels > 1:

@@ -114,6 +114,12 @@ def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys)
         then = out.splitlines()[-1].removeprefix("Then: ")
         assert "--operating-point u1=0,y1=0" in then
         assert idesign(*shlex.split(then)[1:])[0] in (EXIT_DONE, EXIT_MISSED)
+        # A spec that lies where explore writes is explored again beside it.
+        spec = Path("runs/a record_explored/spec.yaml")
+        spec.write_text((folder / "heat exchanger.yaml").read_text())
+        code, out, _ = idesign("assess", spec, folder / "a record.csv", *options, "-o", "again")
+        assert code == EXIT_UNDECIDED
+        assert idesign(*shlex.split(out.splitlines()[-1].removeprefix("next: "))[1:])[0] == EXIT_DONE
 
 
 @pytest.mark.slow

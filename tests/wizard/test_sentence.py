@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from inputdesign_cli import solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard.composing import Conversation, compose
 from inputdesign_cli.wizard.plants import plant_of_words
@@ -562,6 +563,27 @@ def test_a_clause_that_answers_nothing_is_not_lost():
     assert "moon is full" in remark
 
 
+@pytest.mark.parametrize(
+    "part",
+    [
+        "avoid two levels",
+        "do not use a binary signal",
+        "no binary signal",
+        "without three levels",
+        "rather a multisine than two levels",
+        "two levels are not allowed",
+        "avoid drift",
+        "don't want a loop",
+        "avoid more than 0.5 % of overshoot",
+    ],
+)
+def test_what_is_not_wanted_is_asked_about_and_answers_nothing(part):
+    heard = in_sentence(f"gain 2 degC per %, lag 3 min, noise 0.1, {part}, 2 h")
+    assert set(heard.answers) == {"plant", "noise", "time"}
+    assert len(heard.unclear) == 1
+    assert heard.unclear[0] in part
+
+
 def test_a_sentence_stands_behind_other_answers_and_has_their_place(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text(f'time: 2 h\nplant: "{EXCHANGER}"\n')
@@ -579,6 +601,28 @@ def test_about_is_within_a_fifth_and_said_back(word):
     assert "gain 1.28 to 1.92" in said
     assert "dead time" not in said
     assert plant_of_words(f"gain {word} 1.6, time constant 9, each within 5 %").heard == ()
+
+
+@pytest.mark.parametrize("plant", ["words", "system"])
+@pytest.mark.parametrize("answer", [{"hold": "20 s"}, {"loop": "open"}, {"hold": "20 s", "loop": "open"}])
+def test_an_actuator_that_keeps_positions_plays_to_an_integrator_in_open_loop(plant, answer, tmp_path):
+    """No power at frequency zero: the sum of the input over the record, which the output is, stays small."""
+    (tmp_path / "p.json").write_text('{"num": [0.02], "den": [1, 0], "delay": 10}')
+    known = "integrates 1.2 %/min per %, dead time 10 s" if plant == "words" else "p.json"
+    draft = compose(ENGINEER | {"plant": known, "time": "30 min"} | answer, "x", tmp_path)
+    spec = draft.spec()
+    assert spec.experiment.controller is None
+    unasked = "loop" not in answer
+    assert any("open loop" in note for note in draft.notes) == unasked
+    solved = solve(spec.with_(uncertainty=None, **{"solver.any_spectrum": False}))
+    (u,) = (
+        values - spec.signal.offset
+        for name, values in solved.tables["signal"].columns.items()
+        if name.startswith("u1")
+    )
+    assert np.max(np.abs(np.cumsum(u))) < 0.1 * len(u) * np.max(np.abs(u))
+    if "hold" in answer:
+        assert np.min(np.diff(np.flatnonzero(np.diff(u)))) * spec.sample_time >= 20
 
 
 def test_a_plant_that_integrates_is_held_by_a_stable_loop(tmp_path):
