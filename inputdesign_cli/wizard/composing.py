@@ -132,9 +132,8 @@ def compose(
     asked = wished(said["wish"], plant, control is not None, min(there, most * step))
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"], plant)
-    made, unused = asking.chosen("signals", said["signals"], _TYPES), nonparametric and vague
+    unused = nonparametric and vague
     wanders = plant.integrates and control is None
-    two_levels = made == "multisine" and hold > 1 and control is None and not (nonparametric or wanders)
     heard = [*plant.heard, *remarks, *beyond_models(", ".join(said.values()))]
     heard += _of_controller(plant, control, said["loop"], hold)
     facts = {
@@ -155,7 +154,7 @@ def compose(
         "periods": _PERIODS,
         "there": there,
         "most": most,
-        "made": "binary" if two_levels else made,
+        "made": _made(said["signals"], hold if control is None and not (nonparametric or wanders) else 1),
         "converter": quantisation(said["converter"], span),
         "hold": hold,
         "returns": asking.chosen("return", said["return"], {"yes": True, "no": False}),
@@ -165,6 +164,12 @@ def compose(
     notes = (*heard, *against, *[_UNUSED] * unused)
     first = None if nonparametric else _WITHOUT_MEAN if wanders else _FIRST
     return Draft(facts, plant.files, first, folder, said, there, notes)
+
+
+def _made(said: str, hold: int) -> str:
+    """Return the kind of signal: positions that last determine more at two levels."""
+    kind = asking.chosen("signals", said, _TYPES)
+    return "binary" if kind == "multisine" and hold > 1 else kind
 
 
 def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
