@@ -127,12 +127,11 @@ def compose(
     step, why = plant.sample_time, _reason_of_sampling(plant, there)
     hold = dwell(said["hold"], plant)
     control = controller(said["loop"], plant, keeps=hold > 1)
-    vague = plant.covariance is not None or bool(plant.intervals)
-    most = _MOST_IN_LOOP if vague and control is not None else _MOST
+    most = _MOST_IN_LOOP if plant.vague and control is not None else _MOST
     asked = wished(said["wish"], plant, control is not None, min(there, most * step))
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"], plant)
-    unused = nonparametric and vague
+    unused = nonparametric and plant.vague
     wanders = plant.integrates and control is None
     heard = [*plant.heard, *remarks, *beyond_models(", ".join(said.values()))]
     heard += _of_controller(plant, control, said["loop"], hold)
@@ -149,7 +148,7 @@ def compose(
         "points": _points(span),
         "rate": rate,
         "output": output,
-        "looped": vague and control is not None and not nonparametric,
+        "looped": plant.vague and control is not None and not nonparametric,
         "duration": _duration(there, most * step, step, hold, nonparametric=nonparametric),
         "periods": _PERIODS,
         "there": there,
@@ -160,8 +159,7 @@ def compose(
         "returns": asking.chosen("return", said["return"], {"yes": True, "no": False}),
         "channels": channels_of(said, plant, span),
     }
-    against = (f"against the model of {plant.source}: {one}" for one in plant.against)
-    notes = (*heard, *against, *[_UNUSED] * unused)
+    notes = (*heard, *plant.doubts, *[_UNUSED] * unused)
     first = None if nonparametric else _WITHOUT_MEAN if wanders else _FIRST
     return Draft(facts, plant.files, first, folder, said, there, notes)
 

@@ -102,6 +102,16 @@ class PlantAnswer:
         """Return the seconds in the unit of time."""
         return SECONDS[self.time_unit]
 
+    @property
+    def vague(self) -> bool:
+        """Return whether the plant is known within bounds only, or with errors."""
+        return self.covariance is not None or bool(self.intervals)
+
+    @property
+    def doubts(self) -> list[str]:
+        """Return what the data say against the model, a sentence each."""
+        return [f"against the model of {self.source}: {one}" for one in self.against]
+
     def sampled_for(self, wish: str) -> PlantAnswer:
         """Return the plant sampled as fast as the derivative of a PID needs, if nothing else is known."""
         late = self.values.get("dead_time", 0.0)
