@@ -22,7 +22,7 @@ _UNIT = r"(?:[^\s,;|.:+±]|[.:](?=[^\s|]))"  # a letter of it
 _NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak|may|can|must"
 UNIT = rf"(?:\s*(?!(?:{_NO_UNIT})\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
-ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly)\b\.?|~|≈)"
+ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly|near)\b\.?|~|≈)"
 OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
 WITHIN = (
     rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS})"
@@ -57,7 +57,7 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
-LATE = r"dead time|delay|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
+LATE = r"dead time|(?:transport |pure )?delay(?:ed by)?|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
 """What is said of a dead time."""
 _TIMED = rf"(?:time constant|lag|{LATE})"
 _SOME = rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
@@ -136,6 +136,7 @@ SIGNAL = "(?:level|temp(?:erature)?|speed|pressure|flow|position|concentration|o
 SENSOR = r"(?:sensor|encoder|thermocouple|transmitter|thermometer)\b"
 DRIVE = (
     "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"
+    "|gate"
     "|input|actuator)"
 )
 # "per minute", and of a gain "per 10 % of valve".

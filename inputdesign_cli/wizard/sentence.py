@@ -181,6 +181,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     if "wish" in found and any(wishes.PRECISE.search(said) for _, said in found["wish"]):  # "of a flow loop"
         found["wish"] = [one for one in found["wish"] if not wishes.NAMES_A_LOOP.fullmatch(one[1])]
     parts = [part.strip() for clause in _ENDS.split(left) for part in clause.split("|") if unread(part)]
+    parts = [part for part in parts if part.lower() != "but"]
     unclear = unwanted + [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}

@@ -401,6 +401,8 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("each position lasts 20 s", "hold", "20 s"),
         ("the valve must stay 20 s in each position", "hold", "20 s"),
         ("positions are kept for 20 s", "hold", "20 s"),
+        ("Rest at 3 V, may change by 1 V", "range", "Rest at 3 V, may change by 1 V"),
+        ("Gate is at 40 mm, plus or minus 6 mm", "range", "Gate is at 40 mm, plus or minus 6 mm"),
         ("valve at 40 %, 5 % either way", "range", "valve at 40 %, by 5 %"),
         ("valve 40 % give or take 4 %", "range", "valve 40 % give or take 4 %"),
         ("one ml/min more means 0.1 pH less", "plant", "gain -0.1 pH per 1 ml/min"),
@@ -601,6 +603,15 @@ def test_about_is_within_a_fifth_and_said_back(word):
     assert "gain 1.28 to 1.92" in said
     assert "dead time" not in said
     assert plant_of_words(f"gain {word} 1.6, time constant 9, each within 5 %").heard == ()
+
+
+@pytest.mark.parametrize(
+    "late", ["delayed by 5 s", "5 s transport delay", "a delay of 5 s", "pure delay 5 s"]
+)
+def test_a_dead_time_is_called_a_delay(late):
+    plant = plant_of_words(in_sentence(f"gain 2, lag near 25 minutes, {late}, noise 0.1").answers["plant"])
+    assert plant.values == {"gain": 2.0, "time_constant": 1500.0, "dead_time": 5.0}
+    assert list(plant.intervals) == ["time_constant"]  # near is about
 
 
 @pytest.mark.parametrize("plant", ["words", "system"])
