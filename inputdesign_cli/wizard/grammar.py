@@ -57,7 +57,10 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
-LATE = r"dead time|(?:transport |pure )?delay(?:ed by)?|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
+LATE = (
+    r"dead time|(?:transport |pure )?delay(?:ed by)?"
+    r"|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
+)
 """What is said of a dead time."""
 _TIMED = rf"(?:time constant|lag|{LATE})"
 _SOME = rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
@@ -136,8 +139,7 @@ SIGNAL = "(?:level|temp(?:erature)?|speed|pressure|flow|position|concentration|o
 SENSOR = r"(?:sensor|encoder|thermocouple|transmitter|thermometer)\b"
 DRIVE = (
     "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"
-    "|gate"
-    "|input|actuator)"
+    "|gate|input|actuator)"
 )
 # "per minute", and of a gain "per 10 % of valve".
 _SIZE = r"(?P<size>(?!(?:per|and)\b)(?:[^\s\d,;|/.:]|[.:](?=[^\s|]))+)"
