@@ -185,7 +185,8 @@ def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
 def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int) -> list[str]:
     """Return remarks on what is taken unasked: a controller, or none, and what keeps its values under it."""
     if control is None:
-        wanders = "the plant integrates and is played in open loop, as the actuator keeps its positions: see"
+        why = ", as the actuator keeps its positions" * (hold > 1)
+        wanders = f"the plant integrates and is played in open loop{why}: see"
         return [
             f"{wanders} predicted_output.csv, and limit the output (limits) or name a controller (loop)"
         ] * (plant.integrates and said.lower() == "as the plant")

@@ -393,6 +393,8 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     A gain, a lag and a dead time, which rules of tuning know, are taken where they do nearly as well.
     """
     from inputdesign_cli import questions
+    from inputdesign_cli.plant.loop import INTEGRATES
+    from inputdesign_cli.questions.building.system import build_model
     from inputdesign_cli.records import Preparation
 
     named, name = Preparation(columns=columns), f"{stem}-model.yaml"
@@ -422,6 +424,7 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         covariance=name if channels == 1 else None,
         sampling=spec.sample_time,
         tunable=process is not None,
+        integrates=bool(np.any(np.abs(build_model(spec).plant_points) < INTEGRATES)),
         undelayed=lag is not None and late <= _HARDLY * spec.sample_time,
         channels=channels,
         explored=spec,

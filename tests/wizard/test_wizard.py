@@ -220,6 +220,21 @@ def test_the_record_does_not_repeat():
     assert np.abs(u).max() <= 5.0
 
 
+@pytest.mark.slow
+def test_a_tank_of_a_log_is_played_without_power_at_frequency_zero(tmp_path):
+    """A tank behind a lagging valve integrates: power there would give unlimited information."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.choice([-4.0, 4.0], 75), 8)
+    valve = lfilter([0, 0.2], [1, -0.8], u)
+    y = np.cumsum(np.concatenate([[0.0], 0.1 * valve[:-1]])) + 0.05 * rng.standard_normal(600)
+    saved(tmp_path / "log.csv", "time,u,y", 5.0 * np.arange(600), u, y)
+    asked = {key: text for key, text in ENGINEER.items() if key != "noise"}
+    draft = compose({**asked, "plant": "log log.csv", "wish": "PI loop with 6 dB"}, "x", tmp_path)
+    draft.validate()
+    assert draft.spec().experiment.controller is None
+    assert draft.spec().spectrum.type == "multisine"
+
+
 def test_a_log_is_explored_and_keeps_its_unit_of_time(tmp_path):
     """The static gain of 0.5 q^-2/(1 - 0.8 q^-1) is 2.5."""
     rng = np.random.default_rng(3)
