@@ -48,6 +48,9 @@ class DeadBeat(Section):
 FINDING = {
     "undecided": "def judges(results):\n    return [Finding('mine', UNDECIDED, 'No.')]\n",
     "no finding": "def judges(results):\n    return ['no']\n",
+    "undeclared": "def judges(results):\n    return [Finding('mine', NOTE, 'No.')]\n",
+    "not finite": "@finding(NOTE, 'mine', 'R')\ndef judges(kind, results):\n"
+    "    'T. X'\n    return [kind.found(size=float('nan'))]\n",
     "no function": "judges = 1\n",
 }
 ENTRY_POINTS = """

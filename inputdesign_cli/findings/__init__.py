@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 
 from inputdesign_cli.diagnostics import Explanation, explanations as of_errors
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.finding import DOUBT, KINDS, NOTE, Finding, FindingKind
+from inputdesign_cli.finding import DOUBT, KINDS, NOTE, FindingKind
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.plugins import loaded, points, refused
 from inputdesign_cli.specification import plugins
@@ -39,10 +39,9 @@ def with_added(results: Results) -> Results:
     The verdict is there before them.
 
     Raises:
-        SpecError: `bad-plug-in`, what is referred to cannot be loaded, or gives another thing than notes and
-            doubts.
+        SpecError: `bad-plug-in`, what is referred to cannot be loaded. Or it gives something other than notes
+            and doubts with declared codes and finite figures.
     """
-    added = list[Finding]()
     for point in points("idesign.findings").values():
         find = loaded(point)
         if not callable(find):
@@ -50,5 +49,11 @@ def with_added(results: Results) -> Results:
         found = list(find(results))
         if not {getattr(one, "severity", None) for one in found} <= {NOTE, DOUBT}:
             raise refused(point, "gives something that is no note and no doubt")
-        added += found
-    return results.saying(added) if added else results
+        if undeclared := [one.code for one in found if one.code not in KINDS]:
+            raise refused(point, f"gives {', '.join(undeclared)}, which no function declares with @finding")
+        results = results.saying(found) if found else results
+        try:
+            _ = results.result
+        except (TypeError, ValueError) as error:
+            raise refused(point, f"gives figures that cannot be written: {error}") from error
+    return results

@@ -45,16 +45,6 @@ _MATTERS = re.compile(
     r"peak\S*)\b",
     re.I,
 )
-# "avoid two levels", "no binary signal": what is not wanted answers no question.
-_LEVELS = r"(?:(?:two|three) levels|binary|ternary|on[/-]off)\b"
-_UNWANTED = re.compile(
-    r"\b(?:avoid\w*\b|(?:do not|don't|must not|should not|never|can ?not|can't)"
-    r"\s+(?:use|want|like|take|play|apply)\b"
-    rf"|(?:no|not|without|than|instead of|anything but)\s+(?:(?:an?|any|the)\s+)?(?={_LEVELS})"
-    rf"|(?={_LEVELS}(?:\s+signals?)?\s+(?:is|are)\s+(?:not|never|no|forbidden|excluded)\b))"
-    r"(?:[^,;.|]|\.(?=\d))*",
-    re.I,
-)
 # The size of a device says nothing of its dynamics.
 _RATED = re.compile(
     r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
@@ -99,6 +89,20 @@ def _pieces(key: str) -> tuple[tuple[str, str], ...]:
     """Return the patterns of the pieces that answer a question, and what each piece says."""
     listed = [one if isinstance(one, list) else [one, ""] for one in question(key).pieces]
     return tuple((_expanded(pattern), template) for pattern, template in listed)
+
+
+@cache
+def _unwanted() -> re.Pattern[str]:
+    """Return the pattern of what is not wanted, as in "avoid two levels": it answers no question."""
+    levels = "|".join(pattern for pattern, _ in _pieces("signals"))
+    return re.compile(
+        r"\b(?:avoid\w*\b|(?:do not|don't|must not|should not|never|can ?not|can't)"
+        r"\s+(?:use|want|like|take|play|apply)\b"
+        rf"|(?:no|not|without|than|instead of|anything but)\s+(?:(?:an?|any|the)\s+)?(?=(?:{levels}))"
+        rf"|(?=(?:{levels})(?:\s+signals?)?\s+(?:is|are)\s+(?:not|never|no|forbidden|excluded)\b))"
+        r"(?:[^,;.|]|\.(?=\d))*",
+        re.I,
+    )
 
 
 def _expanded(pattern: str) -> str:
@@ -164,8 +168,8 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
     said, named = _with_names(in_figures(text))
     left = BEYOND.sub(_taken, said)
-    unwanted = [part[0].strip() for part in _UNWANTED.finditer(left)]
-    left = _UNWANTED.sub(_taken, left)
+    unwanted = [part[0].strip() for part in _unwanted().finditer(left)]
+    left = _unwanted().sub(_taken, left)
     for key in _TURNS:
         for pattern, template in _pieces(key):
             while piece := re.search(pattern, left, re.I):
