@@ -37,12 +37,12 @@ Noise = tuple[Array, Array]
 
 
 def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Noise]]:
-    """Return C and D of every output's residuals (N, p): first as BIC prefers, then of the largest order.
+    """Return C and D of every output's residuals (N, p), of small orders, as BIC prefers them.
 
     Args:
         lengths: of the records that follow each other; the longest determines the polynomials.
     """
-    at, best, largest = int(np.argmax(lengths)), [], []
+    at, ranked = int(np.argmax(lengths)), []
     begin = sum(lengths[:at])
     for v in errors[begin : begin + lengths[at]].T:
         tried = []
@@ -51,9 +51,8 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
             power = max(float(np.mean(filtered(D, C, v) ** 2)), 1e-300)
             criterion = v.size * np.log(power) + (c + d) * np.log(v.size)
             tried.append((float(criterion), (C, D)))
-        best.append(min(tried, key=lambda one: one[0])[1])
-        largest.append(tried[-1][1])
-    return [best] if all(a is b for a, b in zip(best, largest, strict=True)) else [best, largest]
+        ranked.append([noise for _, noise in sorted(tried, key=lambda one: one[0])])
+    return [list(noises) for noises in zip(*ranked, strict=True)]
 
 
 @dataclass(frozen=True)

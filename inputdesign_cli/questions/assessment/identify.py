@@ -202,6 +202,7 @@ def _with_enough_noise(
     estimate = found.estimate
     plant = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
     noises = noises_of_residuals(estimate.errors, estimate.lengths) if estimate.tests.coloured else ()
+    better = None
     for more in noises:
         try:
             larger = replace(task.with_noise(found.model, more), header=task.header)
@@ -211,8 +212,14 @@ def _with_enough_noise(
             other = estimated(larger, found.data, paths[0], taken, start=start)
         except IdesignError:  # this plant cannot have this noise, or it cannot be estimated
             continue
-        if other.estimate.search.converged and not other.estimate.tests.coloured:
-            return larger, replace(other, noise_refuted=noise_probability(estimate))
+        tests = other.estimate.tests
+        if other.estimate.search.converged and not tests.coloured:
+            chosen = larger, replace(other, noise_refuted=noise_probability(estimate))
+            if not any(test.fault == "noise" for test in tests.failed):
+                return chosen
+            better = better or chosen
+    if better is not None:
+        return better
     return task, found
 
 
