@@ -22,7 +22,7 @@ from inputdesign_cli.identification.derived import Derived
 from inputdesign_cli.identification.directed import alternative, variations
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.gauss_newton import SETTLED, minimise
-from inputdesign_cli.identification.kind import Kind, Part, Starts
+from inputdesign_cli.identification.kind import Batch, Kind, Part, Starts
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.records import (
     Point,
@@ -126,7 +126,6 @@ class BatchEstimate:
     information: Array  # (runs, k, k), whose inverse is the covariance of theta
     converged: NDArray[np.bool_]  # (runs,)
     steps: NDArray[np.int64]  # (runs,)
-    fast: bool = False  # whether all records were estimated in one pass
 
 
 @singledispatch
@@ -237,14 +236,13 @@ def fit_batch(
     kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.model.names)))
-    together = None if free else kind.batch(inputs, outputs)
-    problem = together
+    problem: Batch | None = None if free else kind.batch(inputs, outputs)
     if problem is None:
         runs = zip(inputs, outputs, strict=True)
         problem = RecordProblem(tuple(Records(kind, (run,), free=free) for run in runs))
     found = minimise(problem, np.array(begin), settled_at=settled_at)
-    theta, fast = found.theta, together is not None
-    return BatchEstimate(theta, *problem.concluded(theta), found.converged, found.steps, fast)
+    theta = found.theta
+    return BatchEstimate(theta, *problem.concluded(theta), found.converged, found.steps)
 
 
 def information_of_data(

@@ -1,9 +1,9 @@
-"""How far estimates of short records scatter beyond first-order theory, by simulated records.
+"""How far estimates of short records scatter beyond first-order theory.
 
 First-order theory states a covariance of the estimate. A short record may hold too little noise to average,
-and the likelihood may be no parabola. Then records of the estimated model are simulated and estimated again.
-Their scatter depends on the plant. Other plants of the confidence region are therefore simulated too, if all
-their records can be estimated in one pass.
+and the likelihood may be no parabola. So records of the estimated model are simulated and estimated again.
+Their scatter is that of one plant. The likelihood of the record itself says how far other plants, which
+would have scattered more, may be.
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.estimates import scattered
 from inputdesign_cli.identification import Estimate, fit_batch
+from inputdesign_cli.identification.records import evaluate
 from inputdesign_cli.plant import Model
 
 # Runs, and the samples a parameter beyond which theory is good to a few per cent.
 _RUNS, _PLENTY = 200, 60
 _LEVEL = 0.95
-# Other plants and the runs of each; a quarter of them may scatter more than is stated.
-_OTHERS, _EACH, _MOST_OF_THEM = 8, 100, 0.75
-_TRIES = 10  # draws for each of the other plants, of which some are unstable
-_WIDEST = 6.0  # plants are drawn from a region whose variances are at most this many times those of theory
+# Models drawn about the estimate, from Gaussian densities of these multiples of the deviations of theory.
+_DRAWS, _REACH = 1000, np.array([1.0, 2.0, 4.0])
 # Smaller factors are luck of the runs; a record without an estimate as a rule has the largest.
 _LUCK, _MOST = 1.05, 1e4
 _SETTLED = 0.5
@@ -36,10 +35,10 @@ _NO_NUMBERS = (ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)  # of a p
 
 
 def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tuple[Estimate, list[Finding]]:
-    """Return the estimate with the scatter of simulated estimates, and a finding where it is larger.
+    """Return the estimate with the errors that a short record has, and a finding where they are larger.
 
     The confidence regions of the plant and of the noise are enlarged until each holds 95 % of the simulated
-    estimates. Each of these is judged by its own covariance, as the estimate itself is.
+    estimates, each judged by its own covariance, and 95 % of the likelihood of the record.
 
     Args:
         u: the inputs (N, r) of the data, applied in open loop.
@@ -48,42 +47,43 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     plenty = estimate.errors.size >= _PLENTY * estimate.theta.size
     if plenty or not estimate.search.converged or estimate.tests.failed:  # a refuted model promises nothing
         return estimate, []
-    factors, fast = _scatter(model, u, step, _RUNS, free=estimate.start.free)
+    factors = np.maximum(_scatter(model, u, step, free=estimate.start.free), _reach(model, estimate))
     if np.all(factors <= _LUCK):
         return estimate, []
-    each = [factors]
-    for other in _possible(model, estimate, np.minimum(factors, _WIDEST)) if fast else ():
-        with suppress(*_NO_NUMBERS):
-            each.append(_scatter(other, u, step, _EACH, free=estimate.start.free)[0])
-    factors = np.maximum(factors, np.quantile(each, _MOST_OF_THEM, axis=0))
     times = np.sqrt(np.maximum(factors, 1.0))  # nothing is stated more sharply than by theory
     wider = replace(estimate, factor=estimate.factor / times[:, None])
     of_plant, of_noise = (float(times[part].max(initial=1.0)) for part in (model.in_plant, ~model.in_plant))
     return wider, scattered(of_plant, of_noise, _RUNS, none=bool(factors.max() >= _MOST))
 
 
-def _possible(model: Model, estimate: Estimate, factors: Array) -> list[Model]:
-    """Return stable plants about a model, drawn with the covariance of its estimate times `factors` (k,)."""
-    rng, found = np.random.default_rng(1), list[Model]()
-    for _ in range(_TRIES * _OTHERS):
-        off = scipy.linalg.solve_triangular(estimate.factor.T, rng.standard_normal(factors.size))
-        with suppress(*_NO_NUMBERS):
-            drawn = model.at(model.theta + np.sqrt(factors) * off)
-            if drawn.flaw is None and drawn.radius < 1.0:
-                found.append(drawn)
-        if len(found) == _OTHERS:
-            break
-    return found
+def _reach(model: Model, estimate: Estimate) -> Array:
+    """Return by how much the likelihood of the data reaches beyond the region that theory states, (k,).
 
-
-def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> tuple[Array, bool]:
-    """Return by how much simulated estimates scatter more than first-order theory states, (k,).
-
-    It is the ratio of 95 % quantiles of squared distances, one for the plant and one for the noise alone. The
-    second value says whether all records were estimated in one pass.
+    Stable models are drawn about the estimate; each counts by its likelihood over the density of the draws
+    (importance sampling). The unknown size of the noise is integrated over, as Student's t does.
     """
-    rng, unknown = np.random.default_rng(0), (np.full(model.theta.size, _MOST), False)
-    e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    rng, k = np.random.default_rng(1), model.theta.size
+    records, best = estimate.search.records, estimate.search.point
+    z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, k))
+    off = scipy.linalg.solve_triangular(estimate.factor.T, z.T).T
+    exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - k * np.log(_REACH)
+    logarithms = np.full(_DRAWS, -np.inf)
+    for i, theta in enumerate(best.theta + off):
+        with suppress(*_NO_NUMBERS):
+            drawn = model.at(theta)
+            if drawn.flaw is None and drawn.radius < 1.0 and (cost := evaluate(records, theta).cost) > 0.0:
+                likelihood = -0.5 * best.freedom * np.log(cost / best.cost)
+                logarithms[i] = likelihood - scipy.special.logsumexp(exponents[i])
+    if np.max(logarithms) == -np.inf:
+        return np.ones(k)
+    weights, spread = np.exp(logarithms - np.max(logarithms)), estimate.covariance
+    return _ratios(model, np.broadcast_to(spread, (_DRAWS, k, k)), off, weights)
+
+
+def _scatter(model: Model, u: Array, step: float, *, free: bool) -> Array:
+    """Return by how much simulated estimates scatter more than first-order theory states, (k,)."""
+    rng, unknown = np.random.default_rng(0), np.full(model.theta.size, _MOST)
+    e = rng.standard_normal((_RUNS, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
     try:
         found = fit_batch(model, u, caused + noise, step, start=model.theta, free=free, settled_at=_NEAR)
@@ -92,15 +92,30 @@ def _scatter(model: Model, u: Array, step: float, runs: int, *, free: bool) -> t
     sizes = np.sqrt(np.maximum(np.einsum("rkk->rk", found.information), np.finfo(float).tiny))
     scaled = found.information / (sizes[:, :, None] * sizes[:, None, :])
     usable = found.converged & (np.linalg.cond(scaled) < _SINGULAR)
-    if np.sum(usable) < _SETTLED * runs:
+    if np.sum(usable) < _SETTLED * _RUNS:
         return unknown
     # Without units: the covariance, and the distance from the model.
     spread, away = np.linalg.inv(scaled[usable]), (sizes * (found.theta - model.theta))[usable]
+    return _ratios(model, spread, away, np.ones(len(away)))
+
+
+def _ratios(model: Model, spread: Array, off: Array, weights: Array) -> Array:
+    """Return the ratio of 95 % quantiles of squared distances to those of theory, (k,).
+
+    The plant and the noise each have one ratio.
+
+    Args:
+        spread: covariances (n, k, k) that the distances `off` (n, k) are measured by.
+        weights: how much each distance counts, (n,).
+    """
     factors = np.ones(model.theta.size)
     for part in map(np.flatnonzero, (model.in_plant, ~model.in_plant)):
         if part.size:
-            own, off = spread[:, part[:, None], part], away[:, part]
-            squares = np.einsum("ri,ri->r", off, np.linalg.solve(own, off[:, :, None])[:, :, 0])
-            quantile = np.quantile(squares, _LEVEL) / scipy.stats.chi2.ppf(_LEVEL, part.size)
-            factors[part] = min(quantile, _MOST) if np.isfinite(quantile) else _MOST
-    return factors, found.fast
+            own, away = spread[:, part[:, None], part], off[:, part]
+            squares = np.einsum("ri,ri->r", away, np.linalg.solve(own, away[:, :, None])[:, :, 0])
+            nearest = np.argsort(squares)
+            share = np.cumsum(weights[nearest])
+            quantile = squares[nearest][np.searchsorted(share, _LEVEL * share[-1])]
+            ratio = quantile / scipy.stats.chi2.ppf(_LEVEL, part.size)
+            factors[part] = min(ratio, _MOST) if np.isfinite(ratio) else _MOST
+    return factors
