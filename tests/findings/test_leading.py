@@ -129,6 +129,29 @@ def test_the_command_ends_nearly_every_matter(fault, plant, tmp_path):
     assert sum(ended(fault, plant, seed, tmp_path) for seed in range(10)) >= 9
 
 
+@pytest.mark.parametrize("seed", [0, 10])
+def test_noise_that_fades_beside_white_noise_needs_no_command(seed, tmp_path):
+    """A room whose sensor adds white noise: the first larger noise that was tried left residuals coloured."""
+    rng, n, pole, fades = np.random.default_rng(seed), 864, np.exp(-100 / 2700), np.exp(-100 / 600)
+    u = 10.0 * np.repeat(rng.choice([-1.0, 1.0], n // 6), 6)
+    y = scipy.signal.lfilter([0, 0, 0.14 * (1 - pole)], [1, -pole], u)
+    y += scipy.signal.lfilter([1], [1, -fades], 0.08 * np.sqrt(1 - fades**2) * rng.standard_normal(n))
+    y += 0.05 * rng.standard_normal(n)
+    table = np.column_stack([100.0 * np.arange(n), u, np.round(y, 2)])
+    np.savetxt(tmp_path / "room.csv", table, delimiter=",", header="time,u1,y1", comments="")
+    spec = parse_spec("""
+sample_time: 100
+plant: {continuous: {gain: 0.15, time_constant: 3600, dead_time: 210}, sample: zoh}
+noise: {standard_deviation: 0.1, correlation_time: 600}
+experiment: {samples: 864}
+accuracy: {model_error: {relative: 0.5, band: [0.0001, 0.003]}}
+limits: {amplitude: 10}
+""")
+    found = assess(spec, tmp_path / "room.csv")
+    assert found.verdict == "met"
+    assert "noise-estimated-along" in {one.code for one in found.results.findings}
+
+
 @pytest.mark.parametrize("of_inputs", [True, False])
 def test_spikes_that_follow_the_moves_of_inputs_are_no_faults_of_measurement(of_inputs):
     rng = np.random.default_rng(0)
