@@ -84,8 +84,11 @@ _SYMBOLS = {
     **dict.fromkeys(("l", "theta"), "dead time"),
 }
 _SYMBOL = re.compile(
-    rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta|t63)\s+)(?=(?:{ABOUT}\s*)?[-+.\d])", re.I
+    rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta|t63|[tl](?=\s+[\d.]+\s*{UNIT_OF_TIME}))\s+)"
+    rf"(?=(?:{ABOUT}\s*)?[-+.\d])",
+    re.I,
 )
+_CUBED = re.compile(r"(?<=[ %/(0-9kcdm]m)[23](?![\w.])")
 _MINUS = re.compile(
     r"(?<!plus/)(?<!plus or )(?<!plus and )(?<!plus )\b"
     r"(?:(?P<gain>negative gain)(?: of)?|minus|negative(?: of)?)\s+(?=[\d.])",
@@ -170,9 +173,13 @@ _OF_SPEED = re.compile(
 )
 # "10 % more valve gives about 1.5 degC": a gain.
 _GIVES = re.compile(
-    rf"{ALONE}(?:(?P<many>{_DIGITS})\s+more\s+(?P<unit>[^\s\d,;|]+)|(?P<per>{_DIGITS}\s*(?!{UNIT_OF_TIME}){_UNIT}+))"
-    rf"(?:\s+(?:more|of|on|the|{DRIVE})\b)*\s+(?:gives?|makes?|brings?|causes?|means?|adds?)\s+"
-    rf"(?P<about>(?:{ABOUT}\s*)?)(?P<size>{_DIGITS}\s*[^\s\d,;|]+)"
+    rf"(?<!by ){ALONE}(?:(?P<many>{_DIGITS})\s+more\s+(?P<unit>[^\s\d,;|]+)"
+    rf"|(?P<per>{_DIGITS}\s*(?!{UNIT_OF_TIME}){_UNIT}+))"
+    rf"(?:\s+of\s+(?:the\s+)?[a-z]+|\s+(?:more|on|the|{DRIVE})\b)*\s+"
+    r"(?:(?:gives?|makes?|brings?|causes?|means?|adds?|lets?)\s+"
+    rf"(?:(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){{0,2}}?(?:{UP})\s+(?:by\s+)?)?"
+    rf"|(?:raises?|lifts?|increases?)\s+(?:(?:the|my|our)\s+)?(?:[a-z]+\s+){{1,2}}by\s+)"
+    rf"(?P<about>(?:{ABOUT}\s*)?)(?P<size>{_DIGITS}(?:\s*(?!and\b)[^\s\d,;.|]+)?)"
     rf"(?P<rate>\s+per\s+{UNIT_OF_TIME})?(?:\s+(?:more|(?P<less>less))\b)?",
     re.I,
 )
@@ -375,7 +382,8 @@ def in_figures(text: str) -> str:
     "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 % itself", "an hour" becomes "1 hour", and
     "T = 3 s" becomes "time constant 3 s".
     """
-    figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", text)
+    figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], text)  # no digits of a number
+    figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)
     figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
     figures = _MINUS.sub(lambda found: "gain -" if found["gain"] else "-", figures)
     figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)

@@ -56,7 +56,7 @@ STANDS = (
 )
 MOVES = (
     r"(?:(?:i|we|it|and|which|that|may|can|could|might|should|(?:is )?allowed to|be)\s+)*"
-    r"(?:moved?|moves|go|goes|swings?|vary|varied|varies|changed?|changes|stepped|deviates?)"
+    r"(?:moved?|moves|go|goes|swings?|vary|varied|varies|changed?|changes|stepped|deviates?)\b"
     r"(?:\s+(?:it|by|over))*"
 )
 BOTH_WAYS = (

@@ -368,6 +368,17 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
             "gain about 1.5 degC per 10 %, time constant about 1 hour",
         ),
         ("one more volt gives 2 rad/s less", "plant", "gain -2 rad/s per 1 volt"),
+        (
+            "2 % of valve makes the pressure rise by 0.3 bar per minute",
+            "plant",
+            "rises by 0.3 bar per minute per 2 %",
+        ),
+        (
+            "1 l/h of caustic raises the pH by 0.3, T 4 min",
+            "plant",
+            "gain 0.3 per 1 l/h, time constant 4 min",
+        ),
+        ("the pressure rises 0.2 bar per m3/h", "plant", "the pressure rises 0.2 bar per m³/h"),
         ("10 % give 5 cm per minute more", "plant", "rises by 5 cm per minute per 10 %"),
         ("No controller runs now", "loop", "open"),
         ("There is no controller yet", "loop", "open"),
@@ -669,6 +680,7 @@ def test_a_plant_that_integrates_is_held_by_a_stable_loop(tmp_path):
         ("plus/minus 5 around 40", (5, 40, "", "")),
         ("plus/minus 5", (5, 0, "", "")),
         ("35 to 45", (5, 40, "", "")),
+        ("the pump moves 50 +- 10 m3/h", (10, 50, "pump", "m³/h")),
         ("run at 40 V, +- 5 V", (5, 40, "", "V")),
     ],
 )
