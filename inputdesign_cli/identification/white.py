@@ -37,7 +37,9 @@ Noise = tuple[Array, Array]
 
 
 def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Noise]]:
-    """Return C and D of every output's residuals (N, p), of small orders, as BIC prefers them.
+    """Return C and D of every output's residuals (N, p), with the fewest coefficients first.
+
+    BIC decides between equal numbers.
 
     Args:
         lengths: of the records that follow each other; the longest determines the polynomials.
@@ -50,8 +52,8 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
             C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
             power = max(float(np.mean(filtered(D, C, v) ** 2)), 1e-300)
             criterion = v.size * np.log(power) + (c + d) * np.log(v.size)
-            tried.append((float(criterion), (C, D)))
-        ranked.append([noise for _, noise in sorted(tried, key=lambda one: one[0])])
+            tried.append((c + d, float(criterion), (C, D)))
+        ranked.append([noise for *_, noise in sorted(tried, key=lambda one: one[:2])])
     return [list(noises) for noises in zip(*ranked, strict=True)]
 
 
