@@ -9,6 +9,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from inputdesign_cli.wizard import gains
+from inputdesign_cli.wizard.gains import in_one_form
 from inputdesign_cli.wizard.questions import bad_answer
 
 # Sizes beyond these would overflow, or vanish, where they are squared.
@@ -51,12 +53,15 @@ _ALIKE: tuple[dict[str, float], ...] = (
 # "a minute", "half an hour", "two shifts": words in place of numbers.
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
             "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "twelve": 12, "fifteen": 15,
-            "twenty": 20, "thirty": 30, "forty": 40, "forty-five": 45, "fifty": 50, "sixty": 60, "ninety": 90,
             "a couple of": 2}  # fmt: skip
+_TENS = "twenty thirty forty fifty sixty seventy eighty ninety".split()
+_COUNTED |= {ten: 10 * n for n, ten in enumerate(_TENS, 2)}
+_COUNTED |= {f"{ten}-five": 10 * n + 5 for n, ten in enumerate(_TENS, 2)}
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
-_FRACTION = re.compile(rf"\b(?:a|one) ({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+_FRACTION = re.compile(rf"\b(?:(?:a|one) )?({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+SIGNAL = "(?:level|temp(?:erature)?|speed|pressure|flow|position|concentration|output|sensor|measurement)"
 LATE = (
     r"dead time|(?:transport |pure )?delay(?:ed by)?"
     r"|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
@@ -84,7 +89,7 @@ _SYMBOLS = {
     **dict.fromkeys(("l", "theta"), "dead time"),
 }
 _SYMBOL = re.compile(
-    rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta|t63|[tl](?=\s+[\d.]+\s*{UNIT_OF_TIME}))\s+)"
+    rf"\b(?:({'|'.join(_SYMBOLS)})\s*=\s*|(tau|theta|t63|[tl](?=\s+[\d.]+\s*{UNIT_OF_TIME}))\s+(?:is\s+)?)"
     rf"(?=(?:{ABOUT}\s*)?[-+.\d])",
     re.I,
 )
@@ -100,22 +105,15 @@ _SCATTER = re.compile(
 _HOURS_AND_MINUTES = re.compile(
     r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s*(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
 )
+_KNOWN_TO = re.compile(
+    r"\b(?:not\s+)?(known|good|accurate|precise)\s+(?:only\s+)?(?:to|within|(?:no\s+)?better than)\s+"
+    rf"(?={_DIGITS}\s*%)",
+    re.I,
+)
+_AT_63 = re.compile(r"\b(?:(?:the )?time to\s+)?63\s*%[^,;.|\d]*?(?=(?:about\s+)?\d)", re.I)
 _FALLS = re.compile(
     rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?(?: the [a-z]+)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
-    re.I,
-)
-# "makes the level rise": as "the level rises" beside it.
-_LETS = re.compile(
-    r"\b((?:makes|lets|causes)\s+(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){0,2}?"
-    r"(?:rise|grow|increase|climb|go(?=es? up| up| down)|fall|drop|decrease|sink))(?=\s)",
-    re.I,
-)
-_BECOMES = re.compile(
-    rf"\b(?:makes?|gets?|becomes?)\s+(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){{0,2}}?(?P<about>{ABOUT}\s*)?"
-    rf"(?P<size>{_DIGITS}\s*[^\s\d,;|]+)\s+"
-    r"(?:(?:warm|hott|high|larg|great)er|(?<!% )faster"
-    r"|(?P<down>(?:cold|cool|low|small)er|(?<!% )slower))\b",
     re.I,
 )
 _ENDS = rf"(?P<low>{_DIGITS})\s*(?:to|and|-|–|\.\.+)\s*(?P<high>{_DIGITS})\s*(?P<unit>{UNIT_OF_TIME})"
@@ -129,20 +127,70 @@ _BETWEEN = tuple(
 )
 _SPOKEN = re.compile(
     rf"(?<![\w-])({'|'.join(sorted(_COUNTED, key=len, reverse=True))})\s+"
-    rf"(?=(?:{UNIT_OF_TIME}|(?:more\s+)?(?:volts?|per ?cent|degrees?|rad/s|bar)\b|[^\s\d,;|]+\s+more\b"
+    rf"(?=(?:{UNIT_OF_TIME}|(?:more\s+)?{gains.UNIT}|[^\s\d,;|]+\s+more\b"
     rf"|to\s+(?:{'|'.join(_COUNTED)}|\d+)\s+{UNIT_OF_TIME}))",
     re.I,
+)
+_PIECE = re.compile(r"[^,;.|]+(?:\.\d+[^,;.|]*)*")
+_ONE_TIME = re.compile(
+    rf"(?P<before>[^\d%]*)(?P<amount>{ALONE}{_DIGITS}(?:\s*(?:to|-|–)\s*{_DIGITS})?\s*{UNIT_OF_TIME})"
+    r"(?P<behind>[^\d%]*)",
+    re.I,
+)
+# What the other words of a clause say of its only time, and the form in which it is read.
+_TRIAL = r"\b(?:test|trial|experiment)s?\b"
+_TIMES_SAID = (
+    (r"\bsettl|\bsteady\b|\bfully\b|\bfinal\b", "settles in"),
+    (
+        rf"^(?!.*{_TRIAL}).*\b(?:react|respo|answer|begin|start|first)\w*(?:\s+\w+){{0,3}}?\s+(?:only )?"
+        r"(?:#\s+(?:after|later)|after #)",
+        "dead time",
+    ),
+    (rf"{_TRIAL}(?!.*\b(?:begin|start)s?\b)|\bspend\b|\bcannot have\b", "for"),
+)
+_TIMES_READ = re.compile(
+    rf"\b(?:{_TIMED}|time constant|noise|fad\w+|positions?|every|sampl\w+|keeps?|stays?|settles in|"
+    r"settling time|rise time)\b",
+    re.I,
+)
+_OF_DAY = re.compile(r"(?:\bfrom\s+)?\b(\d\d?):(\d\d)\s*(?:to|until|-|–)\s*(\d\d?):(\d\d)\b", re.I)
+_SIZE_OF = rf"{NUMBER}\s*{gains.UNIT}"
+_MAY_MOVE = rf"(?:(?:and|it|which|that|we)\s+)*(?:may|can|could|swings?|moves?|var|{PLUS_MINUS})"
+_STANDING = re.compile(
+    rf"\b(?P<name>[a-z]+) (?:at|around|near|normally|usually|now)\s+(?P<size>{_SIZE_OF})(?=,?\s+{_MAY_MOVE})",
+    re.I,
+)
+# What is said of an input, and its form, as "12 bits up to 100 %" for "12 bits from 0 to 100 %".
+_OF_INPUTS = (
+    (
+        r"(?<=, )(?:it |which )?(?:may|must|can|should) ?not (?:change|move|vary|go)(?: by)? more than "
+        rf"(?={_SIZE_OF})",
+        "may move by ",
+    ),
+    (
+        rf"\b({SIGNAL}) (?:must|is to|has to|should|may) (?:stay|remain) within (?={_SIZE_OF})",
+        r"\1 may deviate by ",
+    ),
+    (r",\s+which (?=(?:is|stands|sits|runs|rests)\s+(?:at|around|near))", " "),
+    (r"\b(\d+ bits?) (?:from|over|for) 0\s*(?:to|-|–)\s*(?=\d)", r"\1 up to "),
+    (
+        rf"\b(power|range|span|scale|stroke)\s+(?:(?:of|is|from)\s+)*0\s*(?:to|-|–)\s*{_SIZE_OF}",
+        r"\1 (its span)",
+    ),
 )
 AMOUNT = rf"(?:(?:{'|'.join(_COUNTED)})\s+|(?:\d+(?:\.\d*)?|\.\d+)\s*){UNIT_OF_TIME}"
 """A time, as in "45 min" or "one shift"."""
 _SETTING = rf"{OF}{NUMBER}(?:\s*(?:ms|s|sec|min|h)\b)?"
 SETTINGS = rf"(?:PID?\s+)?Kp{_SETTING}(?:(?:\s*,\s*|\s+and\s+|\s+)T[id]{_SETTING})*"
 """Settings of a controller, as in "Kp 1, Ti 60 s"."""
-SIGNAL = "(?:level|temp(?:erature)?|speed|pressure|flow|position|concentration|output|sensor|measurement)"
 SENSOR = r"(?:sensor|encoder|thermocouple|transmitter|thermometer)\b"
 DRIVE = (
     "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"
     "|gate|input|actuator)"
+)
+RESTING = (
+    "(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating|working"
+    "|now|normally|usually|currently|nominally)"
 )
 # "per minute", and of a gain "per 10 % of valve".
 _SIZE = r"(?P<size>(?!(?:per|and)\b)(?:[^\s\d,;|/.:]|[.:](?=[^\s|]))+)"
@@ -157,30 +205,9 @@ _RISE = (
     rf"(?:{UP}|changes)(?:\s+(?:by|with))?\s+"
     rf"(?:{ABOUT}\s*)?-?{_DIGITS}\s*[^\s\d,;|]+"
 )
-# "goes up 0.5 cm in 1 minute", "for each % the level rises by 2 cm"; "the speed rises by 2 rad/s" is a size.
-_IN_ONE = re.compile(
-    rf"\b({_RISE})\s+(?:(?:in|every|each)\s+(?:1\s+)?|1\s+)({UNIT_OF_TIME})(?!\s+(?:after|later)\b)", re.I
-)
-_EACH = re.compile(
-    rf"\bfor\s+(?:each|every)\s+(?P<per>[^\s\d,;|]+)(?:\s+(?:more|of|the|{DRIVE})\b)*,?\s+"
-    rf"(?P<rise>(?:(?:the|my|our|it|its)\s+)?(?:[a-z]+\s+){{0,2}}?{_RISE}(?:\s+per\s+{UNIT_OF_TIME})?)",
-    re.I,
-)
 _OF_SPEED = re.compile(
     rf"\b(?P<what>(?:angle|position|speed|velocity|flow)\s+)?(?:{UP}|changes)"
     rf"(?:\s+(?:by|with))?\s+(?P<size>(?:{ABOUT}\s*)?-?{_DIGITS}\s*(?P<unit>[^\s\d,;|/]+)/[a-z]+)(?=\s+per\b|\s*/)",
-    re.I,
-)
-# "10 % more valve gives about 1.5 degC": a gain.
-_GIVES = re.compile(
-    rf"(?<!by ){ALONE}(?:(?P<many>{_DIGITS})\s+more\s+(?P<unit>[^\s\d,;|]+)"
-    rf"|(?P<per>{_DIGITS}\s*(?!{UNIT_OF_TIME}){_UNIT}+))"
-    rf"(?:\s+of\s+(?:the\s+)?[a-z]+|\s+(?:more|on|the|{DRIVE})\b)*\s+"
-    r"(?:(?:gives?|makes?|brings?|causes?|means?|adds?|lets?)\s+"
-    rf"(?:(?:(?:the|it|my|our)\s+)?(?:[a-z]+\s+){{0,2}}?(?:{UP})\s+(?:by\s+)?)?"
-    rf"|(?:raises?|lifts?|increases?)\s+(?:(?:the|my|our)\s+)?(?:[a-z]+\s+){{1,2}}by\s+)"
-    rf"(?P<about>(?:{ABOUT}\s*)?)(?P<size>{_DIGITS}(?:\s*(?!and\b)[^\s\d,;.|]+)?)"
-    rf"(?P<rate>\s+per\s+{UNIT_OF_TIME})?(?:\s+(?:more|(?P<less>less))\b)?",
     re.I,
 )
 # What stands behind the number of each kind.
@@ -371,7 +398,9 @@ def check_numbers(text: str, key: str) -> None:
         why = f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
         raise bad_answer(key, why)
     if share := re.search(
-        rf"%\s+of\s+(?:the\s+)?(?:{SIGNAL}|that|it|this|range|span|reading|value)\b", text, re.I
+        rf"(?<!63)(?<!63 )%\s+of\s+(?:the\s+)?(?:{SIGNAL}|that|it|this|range|span|reading|value)\b",
+        text,
+        re.I,
     ):
         raise bad_answer(key, f'"{share[0]}": write the size itself, in its unit')
 
@@ -382,25 +411,27 @@ def in_figures(text: str) -> str:
     "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 % itself", "an hour" becomes "1 hour", and
     "T = 3 s" becomes "time constant 3 s".
     """
-    figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], text)  # no digits of a number
+    figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", text)  # the end of a sentence
+    figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)
     figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
     figures = _MINUS.sub(lambda found: "gain -" if found["gain"] else "-", figures)
     figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
     figures = _FEW.sub(lambda found: f"{found['what'] or found['late']} {_few(found)}", figures)
-    figures = _LETS.sub(lambda found: f"{found[1]}{'es' if found[1].endswith('go') else 's'}", figures)
-    figures = _BECOMES.sub(_rises, figures)
     figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
-    figures = _OR_SO.sub(r"about \1", figures)
+    figures = _KNOWN_TO.sub(lambda found: f"{'known ' * (found[1].lower() == 'known')}within ", figures)
+    figures = in_one_form(_AT_63.sub("time constant ", _OR_SO.sub(r"about \1", figures)))
+    figures = _PIECE.sub(_of_time, _OF_DAY.sub(_hours, figures))
+    for said, form in _OF_INPUTS:
+        figures = re.sub(said, form, figures, flags=re.I)
+    figures = _STANDING.sub(_standing, figures)
     figures = _SETTLES.sub(
         lambda found: f"time constant {'about ' * _vague(found['of'])}{_time_constant(found)}", figures
     )
     for between in _BETWEEN:
         figures = between.sub(_middle, figures)
-    figures = _FALLS.sub(r"rises by \g<about>-", _GIVES.sub(_gain, figures))
-    figures = _IN_ONE.sub(r"\1 per \2", figures)
-    figures = _EACH.sub(r"\g<rise> per 1 \g<per>", figures)
+    figures = _FALLS.sub(r"rises by \g<about>-", figures)
     return _OF_SPEED.sub(_size_of_a_speed, figures)
 
 
@@ -418,9 +449,9 @@ def taken_as(text: str) -> list[str]:
             if one["what"].lower() == "noise"
         ),
         *(
-            f'"{one[0]}" is taken as the effect of a change of {one["per"]}'
-            for one in _GIVES.finditer(text)
-            if not re.search(r"\b(?:more|less)\b", one[0], re.I)
+            f'"{text[one.begin : one.end]}" is taken as the effect of a change of {one.assumed}'
+            for one in gains.gains(text)
+            if one.assumed
         ),
     ]
 
@@ -429,17 +460,32 @@ def _few(found: re.Match[str]) -> str:
     return f"2 to 5 {found['unit'] or found['of']}"
 
 
-def _rises(found: re.Match[str]) -> str:
-    """Return a change of an output as a rise, as in "makes the room 1.5 degC warmer"."""
-    return f"rises by {found['about'] or ''}{'-' if found['down'] else ''}{found['size']}"
+def _standing(found: re.Match[str]) -> str:
+    """Return an operating point that stands alone, unless its name is known: "feeder, at 45 %"."""
+    if re.fullmatch(rf"{RESTING}|held|kept|point", found["name"], re.I):
+        return found[0]
+    known = re.fullmatch(DRIVE, found["name"], re.I)
+    return f"{found['name']}{',' * (known is None)} at {found['size']}"
 
 
-def _gain(found: re.Match[str]) -> str:
-    """Return what a move of the input gives as a gain, or as a slope."""
-    per = found["per"] or f"{found['many']} {found['unit']}"
-    what = "rises by" if found["rate"] else "gain"
-    size = f"{found['about']}{'-' if found['less'] else ''}{found['size']}"
-    return f"{what} {size}{found['rate'] or ''} per {per}"
+def _hours(found: re.Match[str]) -> str:
+    """Return the time between two times of day."""
+    begin, end = (60 * int(found[i]) + int(found[i + 1]) for i in (1, 3))
+    return f"for {(end - begin) % 1440} min"
+
+
+def _of_time(piece: re.Match[str]) -> str:
+    """Return a clause whose only time is a settling time, a dead time or that of the experiment."""
+    found = _ONE_TIME.fullmatch(piece[0])
+    if found is None or _TIMES_READ.search(piece[0]):
+        return piece[0]
+    around = f"{found['before']}#{found['behind']}"
+    form = next((form for words, form in _TIMES_SAID if re.search(words, around, re.I)), None)
+    return (
+        piece[0]
+        if form is None
+        else f" {form} {'about ' * _vague(found['before'])}{found['amount']}".rstrip()
+    )
 
 
 def _size_of_a_speed(found: re.Match[str]) -> str:

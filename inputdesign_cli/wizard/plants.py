@@ -48,14 +48,8 @@ BARE_GAIN = (
     r"(?: of (?:the )?<DRIVE>)?(?:<WITHIN>)"
 )
 """A gain without its name, as in "about 20 rad/s per V"; a time unit makes it a slope."""
-RISES_WHEN = (
-    r"(?P<rise>(?:(?:the|my|our) )?<RISES><OF><NUMBER><UNIT>(?:\s*(?:per|/)\s*<UNIT_OF_TIME>)?)"
-    r"\s+(?:when|if|for)\s+(?P<rest>(?:[a-z]+\s+){0,5}?)(?:by\s+)?(?P<per><NUMBER><UNIT>)"
-    r"(?=\s*(?:[,;.]|$|(?:more|in|after|within|and)\b))"
-)
-"""A gain as in "rises by 1.5 degC when the valve opens 10 %"."""
 NO_DELAY = (
-    r"\b(?:(?:no|without|hardly any|negligible)\s+(?:dead time|delay)"
+    r"\b(?:(?:no|without|hardly any|negligible)\s+(?:[a-z]+able\s+)?(?:dead time|delay)"
     r"|(?:dead time|delay)(?:\s+is)?[:=]?\s+(?:none|zero|negligible))\b"
 )
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held

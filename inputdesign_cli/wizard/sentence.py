@@ -130,7 +130,7 @@ def _behind_a_gain() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]
     joined = (
         r"(?:\s+more(?:\s+<DRIVE>)?)?[,;.]?\s+(?:(?:and|after|within|in|with|it|that|takes|slowly,?)\s+)*"
     )
-    gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>|<RISES_WHEN>"
+    gain = f"{_QUANTITIES['gain']}|<BARE_GAIN>"
     times = (
         rf"(?:{gain})<UNIT>{joined}(?P<lag>{time})(?:[,;]\s+(?:(?:and|after|with|but)\s+)*(?P<late>{time}))?"
     )
@@ -198,7 +198,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         *named,
         *taken_as(text),
         *beyond_models(text),
-        *([f"nothing follows from: {', '.join(beside)}"] if beside else []),
+        *([f"words that set nothing: {', '.join(beside)}"] if beside else []),
     ]
     remarks += _of_the_wish(answers.get("wish", ""), text)
     if "wish" in answers and wishes.unbounded(answers["wish"]):

@@ -17,6 +17,7 @@ from inputdesign_cli.wizard.grammar import (
     DRIVE,
     NUMBER,
     PLUS_MINUS,
+    RESTING,
     SIGNAL,
     UNIT,
     Phrase,
@@ -49,13 +50,10 @@ _MIDDLE = 0.05
 
 IN_UNIT = r"(?:\s*(?:\bin\s+|\(\s*(?:in\s+)?)(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
 """The unit behind what moves, as in "valve in %" and "valve (%)"."""
-STANDS = (
-    r"(?:(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating"
-    r"|now|normally|usually|currently|nominally)\s+)*"
-    r"(?:(?:held|kept)\s+)?(?:around|about|at|near)"
-)
+STANDS = rf"(?:{RESTING}\s+)*(?:(?:held|kept)\s+)?(?:around|about|at|near)"
 MOVES = (
     r"(?:(?:i|we|it|and|which|that|may|can|could|might|should|(?:is )?allowed to|be)\s+)*"
+    r"(?<!has )(?<!had )(?<!have )"
     r"(?:moved?|moves|go|goes|swings?|vary|varied|varies|changed?|changes|stepped|deviates?)\b"
     r"(?:\s+(?:it|by|over))*"
 )

@@ -203,7 +203,7 @@ def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
         ("noise of 0.1 degC that fades in a minute", "noise 5 % of the temperature", "% of the temperature"),
         ("45 +- 8 %", "45 % +- 8 % of that", "% of that"),
         ("one shift", "we have at least 6 min", "at least 6 min"),
-        ("one shift", "seventy-five minutes", "minutes"),
+        ("one shift", "seventy-three minutes", "minutes"),
         ("one shift", "an hour and a half", "half"),
         ("PI loop", "P loop", "PI and PID"),
     ],
@@ -325,7 +325,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     [
         ("dead time: about 2 degC/%, 3 minutes", "plant", "gain about 2 degC/%, time constant 3 minutes"),
         ("9 V nominal, +- 3 V", "range", "at 9 V, +- 3 V"),
-        ("a drive, which runs around 9 V, +- 3 V", "range", "which runs around 9 V, +- 3 V"),
+        ("a drive, which runs around 9 V, +- 3 V", "range", "a drive runs around 9 V, +- 3 V"),
         (
             "working around 50 % and allowed to move +-10 %",
             "range",
@@ -338,13 +338,13 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         (
             "For 10 % more valve y rises by 2 K. It takes an hour",
             "plant",
-            "rises by 2 K per 10 %, time constant 1 hour",
+            "gain 2 K per 10 %, time constant 1 hour",
         ),
         ("the valve (in %) sits at 40 %, +- 5 %", "range", "the valve (in %) sits at 40 %, +- 5 %"),
         ("gain 2, time constant 40 s, roughly", "plant", "gain 2, time constant 40 s, roughly"),
         ("gain 2, reacts after a few s", "plant", "gain 2, reacts after 3.5 s within 42.85714 % itself"),
-        ("10 % more makes the room about 1.5 degC warmer", "plant", "rises by about 1.5 degC per 10 %"),
-        ("10 % more gets the water 1.5 degC colder", "plant", "rises by -1.5 degC per 10 %"),
+        ("10 % more makes the room about 1.5 degC warmer", "plant", "gain about 1.5 degC per 10 %"),
+        ("10 % more gets the water 1.5 degC colder", "plant", "gain -1.5 degC per 10 %"),
         ("with 6 dB gain margin", "wish", "gain margin 6 dB"),
         ("our loop now has Kp 1.2, Ti 90 s", "loop", "Kp 1.2, Ti 90 s"),
         ("no drift", "drift", "no"),
@@ -389,7 +389,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         (
             "level goes up 0.5 cm in a minute for each % of valve",
             "plant",
-            "level goes up 0.5 cm per minute for each % of valve",
+            "level rises by 0.5 cm per minute per 1 % of valve",
         ),
         ("gain 2, lag 3 s; experiment 20 s", "time", "20 s"),
         ("a drive with dry friction, working at 9 V", "range", "working at 9 V"),
@@ -405,7 +405,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         (
             "the level climbs about 10 cm a minute per 10 %",
             "plant",
-            "the level climbs about 10 cm per minute per 10 %",
+            "the level rises by about 10 cm per minute per 10 %",
         ),
         ("settles in one to two seconds", "plant", "time constant 0.375 seconds within 33.33333 % itself"),
         ("no position shorter than 10 minutes", "hold", "10 minutes"),

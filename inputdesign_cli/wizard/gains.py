@@ -1,0 +1,253 @@
+"""Find gains in a sentence: a change of the input, and the change of the output that it causes.
+
+"10 % more makes it 2 degC warmer" and "2 degC for every 10 %" are both "gain 2 degC per 10 %". Two sizes
+stand side by side. The words before, between and behind them say which is the cause, and its sign.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+_KNOWN = (
+    r"deg[cf]|degrees?(?:\s+(?:c|celsius|f))?|celsius|kelvin|k|[mk]?v|volts?|m?a|amps?|amperes?|k?hz|rpm|m?bar|"
+    r"[hkm]?pa|psi|[ckm]?m|(?:micro|milli|centi)?met(?:re|er)s?|m?l|lit(?:re|er)s?|t|kg|g|k?n|k?w|(?:kilo)?watts?|"
+    r"rad|ph|ppm|per\s?cent"
+)
+UNIT = rf"(?:[^\W\d]*[%°³²][^\s,;|.]*|[^\W\d]+[³²]?/[^\W\d]+[³²]?|(?:{_KNOWN})(?![\w/³²]))"
+"""A unit: with a sign as in "%" and "°C", with a slash as in "m/s", or a word that is known."""
+_TIME = r"(?P<time>s|min|h|sec|seconds?|minutes?|hours?)\b"
+_TOKEN = re.compile(
+    rf"(?P<size>(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?:\s*(?P<unit>{UNIT})|\s*(?P<timed>{_TIME}|days?\b|shifts?\b|ms\b))?)"
+    r"|(?P<word>[^\W\d]+(?:['-][^\W\d]+)*)|\S",
+    re.I,
+)
+_RATE = re.compile(rf"\s*(?:/|\b(?:per|an?|each|every|in\s+(?:an?|one|1)|1)\b)\s*{_TIME}", re.I)
+_SPEED = re.compile(rf"(?P<size>[^/]+)/{_TIME}", re.I)
+_CLAUSE = re.compile(r"(?:[^;.|]|\.(?=\d))+")
+_ONE_OF = re.compile(
+    rf"\b(each|every|another|(?:an?|one)(?=\s+(?:extra|additional|more|further)))\s+"
+    rf"(?:(?:extra|additional|more|further)\s+)?(?={UNIT})",
+    re.I,
+)
+"""What stands before a unit without a number, as in "each extra kilowatt"."""
+_MORE_OF = re.compile(rf"(\d)\s+(extra|additional|more|further)\s+({UNIT})", re.I)
+_NAMES = re.compile(r"\b(?:(?:pressure )?reducing|lower) valve\b", re.I)
+"""Names of valves that say nothing of how they move."""
+
+
+def _stem(word: str) -> str:
+    """Return a word in small letters without the ending of a verb."""
+    word = word.lower()
+    for ending in ("ing", "ed", "es", "s"):
+        if len(word) > len(ending) + 2 and word.endswith(ending):
+            word = word.removesuffix(ending)
+            break
+    return word.rstrip("e")
+
+
+def _stems(words: str) -> frozenset[str]:
+    return frozenset(map(_stem, words.split()))
+
+
+_ABOUT = _stems("about around roughly approximately approx circa ca some nearly near ~ ≈")
+_MORE = _stems("more further extra additional another each every")
+_RISES = _stems(
+    "rise raise increase grow climb go warm heat lift give make bring cause mean add let get become fill "
+    "yield produce lead result change respond push speed move run turn"
+)
+_FALLS = _stems("fall drop decrease lower reduce cool sink drain down")
+_LESS = _stems("less colder cooler slower smaller lower down")
+_GREATER = _stems("more hotter warmer faster higher larger greater up")
+_CLOSING = _stems("close shut reduce lower throttle decrease fall drop less")
+_LEADS = _stems(
+    "when if with for open close shut raise lower increase decrease reduce drop turn step move change each "
+    "every"
+)
+"""What begins a change of the input, as in "when the valve opens 10 %"."""
+_LINKS = _stems("per for when if with")
+_STANDS = _stems("at around near")
+_NEVER = _stems(
+    "may might can could must should would not never no cannot allowed most within between before than until "
+    "but noise scatter margin limit peak kp ti gain integrates"
+)
+"""What stands in no gain: what may be, what is not, and sizes of something else."""
+_CAUSAL = _stems(
+    "give make bring cause mean add let yield produce lead result raise lift lower heat cool warm increase "
+    "reduce drop"
+)
+_BEHIND = re.compile(
+    r"(?:\s+(?:more|further|extra|less|up|down|open|"
+    r"(?:hott|warm|cold|cool|fast|slow|high|low|larg|small|great)er)\b)*"
+)
+_MOST_BETWEEN = 5  # words between a cause that nothing marks and the verb
+# Of what a unit per time is no speed at which something rises, and words for what is a speed itself.
+_FLOWS = {"l", "ml", "t", "kg", "g", "m³", "rad", "deg", "°", "rev"}
+_SPEEDS = _stems("speed velocity flow rate throughput faster slower")
+_GROWING = _stems("rise grow increase climb go fill move fall drop drain sink")
+
+
+@dataclass(frozen=True)
+class _Token:
+    """Holds a word, a sign or a number with its unit, and where it stands."""
+
+    text: str
+    begin: int
+    end: int
+    size: bool
+    unit: str
+
+    @property
+    def stem(self) -> str:
+        return _stem(self.text)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Holds where a gain stands in a text, and its one form."""
+
+    begin: int
+    end: int
+    form: str
+    assumed: str  # the size that is taken as a change of the input though nothing says so
+
+
+def in_one_form(text: str) -> str:
+    """Return a text with "gain 2 degC per 10 %", or "rises by 2 cm per min per 10 %", for all its gains."""
+    text = _ONE_OF.sub(r"\1 1 ", _MORE_OF.sub(r"\1 \3 \2", _NAMES.sub("valve", text)))
+    for gain in reversed(list(gains(text))):
+        text = f"{text[: gain.begin]}{gain.form}{text[gain.end :]}"
+    return text
+
+
+def gains(text: str) -> Iterator[Gain]:
+    """Find the gains of a text, from left to right."""
+    for clause in _CLAUSE.finditer(text):
+        tokens = [
+            _Token(one[0], one.start(), one.end(), bool(one["size"]) and not one["timed"], one["unit"] or "")
+            for one in _TOKEN.finditer(text, *clause.span())
+        ]
+        sizes, taken = [i for i, one in enumerate(tokens) if one.size], -1
+        for first, second in itertools.pairwise(sizes):
+            if first > taken and (found := _Pair.of(text, tokens, first, second).gain) is not None:
+                taken = second
+                yield found
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Holds two sizes that follow each other, and the words around them up to the next comma or size."""
+
+    text: str
+    first: _Token
+    second: _Token
+    rate: re.Match[str] | None  # "per minute" behind the first
+    before: list[_Token]
+    between: list[_Token]
+    behind: list[_Token]
+    per_third: bool  # the second is per a third: "rises 2 cm for 5 %"
+
+    @classmethod
+    def of(cls, text: str, tokens: Sequence[_Token], first: int, second: int) -> _Pair:
+        """Return two neighbouring sizes among the tokens of a clause."""
+        begin = next((i + 1 for i in range(first - 1, -1, -1) if tokens[i].text in ",:" or tokens[i].size), 0)
+        after = tokens[second + 1 :]
+        end = next((i for i, one in enumerate(after) if one.size or one.text == ","), len(after))
+        behind, rate = list(after[:end]), _RATE.match(text, tokens[first].end)
+        between = [one for one in tokens[first + 1 : second] if rate is None or one.begin >= rate.end()]
+        stems = {one.stem for one in behind}
+        per_third = end < len(after) and after[end].size and bool(stems & _LINKS) and not stems & _NEVER
+        pair = tokens[first], tokens[second]
+        return cls(text, *pair, rate, list(tokens[begin:first]), between, behind, per_third)
+
+    @property
+    def gain(self) -> Gain | None:
+        """Return the gain that the sizes are; None if they are none."""
+        signs = (one for one in (*self.before[-1:], *self.between, *self.behind[:1]) if not one.size)
+        if {one.stem for one in (*self.before, *self.between)} & _NEVER or any(
+            set(one.text) & set("+-±–:=") for one in signs
+        ):
+            return None
+        link = next((i for i, one in enumerate(self.between) if one.stem in _LINKS), None)
+        if link is not None:
+            return self._effect_first(link)
+        return None if self.rate or self.per_third else self._cause_first()
+
+    def _effect_first(self, link: int) -> Gain | None:
+        """Return the gain of "rises 2 cm when the valve opens 5 %"."""
+        effect, cause, verb = self.first, self.second, _verb(self.before)
+        if verb is None and self.between[link].stem != "for":
+            return None
+        marked = any(one.stem in _MORE for one in (*self.between, *self.behind[:1]))
+        stands = verb is not None and self.rate is None and self.before[-1].stem in _STANDS
+        if not cause.unit or stands or (cause.unit == effect.unit and not marked):
+            return None
+        does = self.before if verb is None else self.before[verb:]
+        of_cause = [*self.between[link:], *self.behind[:2]]
+        begin = effect.begin if verb is None else self.before[verb].begin
+        return self._written(effect, cause, [*does, *self.between[:link]], of_cause, begin, "")
+
+    def _cause_first(self) -> Gain | None:
+        """Return the gain of "when the valve opens 5 % the level rises 2 cm"."""
+        cause, effect, before, between = self.first, self.second, self.before, self.between
+        lead = next((i for i, one in enumerate(before) if one.stem in _LEADS), None)
+        more = any(one.stem in _MORE | _stems("less") for one in (*between[:2], *before))
+        verb, marked = _verb(between), lead is not None or more
+        compared = bool(self.behind) and self.behind[0].stem in _GREATER | _LESS
+        if not cause.unit or (cause.unit == effect.unit and not marked):
+            return None
+        if (verb is None and not (more and compared)) or not (
+            effect.unit or "by" in {one.stem for one in between[-2:]}
+        ):
+            return None
+        near = before[-1:] if before and before[-1].stem in _STANDS | _ABOUT | {"by"} else []
+        if not marked:
+            direct = verb == 0 or between[0].stem in ("of", "on")
+            causal = verb is not None and verb <= _MOST_BETWEEN and between[verb].stem in _CAUSAL
+            if near or not (direct and causal):
+                return None
+        start = near if lead is None else before[lead:]
+        does, of_cause = (between, start) if verb is None else (between[verb:], [*start, *between[:verb]])
+        begin, assumed = (start or [cause])[0].begin, "" if marked else cause.text
+        return self._written(effect, cause, [*does, *self.behind[:1]], of_cause, begin, assumed)
+
+    def _written(
+        self, effect: _Token, cause: _Token, does: list[_Token], moved: list[_Token], begin: int, assumed: str
+    ) -> Gain:
+        """Write the gain in one form.
+
+        Args:
+            does: the words on the effect, from its verb on, which say its sign; `moved`: those on the cause.
+        """
+        rate = self.rate or _RATE.match(self.text, effect.end)
+        time, size = rate["time"] if rate else "", effect.text
+        speed, stems = (
+            _SPEED.fullmatch(effect.unit),
+            {one.stem for one in (*self.before, *self.between, *does)},
+        )
+        if (
+            speed
+            and not time
+            and speed["size"].lower() not in _FLOWS
+            and stems & _GROWING
+            and not stems & _SPEEDS
+        ):
+            time, size = speed["time"], f"{size[: -len(effect.unit)]}{speed['size']}"
+        falls = any(one.stem in _FALLS | _stems("less colder cooler slower smaller") for one in does)
+        negative = (falls != any(one.stem in _CLOSING for one in moved)) != size.startswith("-")
+        touching = (self.text[: one.begin].rstrip() for one in (effect, cause))
+        about = any(_stem(re.split(r"\s", words)[-1]) in _ABOUT for words in touching)
+        end = max(effect.end, cause.end, rate.end() if rate else 0)
+        comparatives = _BEHIND.match(self.text, end)
+        form = f"{'rises by' if time else 'gain'} {'about ' * about}{'-' * negative}{size.lstrip('-')}"
+        form += f" per {time}" * bool(time) + f" per {cause.text.lstrip('-')}"
+        return Gain(begin, comparatives.end() if comparatives else end, form, assumed)
+
+
+def _verb(words: Sequence[_Token]) -> int | None:
+    """Return where a verb stands of what an output does; none stands behind an article."""
+    articles = {"the", "a", "an", "my", "our"}
+    at = (i for i, one in enumerate(words) if one.stem in _RISES | _FALLS)
+    return next((i for i in at if i == 0 or words[i - 1].text.lower() not in articles), None)
