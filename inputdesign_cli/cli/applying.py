@@ -13,11 +13,12 @@ if TYPE_CHECKING:
 _CHANNEL = re.compile(r"[ruy]\d+(?= |$)")
 
 
-def instructions(results: Results, spec: str) -> list[str]:
+def instructions(results: Results, spec: str, joint: str = "") -> list[str]:
     """Return sentences on what to apply and to log, and the command that judges the record; none without one.
 
     Args:
         spec: the file that `assess` gets.
+        joint: the command that judges the record together with earlier ones; empty if there are none.
     """
     signal, tables = results.outcome.signal, results.tables
     if signal is None or "predicted_output" not in tables:
@@ -43,6 +44,8 @@ def instructions(results: Results, spec: str) -> list[str]:
             "r is what the controller adds its part to, and may go further than the actuator. In signal.csv "
             f"it {has}: while y rests, u = r. Log u as it is, level included, and r as applied."
         )
+    if joint:
+        return [*said, f"Then: {joint}"]
     judge = f"Then: idesign assess {shlex.quote(spec)} log.csv"
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]

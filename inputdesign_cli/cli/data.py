@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
+from inputdesign_cli.cli.applying import instructions
 from inputdesign_cli.cli.options import Changes, Into, Shown, typed
 from inputdesign_cli.cli.rows import Levels, Rows, Written, levels
 from inputdesign_cli.cli.run import Place, keep, name_of, read_spec
@@ -155,7 +156,12 @@ def assess(
         "idesign explore": [*explores, *typed(rows)],
         "idesign solve SPEC": ["idesign", "solve", str(spec), *typed(changes)],
     }
-    keep(_with_typed(assessment.results, begins), place, shown)
+    results = _with_typed(assessment.results, begins)
+    keep(results, place, shown)
+    if not (shown.quiet or shown.json_output or into.no_output):
+        more = ["idesign", "assess", str(spec), *map(str, data), "MORE.csv", *again]
+        for line in instructions(results, str(spec), shlex.join(more)):
+            typer.echo(line)
     _end(assessment.verdict)
 
 

@@ -82,6 +82,14 @@ _BEHIND = re.compile(
     r"(?:\s+(?:more|further|extra|less|up|down|open|"
     r"(?:hott|warm|cold|cool|fast|slow|high|low|larg|small|great)er)\b)*"
 )
+_PLAIN = _stems(
+    "the a an my our it its this that of by in to i we you and so then is are be some opening valve heater "
+    "pump heating voltage power steam fan drive input output level temperature pressure percent"
+)
+_UNDERSTOOD = (
+    _PLAIN | _RISES | _FALLS | _LESS | _GREATER | _MORE | _CLOSING | _LEADS | _LINKS | _STANDS | _ABOUT
+)
+"""Words of a gain that are understood; others are said back."""
 _MOST_BETWEEN = 5  # words between a cause that nothing marks and the verb
 # Of what a unit per time is no speed at which something rises, and words for what is a speed itself.
 _FLOWS = {"l", "ml", "t", "kg", "g", "m³", "rad", "deg", "°", "rev"}
@@ -178,7 +186,10 @@ class _Pair:
     def _effect_first(self, link: int) -> Gain | None:
         """Return the gain of "rises 2 cm when the valve opens 5 %"."""
         effect, cause, verb = self.first, self.second, _verb(self.before)
+        per = self.between[link].stem in ("per", "for")
         if verb is None and self.between[link].stem != "for":
+            return None
+        if per and any(one.stem not in _UNDERSTOOD for one in self.between[link:]):
             return None
         marked = any(one.stem in _MORE for one in (*self.between, *self.behind[:1]))
         stands = verb is not None and self.rate is None and self.before[-1].stem in _STANDS
@@ -241,7 +252,9 @@ class _Pair:
         about = any(_stem(re.split(r"\s", words)[-1]) in _ABOUT for words in touching)
         end = max(effect.end, cause.end, rate.end() if rate else 0)
         comparatives = _BEHIND.match(self.text, end)
-        form = f"{'rises by' if time else 'gain'} {'about ' * about}{'-' * negative}{size.lstrip('-')}"
+        beside = [one for one in (*does, *moved) if begin <= one.begin < end and one.stem not in _UNDERSTOOD]
+        form = "".join(f"{one.text} " for one in sorted(beside, key=lambda one: one.begin))
+        form += f"{'rises by' if time else 'gain'} {'about ' * about}{'-' * negative}{size.lstrip('-')}"
         form += f" per {time}" * bool(time) + f" per {cause.text.lstrip('-')}"
         return Gain(begin, comparatives.end() if comparatives else end, form, assumed)
 

@@ -54,7 +54,7 @@ _ALIKE: tuple[dict[str, float], ...] = (
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
             "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "twelve": 12, "fifteen": 15,
             "a couple of": 2}  # fmt: skip
-_TENS = "twenty thirty forty fifty sixty seventy eighty ninety".split()
+_TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 _COUNTED |= {ten: 10 * n for n, ten in enumerate(_TENS, 2)}
 _COUNTED |= {f"{ten}-five": 10 * n + 5 for n, ten in enumerate(_TENS, 2)}
 _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
@@ -110,7 +110,11 @@ _KNOWN_TO = re.compile(
     rf"(?={_DIGITS}\s*%)",
     re.I,
 )
-_AT_63 = re.compile(r"\b(?:(?:the )?time to\s+)?63\s*%[^,;.|\d]*?(?=(?:about\s+)?\d)", re.I)
+_AT_63 = re.compile(
+    r"\b(?:(?:the )?time to\s+)?63\s*%\s+(?:(?:of|it|the|way|its|final|value|that|change|is|are|reached|"
+    r"after|in|within)\s+)*(?=(?:about\s+)?\d)",
+    re.I,
+)
 _FALLS = re.compile(
     rf"\b(?:falls|drops|decreases|sinks|cools(?: down)?(?: the [a-z]+)?|goes down)(?: by)?\s+"
     rf"(?P<about>(?:{ABOUT}\s*)?)(?=\d)",
@@ -147,6 +151,12 @@ _TIMES_SAID = (
         "dead time",
     ),
     (rf"{_TRIAL}(?!.*\b(?:begin|start)s?\b)|\bspend\b|\bcannot have\b", "for"),
+)
+# Words of such a clause that are understood; others are said back.
+_OF_TIMES = re.compile(
+    rf"#|{ABOUT}|(?:settl|react|respo|answer|begin|start|first|test|trial|experiment|spend|reach|need|last|take)\w*$"
+    r"|(?:steady|fully|final|value|state|after|later|only|cannot|more|than|up|longer|most|time|half|long)$",
+    re.I,
 )
 _TIMES_READ = re.compile(
     rf"\b(?:{_TIMED}|time constant|noise|fad\w+|positions?|every|sampl\w+|keeps?|stays?|settles in|"
@@ -481,11 +491,11 @@ def _of_time(piece: re.Match[str]) -> str:
         return piece[0]
     around = f"{found['before']}#{found['behind']}"
     form = next((form for words, form in _TIMES_SAID if re.search(words, around, re.I)), None)
-    return (
-        piece[0]
-        if form is None
-        else f" {form} {'about ' * _vague(found['before'])}{found['amount']}".rstrip()
-    )
+    if form is None:
+        return piece[0]
+    others = [word for word in unread(around) if not _OF_TIMES.match(word)]
+    blank, about = piece[0][: len(piece[0]) - len(piece[0].lstrip())], ["about"] * _vague(found["before"])
+    return blank + " ".join([*others, form, *about, found["amount"]])
 
 
 def _size_of_a_speed(found: re.Match[str]) -> str:
