@@ -150,6 +150,7 @@ NONLINEAR = refuted(
 )
 # Drift makes other tests fail; an error of G makes tests of the noise fail.
 OF_MANY = {"drift": DRIFT, "plant": PLANT, "noise": NOISE}
+_MOST = {"drift": "along a trend", "plant": "most on those {} samples ago", "noise": "most {} samples apart"}
 OF_ONE = {"plant": MISSING, "noise": MISSING, "change": CHANGED, "nonlinear": NONLINEAR}
 _LONG = ", or compare with a long FIR model (B: [0, 1, 1, ..])"
 
@@ -162,10 +163,9 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
     for fault, kind in OF_MANY.items():
         test = next((test for test in failing if test.fault == fault and test not in directed), None)
         if test is not None:
-            lag = "" if fault == "drift" else f", most at lag {test.lag}"
-            fact = f"probability {chance(test.probability)} by chance{lag}{_where(model, test)}"
+            p, most = test.probability, _MOST[fault].format(test.lag)
+            fact = f"{most}{_where(model, test)}; with a right model the probability is {chance(p)}"
             remedy = _sentence(f"{remedies[fault]}{_LONG * (fault == 'plant')}")
-            p = test.probability
             found.append(kind.found(fact, where=test.name, remedy=remedy, probability=p, lag=test.lag))
     for test in failing:
         if test in directed:

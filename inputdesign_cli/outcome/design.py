@@ -350,7 +350,7 @@ OBJECTIVES = {
         "samples", "the shortest experiment that meets the accuracy", white="samples", spent="length"
     ),
     "accuracy_factor": ObjectiveWords(
-        "factor",
+        "r_u / r_adm",
         "the least model error within the limits, as a multiple of the admissible error (below 1: enough)",
         label="factor on the admissible error",
     ),

@@ -186,10 +186,12 @@ def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int
     """Return remarks on what is taken unasked: a controller, or none, and what keeps its values under it."""
     if control is None:
         why = ", as the actuator keeps its positions" * (hold > 1)
-        wanders = f"the plant integrates and is played in open loop{why}: see"
-        return [
-            f"{wanders} predicted_output.csv, and limit the output (limits) or name a controller (loop)"
-        ] * (plant.integrates and said.lower() == "as the plant")
+        remark = (
+            f"the plant integrates and is played in open loop{why}: its output wanders as "
+            "predicted_output.csv shows. If that is too far, say how far it may go (limits: output 5), or name "
+            "the controller that runs (loop: PI Kp 1, Ti 60)"
+        )
+        return [remark] * (plant.integrates and said.lower() == "as the plant")
     unasked = "slope" in plant.values and said.lower() == "as the plant"
     taken = f"a plant that integrates runs under a controller; {control} is taken: name yours (loop)"
     held = "under a controller r keeps its values, and the actuator still moves at every sample"

@@ -195,7 +195,7 @@ WHITE = ["limits={input_power: 1}", "spectrum={type: white}"]
 KINDS = [
     ("regression", ["experiment.samples=100"], ["must not exceed 1", "No moments at all"]),
     ("first_order", ["objective=shortest_experiment", *WHITE], ["samples 853", "white excitation: 853"]),
-    ("first_order", ["objective=best_accuracy", *WHITE], ["factor 1.30595"]),
+    ("first_order", ["objective=best_accuracy", *WHITE], ["r_u / r_adm 1.30595"]),
     ("criterion", ["spectrum.order=2"], [": log det M "]),
     ("first_order_given", [], ["The figures hold for"]),
 ]
