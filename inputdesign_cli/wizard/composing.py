@@ -188,8 +188,8 @@ def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int
         why = ", as the actuator keeps its positions" * (hold > 1)
         remark = (
             f"the plant integrates and is played in open loop{why}: its output wanders as "
-            "predicted_output.csv shows. If that is too far, say how far it may go (limits: output 5), or name "
-            "the controller that runs (loop: PI Kp 1, Ti 60)"
+            "predicted_output.csv shows. If that is too far, say how far it may go (limits: output 5), or "
+            "name the controller that runs (loop: PI Kp 1, Ti 60)"
         )
         return [remark] * (plant.integrates and said.lower() == "as the plant")
     unasked = "slope" in plant.values and said.lower() == "as the plant"
