@@ -15,6 +15,7 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.identification import identify as first_order
 from inputdesign_cli.outcome.design import Coverage as Reached
+from inputdesign_cli.questions.assessment.spread import reach
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.common import confidence
 from inputdesign_cli.questions.common.confidence import SimulatedEstimates
@@ -187,3 +188,46 @@ def test_regions_hold_the_truth_as_often_as_stated(tmp_path):
         held += away @ np.linalg.solve(covariance, away) <= scipy.stats.chi2.ppf(0.95, 2)
         tried += 1
     assert held / tried >= 0.88
+
+
+def test_the_likelihood_of_a_regression_is_that_of_students_t():
+    """Of least squares the distances of plants as likely as the data allow are those of Fisher's F."""
+    rng, samples = np.random.default_rng(4), 24
+    u, e = rng.standard_normal(samples), 0.3 * rng.standard_normal(samples)
+    y = scipy.signal.lfilter([0, 0.2], [1, -0.5], u) + scipy.signal.lfilter([1], [1, -0.5], e)
+    plain = parse_spec("plant: {A: [1, -0.5], B: [0, 0.2]}\nnoise: {variance: 0.09}\n", design=False)
+    model = build_model(plain)
+    found = first_order(model, u[:, None], y[:, None], rest=True)
+    k = found.theta.size
+    expected = k * scipy.stats.f.ppf(0.95, k, samples - k) / scipy.stats.chi2.ppf(0.95, k)
+    assert reach(model.at(found.theta, found.noise), found).max() == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.slow
+def test_regions_of_a_lag_hold_the_truth_after_twelve_samples(tmp_path):
+    """Its likelihood is no parabola: 58 % of the regions by first-order theory hold the truth."""
+    asked = """
+plant: {continuous: {gain: 2, time_constant: 5, dead_time: 1.4}, sample: zoh}
+noise: {variance: 0.04}
+"""
+    held = tried = 0
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.choice([-1.0, 1.0], 4), 3)
+        fine, pole = np.concatenate([np.zeros(14), np.repeat(u, 10)]), np.exp(-0.1 / 5)
+        y = scipy.signal.lfilter([0, 2 * (1 - pole)], [1, -pole], fine)[:120][::10]
+        table = np.column_stack([np.arange(12), u, y + 0.2 * rng.standard_normal(12)])
+        np.savetxt(tmp_path / "r.csv", table, delimiter=",", header="time,u1,y1", comments="")
+        try:
+            result = identify(parse_spec(asked, design=False), tmp_path / "r.csv").result
+        except IdesignError:  # an input that does not move
+            continue
+        if result["status"] == "identified":
+            names = list(result["identification"]["theta"])
+            own = [names.index(name) for name in ("gain", "time_constant", "dead_time")]
+            away = np.array([result["identification"]["theta"][names[k]] for k in own]) - [2, 5, 1.4]
+            covariance = np.array(result["information"]["covariance"])[np.ix_(own, own)]
+            held += away @ np.linalg.solve(covariance, away) <= scipy.stats.chi2.ppf(0.95, 3)
+            tried += 1
+    assert tried > 18
+    assert held >= 0.92 * tried

@@ -47,7 +47,7 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     plenty = estimate.errors.size >= _PLENTY * estimate.theta.size
     if plenty or not estimate.search.converged or estimate.tests.failed:  # a refuted model promises nothing
         return estimate, []
-    factors = np.maximum(_scatter(model, u, step, free=estimate.start.free), _reach(model, estimate))
+    factors = np.maximum(_scatter(model, u, step, free=estimate.start.free), reach(model, estimate))
     if np.all(factors <= _LUCK):
         return estimate, []
     times = np.sqrt(np.maximum(factors, 1.0))  # nothing is stated more sharply than by theory
@@ -56,7 +56,7 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     return wider, scattered(of_plant, of_noise, _RUNS, none=bool(factors.max() >= _MOST))
 
 
-def _reach(model: Model, estimate: Estimate) -> Array:
+def reach(model: Model, estimate: Estimate) -> Array:
     """Return by how much the likelihood of the data reaches beyond the region that theory states, (k,).
 
     Stable models are drawn about the estimate; each counts by its likelihood over the density of the draws
