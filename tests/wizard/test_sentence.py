@@ -418,6 +418,22 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("valve 40 % give or take 4 %", "range", "valve 40 % give or take 4 %"),
         ("one ml/min more means 0.1 pH less", "plant", "gain -0.1 pH per 1 ml/min"),
         ("lag 3 s; no faster than 1 % per second", "limits", "rate 1 per second"),
+        ("lag 3 s. From 8:00 to 14:00", "time", "360 min"),
+        ("lag 3 s; we cannot have more than 40 minutes", "time", "40 minutes"),
+        ("lag 3 s; the trial may last an hour", "time", "1 hour"),
+        ("gain 2, reacts 12 s after the feeder changes", "plant", "gain 2, dead time 12 s"),
+        ("gain 2, 63 % of it is reached after 70 s", "plant", "gain 2, time constant 70 s"),
+        ("gain 2, it needs 20 minutes to react fully", "plant", "gain 2, time constant 5 minutes"),
+        ("gain 2, lag 3 s, each known to 10 %", "plant", "gain 2, lag 3 s, each known within 10 %"),
+        ("a converter of 12 bits from 0 to 100 %, valve 40 +- 5 %", "converter", "12 bits up to 100 %"),
+        ("Feeder at 45 %, plus or minus 8 %", "range", "at 45 %, plus or minus 8 %"),
+        (
+            "the valve, which is at 30 %, may be varied by 4 %",
+            "range",
+            "the valve is at 30 %, may be varied by 4 %",
+        ),
+        ("level 3 m; the level must stay within 20 cm", "limits", "output 20 cm"),
+        ("lag 3 s; at the end the valve must be where it started", "return", "yes"),
     ],
 )
 def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
