@@ -68,7 +68,7 @@ def wizard(
 
         if draft is None:
             if said.unclear:
-                raise not_understood(said.unclear[0])
+                raise not_understood(*said.unclear)
             remarks = [*said.remarks, *taken_for_granted(said.texts)] if brief else said.remarks
             draft = compose(said.texts, output.stem, output.parent, remarks=remarks)
             draft.validate()

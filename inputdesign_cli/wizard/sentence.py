@@ -6,7 +6,7 @@ What is left over is asked for in other words where it may matter, and said back
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from inputdesign_cli.errors import SpecError
@@ -20,7 +20,7 @@ from inputdesign_cli.wizard.grammar import (
     taken_as,
     unread,
 )
-from inputdesign_cli.wizard.questions import KEYS, Answers, bad_answer, question
+from inputdesign_cli.wizard.questions import KEYS, Answers, bad_answer, in_other_words, question
 
 _TURNS = (
     *("loop", "wish", "drift", "noise", "plant", "hold", "signals"),
@@ -224,10 +224,20 @@ def _taken(piece: re.Match[str]) -> str:
     return ("|" * before + rest).ljust(len(piece[0]), "|")
 
 
-def not_understood(part: str) -> SpecError:
-    """Return the error about a part of a sentence, with the question that it names."""
-    named = (key for key in KEYS if re.search(rf"\b{key}\b", part, re.I))
-    return bad_answer(next(named, "plant"), f'"{part}" is not understood')
+def not_understood(*parts: str) -> SpecError:
+    """Return the error about all parts of a sentence that are not understood, each with its question."""
+    named = {part: [key for key in KEYS if re.search(rf"\b{key}\b", part, re.I)] for part in parts}
+    return SpecError(
+        [
+            replace(
+                one,
+                message=f'"{part}" is not understood',
+                hint=f"say {in_other_words(part).allowed}, or leave it out",
+            )
+            for part, keys in named.items()
+            for one in bad_answer([*keys, "plant"][0], "").diagnostics
+        ]
+    )
 
 
 def spread(answers: Answers, sentence: str | None = None) -> bool:
