@@ -61,7 +61,9 @@ _RISES = _stems(
 _FALLS = _stems("fall drop decrease lower reduce cool sink drain down")
 _LESS = _stems("less colder cooler slower smaller lower down")
 _GREATER = _stems("more hotter warmer faster higher larger greater up")
-_CLOSING = _stems("close shut reduce lower throttle decrease fall drop less")
+_CLOSING = _stems(
+    "close shut reduce lower throttle decrease fall drop less down back smaller slower cut remove weaken"
+)
 _LEADS = _stems(
     "when if with for open close shut raise lower increase decrease reduce drop turn step move change each "
     "every"
@@ -69,9 +71,11 @@ _LEADS = _stems(
 """What begins a change of the input, as in "when the valve opens 10 %"."""
 _LINKS = _stems("per for when if with")
 _STANDS = _stems("at around near")
+_STATES = _stems("get become")  # verbs of what is compared, as in "gets 2 degC warmer"
+_ARTICLES = {"the", "a", "an", "my", "our"}
 _NEVER = _stems(
     "may might can could must should would not never no cannot allowed most within between before than until "
-    "but noise scatter margin limit peak kp ti gain integrates"
+    "but noise scatter margin limit peak kp ti gain integrates last year yesterday ago earlier once"
 )
 """What stands in no gain: what may be, what is not, and sizes of something else."""
 _CAUSAL = _stems(
@@ -93,7 +97,7 @@ _UNDERSTOOD = (
 _MOST_BETWEEN = 5  # words between a cause that nothing marks and the verb
 # Of what a unit per time is no speed at which something rises, and words for what is a speed itself.
 _FLOWS = {"l", "ml", "t", "kg", "g", "m³", "rad", "deg", "°", "rev"}
-_SPEEDS = _stems("speed velocity flow rate throughput faster slower")
+_SPEEDS = _stems("speed velocity flow throughput faster slower")
 _GROWING = _stems("rise grow increase climb go fill move fall drop drain sink")
 
 
@@ -178,6 +182,8 @@ class _Pair:
             set(one.text) & set("+-±–:=") for one in signs
         ):
             return None
+        if any(one.text.lower() in ("to", "from") for one in (*self.before[-1:], *self.between[-1:])):
+            return None  # where it goes is no change
         link = next((i for i, one in enumerate(self.between) if one.stem in _LINKS), None)
         if link is not None:
             return self._effect_first(link)
@@ -185,7 +191,7 @@ class _Pair:
 
     def _effect_first(self, link: int) -> Gain | None:
         """Return the gain of "rises 2 cm when the valve opens 5 %"."""
-        effect, cause, verb = self.first, self.second, _verb(self.before)
+        effect, cause, verb = self.first, self.second, next(reversed(_verbs(self.before)), None)
         per = self.between[link].stem in ("per", "for")
         if verb is None and self.between[link].stem != "for":
             return None
@@ -195,17 +201,18 @@ class _Pair:
         stands = verb is not None and self.rate is None and self.before[-1].stem in _STANDS
         if not cause.unit or stands or (cause.unit == effect.unit and not marked):
             return None
-        does = self.before if verb is None else self.before[verb:]
+        does = [] if verb is None else self.before[verb:]
         of_cause = [*self.between[link:], *self.behind[:2]]
         begin = effect.begin if verb is None else self.before[verb].begin
-        return self._written(effect, cause, [*does, *self.between[:link]], of_cause, begin, "")
+        return self._written(effect, cause, does, self.between[:link], of_cause, begin, "")
 
     def _cause_first(self) -> Gain | None:
         """Return the gain of "when the valve opens 5 % the level rises 2 cm"."""
         cause, effect, before, between = self.first, self.second, self.before, self.between
         lead = next((i for i, one in enumerate(before) if one.stem in _LEADS), None)
         more = any(one.stem in _MORE | _stems("less") for one in (*between[:2], *before))
-        verb, marked = _verb(between), lead is not None or more
+        verbs, marked = _verbs(between), lead is not None or more
+        verb = verbs[-1] if verbs else None
         compared = bool(self.behind) and self.behind[0].stem in _GREATER | _LESS
         if not cause.unit or (cause.unit == effect.unit and not marked):
             return None
@@ -215,39 +222,52 @@ class _Pair:
             return None
         near = before[-1:] if before and before[-1].stem in _STANDS | _ABOUT | {"by"} else []
         if not marked:
-            direct = verb == 0 or between[0].stem in ("of", "on")
-            causal = verb is not None and verb <= _MOST_BETWEEN and between[verb].stem in _CAUSAL
+            direct = verbs[:1] == [0] or between[0].stem in ("of", "on")
+            causal = bool(verbs) and verbs[0] <= _MOST_BETWEEN and between[verbs[0]].stem in _CAUSAL
             if near or not (direct and causal):
                 return None
         start = near if lead is None else before[lead:]
-        does, of_cause = (between, start) if verb is None else (between[verb:], [*start, *between[:verb]])
+        does, of_cause = (
+            ([], [*start, *between]) if verb is None else (between[verb:], [*start, *between[:verb]])
+        )
         begin, assumed = (start or [cause])[0].begin, "" if marked else cause.text
-        return self._written(effect, cause, [*does, *self.behind[:1]], of_cause, begin, assumed)
+        return self._written(effect, cause, does, self.behind, of_cause, begin, assumed)
 
     def _written(
-        self, effect: _Token, cause: _Token, does: list[_Token], moved: list[_Token], begin: int, assumed: str
-    ) -> Gain:
-        """Write the gain in one form.
+        self,
+        effect: _Token,
+        cause: _Token,
+        does: list[_Token],
+        compared: list[_Token],
+        moved: list[_Token],
+        begin: int,
+        assumed: str,
+    ) -> Gain | None:
+        """Write the gain in one form; None where its sign is not clear.
 
         Args:
-            does: the words on the effect, from its verb on, which say its sign; `moved`: those on the cause.
+            does: the words on the effect from its verb on; `compared`: those behind its size.
+            moved: the words on the cause.
         """
+        behind = compared[0].stem if compared else ""
+        # "makes the cooler warmer", "10 degC of cooling": a word that may be a name, or a sign.
+        if any(one.stem in _FALLS | _LESS for one in (*does[1:], *compared[1:3])):
+            return None
         rate = self.rate or _RATE.match(self.text, effect.end)
+        if does and does[0].stem in _STATES and not (rate or behind in _LESS | _GREATER):
+            return None  # "it gets 70 degC" is no change
         time, size = rate["time"] if rate else "", effect.text
-        speed, stems = (
-            _SPEED.fullmatch(effect.unit),
-            {one.stem for one in (*self.before, *self.between, *does)},
-        )
-        if (
-            speed
-            and not time
-            and speed["size"].lower() not in _FLOWS
-            and stems & _GROWING
-            and not stems & _SPEEDS
-        ):
+        speed, stems = _SPEED.fullmatch(effect.unit), {one.stem for one in (*self.before, *self.between)}
+        flows = speed is not None and (speed["size"].lower() in _FLOWS or bool(stems & _SPEEDS))
+        if speed and not (time or flows or behind in _SPEEDS) and stems & _GROWING:
             time, size = speed["time"], f"{size[: -len(effect.unit)]}{speed['size']}"
-        falls = any(one.stem in _FALLS | _stems("less colder cooler slower smaller") for one in does)
-        negative = (falls != any(one.stem in _CLOSING for one in moved)) != size.startswith("-")
+        falls = behind in _LESS or (bool(does) and does[0].stem in _FALLS)
+        closes = any(
+            one.stem in _CLOSING and (i == 0 or moved[i - 1].text.lower() not in _ARTICLES)
+            for i, one in enumerate(moved)
+        )
+        signs = (falls, closes, size.startswith("-"), cause.text.startswith("-"))
+        negative = sum(signs) % 2 == 1
         touching = (self.text[: one.begin].rstrip() for one in (effect, cause))
         about = any(_stem(re.split(r"\s", words)[-1]) in _ABOUT for words in touching)
         end = max(effect.end, cause.end, rate.end() if rate else 0)
@@ -259,8 +279,7 @@ class _Pair:
         return Gain(begin, comparatives.end() if comparatives else end, form, assumed)
 
 
-def _verb(words: Sequence[_Token]) -> int | None:
-    """Return where a verb stands of what an output does; none stands behind an article."""
-    articles = {"the", "a", "an", "my", "our"}
+def _verbs(words: Sequence[_Token]) -> list[int]:
+    """Return where verbs of what an output does stand; none stands behind an article."""
     at = (i for i, one in enumerate(words) if one.stem in _RISES | _FALLS)
-    return next((i for i in at if i == 0 or words[i - 1].text.lower() not in articles), None)
+    return [i for i in at if i == 0 or words[i - 1].text.lower() not in _ARTICLES]

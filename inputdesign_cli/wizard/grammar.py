@@ -53,7 +53,7 @@ _ALIKE: tuple[dict[str, float], ...] = (
 # "a minute", "half an hour", "two shifts": words in place of numbers.
 _COUNTED = {"half an": 0.5, "half a": 0.5, "an": 1, "a": 1, "one": 1, "two": 2, "three": 3, "four": 4,
             "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "twelve": 12, "fifteen": 15,
-            "a couple of": 2}  # fmt: skip
+            "a couple of": 2, "half a dozen": 6, "a dozen": 12, "dozen": 12}  # fmt: skip
 _TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 _COUNTED |= {ten: 10 * n for n, ten in enumerate(_TENS, 2)}
 _COUNTED |= {f"{ten}-five": 10 * n + 5 for n, ten in enumerate(_TENS, 2)}
@@ -93,6 +93,8 @@ _SYMBOL = re.compile(
     rf"(?=(?:{ABOUT}\s*)?[-+.\d])",
     re.I,
 )
+_MINUS_SIGN = re.compile(r"−|(?<=\s)–(?=\d)")
+_NEGATIVE = re.compile(r"\b(gain|of|by|gives?)\s+[-−–]\s+(?=\d)", re.I)
 _CUBED = re.compile(r"(?<=[ %/(0-9kcdm]m)[23](?![\w.])")
 _MINUS = re.compile(
     r"(?<!plus/)(?<!plus or )(?<!plus and )(?<!plus )\b"
@@ -206,7 +208,7 @@ RESTING = (
 _SIZE = r"(?P<size>(?!(?:per|and)\b)(?:[^\s\d,;|/.:]|[.:](?=[^\s|]))+)"
 _RATE = rf"(?:\s*{_SIZE})?(?:\s*(?:per|/)\s*{_TIME})?"
 _BASE = (
-    rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?:(?!\d){_UNIT})+)"
+    rf"\s*(?:/|\bper\b|\bfor (?:each|every)\b)\s*(?P<many>{_DIGITS}\s*)?(?P<base>(?![\d-]){_UNIT}+)"
     rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
 )
 UP = "rises|grows|increases|climbs|goes up|warms|heats|raises|lifts"
@@ -421,7 +423,8 @@ def in_figures(text: str) -> str:
     "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 % itself", "an hour" becomes "1 hour", and
     "T = 3 s" becomes "time constant 3 s".
     """
-    figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", text)  # the end of a sentence
+    figures = _MINUS_SIGN.sub("-", _NEGATIVE.sub(r"\1 -", text))
+    figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", figures)  # the end of a sentence
     figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)
     figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
