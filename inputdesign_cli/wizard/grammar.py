@@ -17,6 +17,8 @@ from inputdesign_cli.wizard.questions import bad_answer
 LARGEST, SMALLEST = 1e15, 1e-15
 _DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"([-+]?{_DIGITS})"
+UNREAD = "_"
+"""What stands before a number that answers no question."""
 ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 PLUS_MINUS = r"(?:plus(?:/| or | )minus|give or take|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
@@ -25,10 +27,11 @@ _NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak
 UNIT = rf"(?:\s*(?!(?:{_NO_UNIT})\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
 ABOUT = r"(?:\b(?:about|around|roughly|approximately|approx|circa|ca|some|nearly|near)\b\.?|~|≈)"
-OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is|up to)\b\s*|{ABOUT}\s*|[:=]\s*)*"
+OF = rf"\s*(?:,\s+(?={ABOUT})|(?:of|is)\b\s*|{ABOUT}\s*|[:=]\s*)*"
+_SHARE_UNIT = r"(?:\s*(?P<share_unit>ms|s|sec|min|h)\b)?"
 WITHIN = (
     rf"(?:\s*(?:within|{PLUS_MINUS})\s*(?P<share>[-+]?{_DIGITS})"
-    rf"(?:(?P<per_cent>{_PER_CENT}(?P<itself>\s+itself\b)?)|(?:\s*(?P<share_unit>ms|s|sec|min|h)\b)?"
+    rf"(?:(?P<per_cent>{_PER_CENT}(?P<itself>\s+itself\b)?)|{_SHARE_UNIT}"
     r"(?=\s*(?:[,;.:|)]|$|(?:and|with)\b))))?"
 )
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
@@ -61,6 +64,10 @@ _TIME = rf"(?P<unit>{'|'.join(_TIMES)})s?\b"
 UNIT_OF_TIME = _TIME.replace("?P<unit>", "?:")
 _FRACTIONS = {"tenth": 0.1, "fifth": 0.2, "quarter": 0.25, "third": 1 / 3}
 _FRACTION = re.compile(rf"\b(?:(?:a|one) )?({'|'.join(_FRACTIONS)}) of an? (?={UNIT_OF_TIME})", re.I)
+RESTING = (
+    "(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating|working"
+    "|now|normally|usually|currently|nominally)"
+)
 SIGNAL = "(?:level|temp(?:erature)?|speed|pressure|flow|position|concentration|output|sensor|measurement)"
 LATE = (
     r"dead time|(?:transport |pure )?delay(?:ed by)?"
@@ -172,6 +179,11 @@ _STANDING = re.compile(
     rf"\b(?P<name>[a-z]+) (?:at|around|near|normally|usually|now)\s+(?P<size>{_SIZE_OF})(?=,?\s+{_MAY_MOVE})",
     re.I,
 )
+_OUTPUT = r"\b(?:the\s+)?(?:level|temp(?:erature)?|concentration|output|sensor)\s+"
+OUTPUT_RESTS = re.compile(rf"{_OUTPUT}(?:(?:{RESTING}|kept|held)\s+)+(?:at|around|near)\s+{_SIZE_OF}", re.I)
+"""Where an output rests, as in "the level is kept at 60 %"."""
+_ENDS_OF = rf"{NUMBER}\s*(?:{gains.UNIT})?\s*(?:to|-|–|\.\.|{PLUS_MINUS})\s*{NUMBER}"
+_OUTPUT_RANGE = re.compile(rf"{_OUTPUT}(?:(?:may|can|could|moves?|goes|go|from|is)\s+)*{_ENDS_OF}", re.I)
 # What is said of an input, and its form, as "12 bits up to 100 %" for "12 bits from 0 to 100 %".
 _OF_INPUTS = (
     (
@@ -200,10 +212,6 @@ DRIVE = (
     "(?:valve|heater|heating|pump|voltage|power|flow|steam|reflux|damper|fan|current|opening|radiator|drive"
     "|gate|input|actuator)"
 )
-RESTING = (
-    "(?:is|stands?|sits?|rests?|runs?|works?|operates?|stays?|running|sitting|operating|working"
-    "|now|normally|usually|currently|nominally)"
-)
 # "per minute", and of a gain "per 10 % of valve".
 _SIZE = r"(?P<size>(?!(?:per|and)\b)(?:[^\s\d,;|/.:]|[.:](?=[^\s|]))+)"
 _RATE = rf"(?:\s*{_SIZE})?(?:\s*(?:per|/)\s*{_TIME})?"
@@ -224,7 +232,8 @@ _OF_SPEED = re.compile(
 )
 # What stands behind the number of each kind.
 _BEHIND = {
-    "time": rf"(?:\s*{_TIME}|(?![\d.]|\s*(?:%|°|[a-z]+\s*/|[a-z]+ per\b|(?:[mk]?hz|ks|samples?|rad)\b)))",
+    "time": rf"(?:\s*{_TIME}|(?![\d.]|\s*(?:[%°'’″′½¼¾]|[a-z]+\s*/|[a-z]+ per\b"
+    r"|(?:[mk]?hz|ks|samples?|rad|[nµμ]s|m)\b)))",
     "frequency": rf"(?:\s*(?P<unit>{'|'.join(_FREQUENCIES)})\b)?",
     "rate": rf"{_RATE}(?!\s*[^\s,;]*\s*(?:\bper\b|/)\s*[a-z])",
     "slope": rf"{_RATE}(?:{_BASE})?",
@@ -262,6 +271,7 @@ BEYOND = re.compile(
 def orders(words: str, kind: str, within: str = WITHIN) -> tuple[str, str]:
     """Return the patterns of a quantity: "dead time of 25 s", and "25 s of dead time"."""
     number = rf"(?P<number>[-+]?{_DIGITS}){_BEHIND[kind]}"
+    within = within if kind == "time" else within.replace(_SHARE_UNIT, "")  # "2 K within 5 min" is no share
     return (
         rf"(?P<words>(?:{ABOUT}\s*|\b)(?:{words})\b{OF}){number}{within}",
         rf"(?P<words>{ABOUT}\s*)?{ALONE}{number}\s*(?:of\s+)?\b(?:{words})\b{within}",
@@ -410,7 +420,8 @@ def check_numbers(text: str, key: str) -> None:
         why = f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
         raise bad_answer(key, why)
     if share := re.search(
-        rf"(?<!63)(?<!63 )%\s+of\s+(?:the\s+)?(?:{SIGNAL}|that|it|this|range|span|reading|value)\b",
+        r"(?<!63)(?<!63 )(?:%|per ?cent)\s+of\s+(?:the\s+)?"
+        rf"(?:{SIGNAL}|that|it|this|range|span|reading|value)\b",
         text,
         re.I,
     ):
@@ -438,6 +449,7 @@ def in_figures(text: str) -> str:
     figures = _PIECE.sub(_of_time, _OF_DAY.sub(_hours, figures))
     for said, form in _OF_INPUTS:
         figures = re.sub(said, form, figures, flags=re.I)
+    figures = _OUTPUT_RANGE.sub(lambda found: re.sub(r"(?<![\w.])(?=\d)", UNREAD, found[0]), figures)
     figures = _STANDING.sub(_standing, figures)
     figures = _SETTLES.sub(
         lambda found: f"time constant {'about ' * _vague(found['of'])}{_time_constant(found)}", figures
@@ -479,6 +491,11 @@ def _standing(found: re.Match[str]) -> str:
         return found[0]
     known = re.fullmatch(DRIVE, found["name"], re.I)
     return f"{found['name']}{',' * (known is None)} at {found['size']}"
+
+
+def of_outputs(text: str) -> list[str]:
+    """Return what a text says of where an output rests, which is no operating point of the input."""
+    return [found[0].strip() for found in OUTPUT_RESTS.finditer(text)]
 
 
 def _hours(found: re.Match[str]) -> str:

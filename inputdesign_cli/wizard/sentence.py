@@ -45,6 +45,13 @@ _MATTERS = re.compile(
     r"peak\S*)\b",
     re.I,
 )
+# Words of a clause that says how long the experiment may take.
+_OF_TIME = re.compile(
+    r"(?:experiment|test|trial|record)\w*|time|available|free|plant|have|got|i've|we've|i'd|get|gets|spend|use|give|"
+    r"most|least|max(?:imum)?|long(?:er|est)?|no|not|more|than|up|less|fine|okay?|enough|total|altogether|all|within|"
+    r"during|over|last|run|runs|there's|duration|only|just|roughly|but|loop|pid?|\W+",
+    re.I,
+)
 # The size of a device says nothing of its dynamics.
 _RATED = re.compile(
     r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
@@ -167,12 +174,12 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         raise bad_answer("wish", f'"{other[0]}": settings are found for PI and PID')
     found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
     said, named = _with_names(in_figures(text))
-    left = BEYOND.sub(_taken, said)
+    left = grammar.OUTPUT_RESTS.sub(_taken, BEYOND.sub(_taken, said))
     unwanted = [part[0].strip() for part in _unwanted().finditer(left)]
     left = _unwanted().sub(_taken, left)
     for key in _TURNS:
         for pattern, template in _pieces(key):
-            while piece := re.search(pattern, left, re.I):
+            while piece := _first(pattern, left, key):
                 says = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
                 rest = _taken(piece)
                 if key == "plant" and " per " in says and (less := _LESS.search(piece[0])):
@@ -187,9 +194,12 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     parts = [part.strip() for clause in _ENDS.split(left) for part in clause.split("|") if unread(part)]
     parts = [part for part in parts if part.lower() != "but"]
     unclear = unwanted + [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
-    beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"\w", part)]
+    beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"[\w%]", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
-    beside = [part for part in beside if part.lower() not in " ".join(answers.values()).lower()]
+    said_already = " ".join(answers.values())
+    beside = [
+        part for part in beside if not re.search(rf"(?<!\w){re.escape(part)}(?!\w)", said_already, re.I)
+    ]
     for word in [part for part in beside if re.fullmatch(grammar.ABOUT, part, re.I)]:
         beside.remove(word)
         if "plant" in answers:  # "gain 2, time constant 3 min, roughly"
@@ -198,13 +208,27 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         *named,
         *taken_as(text),
         *beyond_models(text),
+        *(f"{part}: assess takes that in --operating-point" for part in grammar.of_outputs(said)),
         *([f"words that set nothing: {', '.join(beside)}"] if beside else []),
     ]
     remarks += _of_the_wish(answers.get("wish", ""), text)
     if "wish" in answers and wishes.unbounded(answers["wish"]):
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")
-    return Heard(answers, tuple(remarks), tuple(unclear))
+    return Heard(answers, tuple(remarks), tuple(part.replace(grammar.UNREAD, "") for part in unclear))
+
+
+def _first(pattern: str, text: str, key: str) -> re.Match[str] | None:
+    """Return the first piece of a text that answers a question; a time answers none in a foreign clause."""
+    found = re.finditer(pattern, text, re.I)
+    return next((one for one in found if key != "time" or _of_experiment(one, text)), None)
+
+
+def _of_experiment(piece: re.Match[str], text: str) -> bool:
+    """Return whether the words of a clause about a time are those of an experiment and how long it lasts."""
+    begin, end = piece.span("said") if "said" in piece.re.groupindex else piece.span()
+    before, behind = re.split(r"[,;:|]|\.\s", text[:begin])[-1], re.split(r"[,;:|]|\.(?:\s|$)", text[end:])[0]
+    return all(_OF_TIME.fullmatch(word) for word in unread(f"{before} {behind}"))
 
 
 def _of_the_wish(wish: str, text: str) -> list[str]:

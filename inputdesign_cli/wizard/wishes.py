@@ -108,7 +108,7 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
     said.finish("move stands sits rests runs run operate keep from allowed possible permitted only")
     units = [*(one.strip() for _, one in sizes), (named and named["in_unit"]) or ""]
     unit = next(filter(None, units), "")
-    one, other = (said.sized(float(number), own.strip() or unit) for number, own in sizes)
+    one, other = (said.sized(float(number), own.strip() or unit, ours or unit) for number, own in sizes)
     middle, side = (one, other) if ends is None else (0.5 * (one + other), 0.5 * (other - one))
     if ends is not None and not one < other:
         raise bad_answer("range", f"{one:g} is not below {other:g}")
