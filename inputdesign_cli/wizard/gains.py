@@ -56,14 +56,16 @@ _ABOUT = _stems("about around roughly approximately approx circa ca some nearly 
 _MORE = _stems("more further extra additional another each every")
 _RISES = _stems(
     "rise raise increase grow climb go warm heat lift give make bring cause mean add let get become fill "
-    "yield produce lead result change respond push speed move run turn"
+    "yield produce lead result change respond push speed move"
 )
-_FALLS = _stems("fall drop decrease lower reduce cool sink drain down")
-_LESS = _stems("less colder cooler slower smaller lower down")
+_FALLS = _stems("fall drop decrease lower reduce cool sink drain down lose loss decline empty emptier")
+_LESS = _stems("less colder cooler slower smaller lower down emptier")
 _GREATER = _stems("more hotter warmer faster higher larger greater up")
 _CLOSING = _stems(
-    "close shut reduce lower throttle decrease fall drop less down back smaller slower cut remove weaken"
+    "close shut reduce lower throttle decrease fall drop less down back smaller slower slow cut remove "
+    "weaken withdraw missing"
 )
+_OPENING = _stems("open raise increase more further extra additional up")
 _LEADS = _stems(
     "when if with for open close shut raise lower increase decrease reduce drop turn step move change each "
     "every"
@@ -71,11 +73,14 @@ _LEADS = _stems(
 """What begins a change of the input, as in "when the valve opens 10 %"."""
 _LINKS = _stems("per for when if with")
 _STANDS = _stems("at around near")
+_NOUNS = {"drop", "fall", "decline", "loss", "decrease"}
+_LETS = _stems("let make cause")
 _STATES = _stems("get become")  # verbs of what is compared, as in "gets 2 degC warmer"
 _ARTICLES = {"the", "a", "an", "my", "our"}
 _NEVER = _stems(
     "may might can could must should would not never no cannot allowed most within between before than until "
-    "but noise scatter margin limit peak kp ti gain integrates last year yesterday ago earlier once"
+    "but noise scatter margin limit peak kp ti gain integrates least reach used hope last "
+    "year yesterday ago earlier once"
 )
 """What stands in no gain: what may be, what is not, and sizes of something else."""
 _CAUSAL = _stems(
@@ -193,11 +198,11 @@ class _Pair:
         """Return the gain of "rises 2 cm when the valve opens 5 %"."""
         effect, cause, verb = self.first, self.second, next(reversed(_verbs(self.before)), None)
         per = self.between[link].stem in ("per", "for")
-        if verb is None and self.between[link].stem != "for":
+        marked = any(one.stem in _MORE for one in (*self.between, *self.behind[:1]))
+        if verb is None and not (marked and self.between[link].stem == "for"):
             return None
         if per and any(one.stem not in _UNDERSTOOD for one in self.between[link:]):
             return None
-        marked = any(one.stem in _MORE for one in (*self.between, *self.behind[:1]))
         stands = verb is not None and self.rate is None and self.before[-1].stem in _STANDS
         if not cause.unit or stands or (cause.unit == effect.unit and not marked):
             return None
@@ -209,7 +214,7 @@ class _Pair:
     def _cause_first(self) -> Gain | None:
         """Return the gain of "when the valve opens 5 % the level rises 2 cm"."""
         cause, effect, before, between = self.first, self.second, self.before, self.between
-        lead = next((i for i, one in enumerate(before) if one.stem in _LEADS), None)
+        lead = next((i for i, one in enumerate(before) if one.stem in _LEADS and _free(before, i)), None)
         more = any(one.stem in _MORE | _stems("less") for one in (*between[:2], *before))
         verbs, marked = _verbs(between), lead is not None or more
         verb = verbs[-1] if verbs else None
@@ -224,7 +229,7 @@ class _Pair:
         if not marked:
             direct = verbs[:1] == [0] or between[0].stem in ("of", "on")
             causal = bool(verbs) and verbs[0] <= _MOST_BETWEEN and between[verbs[0]].stem in _CAUSAL
-            if near or not (direct and causal):
+            if near or not (direct and causal) or any(one.stem in _CLOSING for one in before):
                 return None
         start = near if lead is None else before[lead:]
         does, of_cause = (
@@ -232,6 +237,11 @@ class _Pair:
         )
         begin, assumed = (start or [cause])[0].begin, "" if marked else cause.text
         return self._written(effect, cause, does, self.behind, of_cause, begin, assumed)
+
+    def _lets(self, verb: _Token) -> bool:
+        """Return whether a verb follows one as in "lets the level fall", or begins a clause."""
+        earlier = [one for one in (*self.before, *self.between) if one.begin < verb.begin]
+        return not any(one.stem in _RISES - _LETS for one in earlier)
 
     def _written(
         self,
@@ -250,6 +260,13 @@ class _Pair:
             moved: the words on the cause.
         """
         behind = compared[0].stem if compared else ""
+        if (
+            len(does) > 1
+            and does[0].stem in _FALLS
+            and does[0].text.lower() in _NOUNS
+            and not self._lets(does[0])
+        ):
+            return None
         # "makes the cooler warmer", "10 degC of cooling": a word that may be a name, or a sign.
         if any(one.stem in _FALLS | _LESS for one in (*does[1:], *compared[1:3])):
             return None
@@ -262,10 +279,9 @@ class _Pair:
         if speed and not (time or flows or behind in _SPEEDS) and stems & _GROWING:
             time, size = speed["time"], f"{size[: -len(effect.unit)]}{speed['size']}"
         falls = behind in _LESS or (bool(does) and does[0].stem in _FALLS)
-        closes = any(
-            one.stem in _CLOSING and (i == 0 or moved[i - 1].text.lower() not in _ARTICLES)
-            for i, one in enumerate(moved)
-        )
+        closes = any(one.stem in _CLOSING and _free(moved, i) for i, one in enumerate(moved))
+        if closes and any(one.stem in _OPENING for one in moved):
+            return None  # "opening the valve that is closed", "5 % more in the lower tank"
         signs = (falls, closes, size.startswith("-"), cause.text.startswith("-"))
         negative = sum(signs) % 2 == 1
         touching = (self.text[: one.begin].rstrip() for one in (effect, cause))
@@ -282,4 +298,9 @@ class _Pair:
 def _verbs(words: Sequence[_Token]) -> list[int]:
     """Return where verbs of what an output does stand; none stands behind an article."""
     at = (i for i, one in enumerate(words) if one.stem in _RISES | _FALLS)
-    return [i for i in at if i == 0 or words[i - 1].text.lower() not in _ARTICLES]
+    return [i for i in at if _free(words, i) and words[i].text.lower() not in ("lower", "cooler")]
+
+
+def _free(words: Sequence[_Token], at: int) -> bool:
+    """Return whether no article stands before a word, as it does before "the lower valve"."""
+    return at == 0 or words[at - 1].text.lower() not in _ARTICLES

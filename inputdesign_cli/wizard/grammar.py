@@ -434,7 +434,7 @@ def in_figures(text: str) -> str:
     "dead time 3 to 6 min" becomes "dead time 4.5 min within 33.3 % itself", "an hour" becomes "1 hour", and
     "T = 3 s" becomes "time constant 3 s".
     """
-    figures = _MINUS_SIGN.sub("-", _NEGATIVE.sub(r"\1 -", text))
+    figures = _MINUS_SIGN.sub("-", _NEGATIVE.sub(r"\1 -", re.sub(r"\bper cent\b", "%", text, flags=re.I)))
     figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", figures)  # the end of a sentence
     figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)

@@ -36,11 +36,12 @@ _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
 # What is left is asked for again if it has a number or a negation, or words whose number is missing.
 _MATTERS = re.compile(
-    r"\d|^one\b|n't\b|\b(?:two|three|four|five|six|eight|ten|twelve|twenty|thirty|"
+    r"\d|^%|^one\b|n't\b|\b(?:two|three|four|five|six|eight|ten|twelve|twenty|thirty|"
     r"not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
     r"invers\w*|clos(?:e|es|ed|ing)|shut\w*|reduc\w*|less(?! is)|unstable|off|manual|slower|faster|times|"
     r"factor|accura\w*|uncertain\w*|guess\w*|total|overall|upwards?|downwards?|PRBS|binary|weekend|overnight|"
-    r"dead time|delay|time constant|lag|react\w*|respon[ds]\w*|answers|"
+    r"dead time|delay|time constant|lag|gain|react\w*|respon[ds]\w*|answers|cannot|or|pp|p-p|negligible|"
+    r"hardly|old|had|used|hope|expect\w*|perhaps|might|predict\w*|humidity|"
     r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month|morning|afternoon|evening)s?|half|twice|doubled?|"
     r"peak\S*)\b",
     re.I,
@@ -227,6 +228,8 @@ def _first(pattern: str, text: str, key: str) -> re.Match[str] | None:
 def _of_experiment(piece: re.Match[str], text: str) -> bool:
     """Return whether the words of a clause about a time are those of an experiment and how long it lasts."""
     begin, end = piece.span("said") if "said" in piece.re.groupindex else piece.span()
+    if re.search(r"\|\s*$", text[: piece.start()]) and re.match(r"(?:with)?in\b", piece[0], re.I):
+        return False  # "it rises by 2 degC within 5 min"
     before, behind = re.split(r"[,;:|]|\.\s", text[:begin])[-1], re.split(r"[,;:|]|\.(?:\s|$)", text[end:])[0]
     return all(_OF_TIME.fullmatch(word) for word in unread(f"{before} {behind}"))
 
