@@ -280,7 +280,12 @@ class _Pair:
             time, size = speed["time"], f"{size[: -len(effect.unit)]}{speed['size']}"
         falls = behind in _LESS or (bool(does) and does[0].stem in _FALLS)
         closes = any(one.stem in _CLOSING and _free(moved, i) for i, one in enumerate(moved))
-        if closes and any(one.stem in _OPENING for one in moved):
+        after = [*moved[1:], effect][: len(moved)]
+        opens = (
+            one.stem in _OPENING and next_.stem not in _CLOSING
+            for one, next_ in zip(moved, after, strict=True)
+        )
+        if closes and any(opens):
             return None  # "opening the valve that is closed", "5 % more in the lower tank"
         signs = (falls, closes, size.startswith("-"), cause.text.startswith("-"))
         negative = sum(signs) % 2 == 1
@@ -288,7 +293,10 @@ class _Pair:
         about = any(_stem(re.split(r"\s", words)[-1]) in _ABOUT for words in touching)
         end = max(effect.end, cause.end, rate.end() if rate else 0)
         comparatives = _BEHIND.match(self.text, end)
-        beside = [one for one in (*does, *moved) if begin <= one.begin < end and one.stem not in _UNDERSTOOD]
+        of_rate = rate.span() if rate else (end, end)
+        words = [one for one in {*does, *compared, *moved} if begin <= one.begin < end]
+        words = [one for one in words if one.begin < of_rate[0] or one.begin >= of_rate[1]]
+        beside = [one for one in words if one.stem not in _UNDERSTOOD]
         form = "".join(f"{one.text} " for one in sorted(beside, key=lambda one: one.begin))
         form += f"{'rises by' if time else 'gain'} {'about ' * about}{'-' * negative}{size.lstrip('-')}"
         form += f" per {time}" * bool(time) + f" per {cause.text.lstrip('-')}"

@@ -144,6 +144,9 @@ _SPOKEN = re.compile(
     rf"|to\s+(?:{'|'.join(_COUNTED)}|\d+)\s+{UNIT_OF_TIME}))",
     re.I,
 )
+_NOTHING = re.compile(
+    r"\bnothing (?:happens|moves|changes) (?:in|for|during|within) (?:the )?(?:first )?(?:a )?(?=few\b)", re.I
+)
 _PIECE = re.compile(r"[^,;.|]+(?:\.\d+[^,;.|]*)*")
 _ONE_TIME = re.compile(
     rf"(?P<before>[^\d%]*)(?P<amount>{ALONE}{_DIGITS}(?:\s*(?:to|-|–)\s*{_DIGITS})?\s*{UNIT_OF_TIME})"
@@ -173,7 +176,7 @@ _TIMES_READ = re.compile(
     re.I,
 )
 _OF_DAY = re.compile(r"(?:\bfrom\s+)?\b(\d\d?):(\d\d)\s*(?:to|until|-|–)\s*(\d\d?):(\d\d)\b", re.I)
-_SIZE_OF = rf"{NUMBER}\s*{gains.UNIT}"
+_SIZE_OF = rf"[-+]?{_DIGITS}\s*{gains.UNIT}"
 _MAY_MOVE = rf"(?:(?:and|it|which|that|we)\s+)*(?:may|can|could|swings?|moves?|var|{PLUS_MINUS})"
 _STANDING = re.compile(
     rf"\b(?P<name>[a-z]+) (?:at|around|near|normally|usually|now)\s+(?P<size>{_SIZE_OF})(?=,?\s+{_MAY_MOVE})",
@@ -186,9 +189,15 @@ _ENDS_OF = rf"{NUMBER}\s*(?:{gains.UNIT})?\s*(?:to|-|–|\.\.|{PLUS_MINUS})\s*{N
 _OUTPUT_RANGE = re.compile(rf"{_OUTPUT}(?:(?:may|can|could|moves?|goes|go|from|is)\s+)*{_ENDS_OF}", re.I)
 # What is said of an input, and its form, as "12 bits up to 100 %" for "12 bits from 0 to 100 %".
 _OF_INPUTS = (
+    (rf"({_SIZE_OF})\s+up,?\s+(?:and\s+|or\s+)?\1\s+down", r"\1 either way"),
+    (rf"\b(up (?:and|or) down) by ({_SIZE_OF})", r"by \2 \1"),
+    (
+        rf"(?:and )?\bnot (?:above|over) ({_SIZE_OF}),? (?:and|or) (?:not )?(?:below|under) ({_SIZE_OF})",
+        r"\2 to \1",
+    ),
     (
         r"(?<=, )(?:it |which )?(?:may|must|can|should) ?not (?:change|move|vary|go)(?: by)? more than "
-        rf"(?={_SIZE_OF})",
+        rf"(?={_SIZE_OF}(?!\s*(?:per\b|/)))",
         "may move by ",
     ),
     (
@@ -436,6 +445,7 @@ def in_figures(text: str) -> str:
     """
     figures = _MINUS_SIGN.sub("-", _NEGATIVE.sub(r"\1 -", re.sub(r"\bper cent\b", "%", text, flags=re.I)))
     figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", figures)  # the end of a sentence
+    figures = _NOTHING.sub("dead time of a ", figures)
     figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)
     figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
@@ -443,7 +453,7 @@ def in_figures(text: str) -> str:
     figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
     figures = _FEW.sub(lambda found: f"{found['what'] or found['late']} {_few(found)}", figures)
-    figures = _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", figures)
+    figures = _counted(figures)
     figures = _KNOWN_TO.sub(lambda found: f"{'known ' * (found[1].lower() == 'known')}within ", figures)
     figures = in_one_form(_AT_63.sub("time constant ", _OR_SO.sub(r"about \1", figures)))
     figures = _PIECE.sub(_of_time, _OF_DAY.sub(_hours, figures))
@@ -462,6 +472,7 @@ def in_figures(text: str) -> str:
 
 def taken_as(text: str) -> list[str]:
     """Return how "a few minutes", "settles in 2 s", "noise +- 2" and "9 V gives 18 K" in a text are taken."""
+    text = _PIECE.sub(_of_time, _counted(text))
     return [
         *(f'"a few {one["unit"] or one["of"]}" is taken as {_few(one)}' for one in _FEW.finditer(text)),
         *(
@@ -491,6 +502,11 @@ def _standing(found: re.Match[str]) -> str:
         return found[0]
     known = re.fullmatch(DRIVE, found["name"], re.I)
     return f"{found['name']}{',' * (known is None)} at {found['size']}"
+
+
+def _counted(text: str) -> str:
+    """Return a text with figures for number words before a unit."""
+    return _SPOKEN.sub(lambda found: f"{_COUNTED[found[1].lower()]} ", text)
 
 
 def of_outputs(text: str) -> list[str]:

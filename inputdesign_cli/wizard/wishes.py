@@ -59,7 +59,7 @@ MOVES = (
 )
 BOTH_WAYS = (
     r"(?:up (?:and|or) down|(?:either|each|both) ways?|(?:(?:to|on) )?(?:either|each|both) sides?"
-    r"|in (?:both|either) directions?)"
+    r"|in (?:both|either) directions?|more or less)"
 )
 ACTUATOR = rf"(?:(?!(?:the|our|my|move|may|can|by|from|around|when|open|if|i)\b)[a-z]+ )?{DRIVE}"
 

@@ -13,6 +13,10 @@ CAUSES = {
     "if I close the valve by 5 %": -1,
     "reducing the flow by 5 %": -1,
     "for 5 % less fuel": -1,
+    "turning the heater down by 5 %": -1,
+    "with the valve 5 % more closed": -1,
+    "for a step of -5 %": -1,
+    "opening the closed valve by 5 %": 1,
 }
 EFFECTS = {
     "the room warms by 2 K": 1,
@@ -20,6 +24,8 @@ EFFECTS = {
     "the temperature drops by 2 K": -1,
     "it lowers the outlet by 2 K": -1,
     "the water becomes 2 K colder": -1,
+    "it lets the temperature fall by 2 K": -1,
+    "it makes the cooler rise by 2 K": 1,
 }
 
 
@@ -60,6 +66,11 @@ def test_a_gain_has_one_form(said, form):
         "the motor turns at 150 rad/s with 9 V",
         "valve 35 to 45 %, the level rises in 3 min",
         "steps of 0.5 % take 2 s",
+        "5 % more makes the cooler 2 K warmer",
+        "opening the valve that is normally closed by 5 % raises the level by 2 cm",
+        "the temperature rises to 70 degC when the valve opens to 45 %",
+        "with 45 % it becomes 70 degC",
+        "last year it rose and it rises by 5 K for 2 %",
         "the pressure must stay within 200 mbar when the valve moves 5 %",
     ],
 )
