@@ -26,7 +26,6 @@ NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgErro
 """What ends the estimate of one structure, not that of others: warnings of arithmetic may be errors."""
 
 _BY_CHANCE = 0.05
-_DEPENDENT = 1e-9
 # A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 
@@ -66,13 +65,11 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
         samples, moves = np.arange(len(y)), u - u.mean(axis=0)
         counted = samples >= (delay if late is None else late)
         unexplained, level = counted & (samples < delay), y[counted].mean(axis=0) if np.any(counted) else 0.0
+        part, by = ((moves, y - y.mean(axis=0)),), np.eye(y.shape[1])
         with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-            caused, _ = form.simulate(moves, np.zeros(y.shape), 1.0)
-            for i, start in enumerate(plant.starts(form.theta, len(y), delay, free=True)):
-                caused[:, i] += _nearest(start.free, y[:, i] - caused[:, i])
-            record = Records(kind, ((moves, y - y.mean(axis=0)),))
-            predicted = record.begun_freely(kind.lateness(model.theta)).at(model.theta).errors
-        missing.append(y - np.where(unexplained[:, None], level, caused))
+            left = Records(plant, part, weights=by).begun_freely(delay).at(form.theta).errors
+            predicted = Records(kind, part).begun_freely(kind.lateness(model.theta)).at(model.theta).errors
+        missing.append(np.where(unexplained[:, None], y - level, left))
         simulated.append(y - missing[-1])
         errors.append(np.where(unexplained[:, None], y - level, predicted))
         kept.append(counted)
@@ -102,14 +99,6 @@ def percent(errors: Array, varying: Array) -> tuple[float, ...]:
     with np.errstate(over="ignore"):
         left = np.linalg.norm(errors, axis=0) / np.maximum(np.linalg.norm(varying, axis=0), 1e-300)
     return tuple(float(100.0 * (1.0 - x)) if np.isfinite(x) else -np.inf for x in left)
-
-
-def _nearest(responses: NDArray[np.float64], left: Array) -> Array:
-    """Return the combination of responses (m, n) nearest to the remainder (n,); infinite where they are."""
-    if not (np.all(np.isfinite(responses)) and np.all(np.isfinite(left))):
-        return np.full(left.shape, np.inf)
-    columns = responses.T / np.maximum(np.linalg.norm(responses, axis=1), 1e-300)
-    return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
 
 
 def is_steady(model: Model, samples: int) -> bool:
