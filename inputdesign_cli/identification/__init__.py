@@ -13,7 +13,6 @@ from inputdesign_cli.identification.estimators import (
     Estimate as Estimate,
     fit_batch as fit_batch,
     identify as identify,
-    information_begun_anywhere as information_begun_anywhere,
     information_of_data as information_of_data,
 )
 from inputdesign_cli.identification.frequency_response import (

@@ -257,24 +257,17 @@ def information_of_data(
 ) -> Array:
     """Return the information matrix (k, k) of records at a model's own parameters and noise, fitting or not.
 
-    If `free`, starts and levels of the records are unknown; for the rest see `identify`.
+    If `free`, starts and levels of the records are unknown; for the rest see `identify`. Only the excitation
+    of u (N, r) and y (N, p) counts, which may be signals without noise.
     """
-    parts = split(u, y, lengths)
-    records = Records(estimator(model, step), tuple(centred(parts) if free else parts), free=free)
+    kind, parts = estimator(model, step), split(u, y, lengths)
+    weights = np.asarray(np.linalg.inv(model.covariance), dtype=float)
+    records = Records(kind, tuple(centred(parts) if free else parts), weights=weights)
+    if free:
+        late = kind.lateness(model.theta)
+        records = records.begun_freely(late if late * u.shape[1] * y.shape[1] * y.size <= _MOST else 0)
     found = information_of(records, evaluate(records, model.theta), model.covariance)
     return found if earlier is None else found + earlier.information
-
-
-def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) -> Array:
-    """Return the information matrix (k, k) of a record whose initial state and level are unknown.
-
-    Only the excitation of u (N, r) and y (N, p) counts: they are signals without noise.
-    """
-    weights = np.asarray(np.linalg.inv(model.covariance), dtype=float)
-    records = Records(estimator(model, step), ((u, y),), weights=weights)
-    late = records.kind.lateness(model.theta)
-    free = records.begun_freely(late if late * u.shape[1] * y.shape[1] * y.size <= _MOST else 0)
-    return information_of(free, evaluate(free, model.theta), model.covariance)
 
 
 def concluded(

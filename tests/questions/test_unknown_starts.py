@@ -7,7 +7,7 @@ import pytest
 import scipy
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.identification import information_begun_anywhere
+from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.common.task import growth_by_start
@@ -77,7 +77,7 @@ def test_an_unknown_start_costs_what_its_information_shows():
     found = growth_by_start(
         experiment, record, 1.0, [make(experiment) for make in task.asked.question.requirements]
     )
-    anywhere = information_begun_anywhere(experiment.model, record, plant.signals("output", record), 1.0)
+    anywhere = information_of_data(experiment.model, record, plant.signals("output", record), free=True)
     (exact,) = np.sqrt(np.diag(plant.information(record)) / np.diag(plant.known + anywhere))
     assert 1.0 < exact <= found < 1.2  # a bound is enough where nothing is said
 
@@ -103,5 +103,5 @@ def test_what_is_told_from_anywhere(F, D):
     X = np.array([*X, *([scipy.signal.lfilter([1.0], F, np.ones(80))] if sum(F) == 0.0 else [])]).T
     rest = white @ (psi.T - X @ np.linalg.lstsq(white @ X, white @ psi.T, rcond=None)[0])
     y = scipy.signal.lfilter([0, 0.5], F, u)
-    found = information_begun_anywhere(model, u[:, None], y[:, None], 1.0)
+    found = information_of_data(model, u[:, None], y[:, None], free=True)
     assert found[: theta.size, : theta.size] == pytest.approx(rest.T @ rest, rel=1e-5)

@@ -149,10 +149,10 @@ def growth_by_start(
             bound = error(plant.known + np.tensordot(psi, psi, axes=([0, 2], [0, 2]))) / at_rest
             if bound <= 1.0 + _SURELY:
                 return bound
-        from inputdesign_cli.identification import information_begun_anywhere
+        from inputdesign_cli.identification import information_of_data
 
         u, y = plant.signals("input", record), plant.signals("output", record)
-        anywhere = information_begun_anywhere(experiment.model, u, y, step)
+        anywhere = information_of_data(experiment.model, u, y, step, free=True)
         return error(plant.known + experiment.whiten_matrix(anywhere)) / at_rest
     except np.linalg.LinAlgError:
         return np.inf
