@@ -13,7 +13,7 @@ from inputdesign_cli.findings.outlying_values import visible_step
 from inputdesign_cli.findings.places import SHOWN, Record, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.faults import Frozen, frozen, shifted, spikes
+from inputdesign_cli.identification.faults import frozen, shifted, spikes
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import TransferMatrix
@@ -65,9 +65,9 @@ def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
                 fact, where=name, remedy=remedy, share=one.share, times=times, rows=at, option=option
             )
         )
-    for output, stretches in _still(estimate, data).items():
-        runs = [(one.first, one.first + one.length - 1) for one in stretches]
-        rows, still, name = rows_of(data, runs), sum(one.length for one in stretches), _named(units, output)
+    for output, runs in _still(estimate, data).items():
+        rows, name = rows_of(data, runs), _named(units, output)
+        still = sum(last - first + 1 for first, last in runs)
         listed = ", ".join(
             f"rows {first} to {last}{of_file(data, at)}"
             for (at, _), (_, first, last) in zip(runs[:SHOWN], rows, strict=False)
@@ -130,17 +130,12 @@ def biasing(units: Units, estimate: Estimate, data: Record, fitted: Sequence[flo
         fitted: (p,), per cent of each output that the simulation explains.
     """
     fits = {_named(units, output): fit for output, fit in enumerate(fitted)}
-    long = {
-        _named(units, output)
-        for output, runs in _still(estimate, data).items()
-        if sum(one.length for one in runs) >= _BIASING * len(data.y)
+    matters = {
+        COARSE.code: lambda one: True,
+        SPIKES.code: lambda one: fits[one.where] < _HALF,
+        FROZEN.code: lambda one: one.figures["samples"] >= _BIASING * len(data.y),
     }
-    return [
-        one
-        for one in faults(units, estimate, data)
-        if one.code == COARSE.code
-        or (fits[one.where] < _HALF if one.code == SPIKES.code else one.where in long)
-    ]
+    return [one for one in faults(units, estimate, data) if matters[one.code](one)]
 
 
 @finding(REFUTED, "columns-misaligned", "Shift the column, or correct the controller of the spec.")
@@ -165,17 +160,13 @@ def _named(units: Units, output: int) -> str:
     return f"y{output + 1}" if units.outputs > 1 else "y"
 
 
-def _still(estimate: Estimate, data: Record) -> dict[int, list[Frozen]]:
-    """Return the stretches in which outputs stand still while an input moves, by output."""
-    if data.recorded is None:
-        return {}
+def _still(estimate: Estimate, data: Record) -> dict[int, list[tuple[int, int]]]:
+    """Return the stretches in which outputs stand still while an input moves, by output; see `frozen`."""
     known, simulated = data.recorded, estimate.simulation.outputs
-    found: dict[int, list[Frozen]] = {}
-    for one in frozen(
-        known.held, known.resolution, data.u, estimate.errors, data.y - simulated, simulated, data.lengths
-    ):
-        found.setdefault(one.output, []).append(one)
-    return dict(sorted(found.items()))
+    if known is None:
+        return {}
+    apart = data.y - simulated
+    return frozen(known.held, known.resolution, data.u, estimate.errors, apart, simulated, data.lengths)
 
 
 @finding(

@@ -54,14 +54,6 @@ class Spikes(NamedTuple):
     share: float
 
 
-class Frozen(NamedTuple):
-    """A stretch in which output `output` stands still for `length` samples from `first` on."""
-
-    output: int
-    first: int
-    length: int
-
-
 class Shift(NamedTuple):
     """Signals `letter` of input `channel` obey the controller `lag` samples later (earlier, if negative).
 
@@ -113,8 +105,8 @@ def frozen(
     apart: Array,
     simulated: Array,
     lengths: Sequence[int],
-) -> list[Frozen]:
-    """Return the stretches in which an output stands still while an input moves, output by output.
+) -> dict[int, list[tuple[int, int]]]:
+    """Return by output the first and last samples of stretches in which it stands still and an input moves.
 
     Args:
         held: (samples, p), whether the sample is that before, as recorded in steps of `resolution` (p,).
@@ -123,7 +115,7 @@ def frozen(
         lengths: of the stretches without gaps.
     """
     ends, moves = np.cumsum([0, *lengths]), _MOVES * np.std(u, axis=0)
-    found = []
+    found: dict[int, list[tuple[int, int]]] = {}
     for output, d in enumerate(resolution.tolist()):
         stays = _likely(errors[:, [output]], d)
         size = _spread(apart[:, output])
@@ -136,7 +128,7 @@ def frozen(
                     continue
                 by_chance = len(u) * stays ** (length - 1)
                 if by_chance < level("frozen") or np.ptp(simulated[run, output]) > d + _SPAN * size:
-                    found.append(Frozen(output, start + first, length))
+                    found.setdefault(output, []).append((run.start, run.stop - 1))
     return found
 
 

@@ -58,9 +58,9 @@ def test_a_frozen_stretch_is_found_where_it_is(step, stuck, seed):
     u, y, model = record(seed, step, stuck)
     start = SAMPLES // 3
     if np.any(np.diff(u[start : start + stuck - 1], axis=0)):
-        (found,) = seen(u, y, model)
-        assert (found.output, found.first <= start) == (0, True)
-        assert found.first + found.length >= start + stuck
+        ((output, ((first, last),)),) = seen(u, y, model).items()
+        assert (output, first <= start) == (0, True)
+        assert last + 1 >= start + stuck
 
 
 @pytest.mark.parametrize("step", [None, 0.1, 5.0])
@@ -80,9 +80,9 @@ def test_without_noise_or_without_an_input_that_moves_nothing_is_said():
     held = np.concatenate([[[False]], y[1:] == y[:-1]])
     still, zero = np.ones_like(y), np.zeros_like(y)
     noise = np.random.default_rng(2).standard_normal(y.shape)
-    assert frozen(held, np.array([1e-3]), still, noise, noise, zero, [200]) == []
-    assert frozen(held, np.array([1e-3]), noise, zero, zero, zero, [200]) == []
-    assert len(frozen(held, np.array([1e-3]), noise, noise, noise, zero, [200])) == 20
+    assert frozen(held, np.array([1e-3]), still, noise, noise, zero, [200]) == {}
+    assert frozen(held, np.array([1e-3]), noise, zero, zero, zero, [200]) == {}
+    assert len(frozen(held, np.array([1e-3]), noise, noise, noise, zero, [200])[0]) == 20
 
 
 def test_an_input_that_rests_and_flickers_does_not_move():
@@ -97,7 +97,7 @@ def test_an_input_that_rests_and_flickers_does_not_move():
     seen = [
         frozen(held, np.array([0.01]), v, errors, errors, 0.0 * y, [600]) for v in (flicker, 10.0 * flicker)
     ]
-    assert seen == [[], []]
+    assert seen == [{}, {}]
     moved = u + rng.uniform(-2.0, 2.0, u.shape)
     assert frozen(held, np.array([0.01]), moved, errors, errors, 0.0 * y, [600])
 
