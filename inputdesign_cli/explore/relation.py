@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -349,25 +348,11 @@ def left_of_inputs(parts: Parts) -> list[float]:
     return found
 
 
-@dataclass(frozen=True)
-class UnstablePole:
-    """Holds the pole farthest from the origin, and the standard deviation of its radius."""
+def unstable_pole(parts: Parts, output: int) -> tuple[complex, float] | None:
+    """Return the unstable pole of one output y (n, p), and the deviation of its radius; None: it is stable.
 
-    pole: complex
-    deviation: float
-
-    @property
-    def denominator(self) -> Array:
-        """Return the denominator in q^-1, ascending: (2,), or (3,) with the conjugate pole."""
-        both = [self.pole] if self.pole.imag == 0.0 else [self.pole, self.pole.conjugate()]
-        return np.asarray(np.poly(both).real)
-
-
-def unstable_pole(parts: Parts, output: int) -> UnstablePole | None:
-    """Return the unstable pole of one output y (n, p), at the order that BIC prefers; None: it has none.
-
-    A loop that holds an unstable plant excites it, and the predictor of an ARX model is stable wherever its
-    poles are ([ljung-1999], Section 13.4).
+    The order is that which BIC prefers. A loop that holds an unstable plant excites it, and the predictor of
+    an ARX model is stable wherever its poles are ([ljung-1999], Section 13.4).
     """
     long = [(u, y[:, output : output + 1]) for u, y in _centred(parts, 4 * _HIGHEST)]
     best, found = np.inf, None
@@ -384,12 +369,12 @@ def unstable_pole(parts: Parts, output: int) -> UnstablePole | None:
             best, pole = criterion, _farthest(theta[:n])
             spread = np.sqrt(variance) * right / sizes[:, None]
             moved = [abs(_farthest((theta + _STEP * way)[:n])) - abs(pole) for way in spread]
-            found = UnstablePole(pole, float(np.linalg.norm(moved)) / _STEP)
+            found = pole, float(np.linalg.norm(moved)) / _STEP
     if found is None:
         return None
     samples = sum(len(y) for _, y in long)
-    beyond = max(1.0 + _BEYOND * found.deviation, _GROWN ** (1.0 / samples))
-    return found if abs(found.pole) > beyond else None
+    beyond = max(1.0 + _BEYOND * found[1], _GROWN ** (1.0 / samples))
+    return found if abs(found[0]) > beyond else None
 
 
 def _farthest(regressed: Array) -> complex:

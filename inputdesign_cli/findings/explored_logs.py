@@ -278,17 +278,19 @@ def _unstable(kind: FindingKind, parts: Parts, step: float, unit: str) -> list[F
     outputs, found = parts[0][1].shape[1], []
     clock = f"sample_time: {step:.6g}{'' if unit == 's' else f', time_unit: {unit}'}"
     for i in range(outputs):
-        pole, output = unstable_pole(parts, i), signal_name("y", i, outputs)
-        if pole is None:
+        unstable, output = unstable_pole(parts, i), signal_name("y", i, outputs)
+        if unstable is None:
             continue
-        A = ", ".join(f"{a:.4g}" for a in pole.denominator)
-        B = ", ".join(["0", "1", "1"][: pole.denominator.size])
-        radius = abs(pole.pole)
+        pole, deviation = unstable
+        below = np.poly([pole, pole.conjugate()] if pole.imag else [pole]).real
+        A = ", ".join(f"{a:.4g}" for a in below)
+        B = ", ".join(["0", "1", "1"][: below.size])
+        radius = abs(pole)
         remedy = (
             f"Identify it with its loop: idesign identify DATA --spec SPEC. In SPEC write {clock}, plant: "
             f"{{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and the controller as it was, "
             "experiment: {controller: {numerator: [..], denominator: [..]}}. Raise orders where tests fail"
         )
-        fact = f"{output} has a pole at a radius of {radius:.4g} +- {pole.deviation:.1g}"
-        found.append(kind.found(fact, where=output, remedy=remedy, radius=radius, deviation=pole.deviation))
+        fact = f"{output} has a pole at a radius of {radius:.4g} +- {deviation:.1g}"
+        found.append(kind.found(fact, where=output, remedy=remedy, radius=radius, deviation=deviation))
     return found
