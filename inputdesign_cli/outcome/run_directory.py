@@ -262,7 +262,7 @@ def write_run(
         target = check_directory(directory)
         if origin is not None:
             result |= origin.entry(target, results.resolved_spec)
-        contents = _contents(results, result, figures)
+        contents = run_contents(results, figures, result)
         with workplace(target) as work:
             if origin is not None and not origin.overwrite:
                 check_origin(origin, results.resolved_spec, target, shown=directory)
@@ -349,8 +349,11 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
         raise unreadable(directory / RESULT, str(error)) from error
 
 
-def _contents(results: Results, result: dict[str, Any], figures: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the content of all files of the run by name, the result last."""
+def run_contents(
+    results: Results, figures: Mapping[str, bytes], result: dict[str, Any] | None = None
+) -> dict[str, bytes]:
+    """Return the content of all files of the run by name, the result last; `result.json` may have more."""
+    result = finished_result(results) if result is None else result
     tables = {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
     texts = {name: encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
     contents = {**texts, **results.files, **figures}

@@ -206,19 +206,15 @@ class Plan:
             return {}
         return moved_names(files, self.draft.folder, Layout(directory).run(self.key(index)))
 
-    def job(self, index: int, root: Path | None, *, directory: Path, figures: str) -> PointJob:
-        """Return the job of a point for a worker; without `root` it carries the files that the spec names.
-
-        Args:
-            directory: of the sweep, which `root` is for a worker that may see it.
-        """
+    def job(self, index: int, directory: Path, *, carries: bool, figures: str) -> PointJob:
+        """Return the job of a point in the `directory` of the sweep; it may carry the files of the spec."""
         overrides, files = tuple(self.grid.overrides(index)), None
-        if root is None:
+        if carries:
             with suppress(SpecError):
                 names = [*self.draft.included, *self.draft.files(self.draft.variant(overrides))]
                 files = {name: read_regular(self.draft.folder / name) for name in names}
         key, moved = self.key(index), self.names(index, directory)
-        return PointJob(index, key, self.draft, overrides, self.verb, figures, root, moved, files)
+        return PointJob(index, key, self.draft, overrides, self.verb, figures, moved, files)
 
     def resolved(self, index: int, directory: Path) -> str | None:
         """Return the `spec.yaml` of a point in the `directory` of the sweep, or None for an invalid spec."""

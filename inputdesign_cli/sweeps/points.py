@@ -5,7 +5,7 @@
     sweep.csv            one row a point
     points/<key>/        the run directory of a point that has a result
     failures/<key>.json  why a point has none
-    .lock, .worker-<id>  locks; they hold as long as their processes live. .process names who holds .lock
+    .lock                a lock that holds as long as its process lives; .process names that process
 
 A point is done when its directory or its failure stands: both appear in one step. `<key>` is a hash of
 the resolved spec, of the files that it names, of the command and of the version of this package.
@@ -20,7 +20,6 @@ import shutil
 import tempfile
 import threading
 import time
-import uuid
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,13 +36,14 @@ from inputdesign_cli.errors import (
     SpecError,
 )
 from inputdesign_cli.outcome.codec import json_text
-from inputdesign_cli.outcome.run_directory import digest, output_errors, read_run, replace_text
+from inputdesign_cli.outcome.run_directory import digest, output_errors, read_run, replace_text, run_contents
 from inputdesign_cli.outcome.run_files import (
     RESULT,
     SPEC as RUN_SPEC,
     environment,
     is_plain,
     locked,
+    sync,
     unreadable,
 )
 from inputdesign_cli.questions import Verb, run_verb
@@ -51,8 +51,7 @@ from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, renamed
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
-LOCK, OWNER, WORKER = ".lock", ".process", ".worker-"
-_ENDLESS = -1.0  # seconds, in the words of `locked`
+LOCK, OWNER = ".lock", ".process"
 _FAILURE = ("status", "code", "message", "hint", "key")
 
 
@@ -141,6 +140,8 @@ class Layout:
             partial.mkdir(parents=True)
             for name, content in files.items():
                 (partial / name).write_bytes(content)
+            for name in (*files, ""):
+                sync(partial / name)
             partial.rename(target)
 
 
@@ -173,10 +174,6 @@ def opened(root: Path) -> Iterator[Layout]:
                 hint = "wait for it, or choose another directory with -o"
                 raise OutputError.because("sweep-locked", message, hint)
             replace_text(root / OWNER, str(os.getpid()))
-            for worker in root.glob(f"{WORKER}*"):
-                # Processes of a killed sweep hold it until they have noticed, which takes no time.
-                with locked(worker, _ENDLESS):
-                    worker.unlink(missing_ok=True)
             # What killed processes left half-written; only the holder of the lock may remove it.
             for path in (*root.glob(".*.partial*"), *root.glob("failures/.*.partial*")):
                 path.unlink(missing_ok=True)
@@ -184,18 +181,6 @@ def opened(root: Path) -> Iterator[Layout]:
                 if run.name.startswith(".") or not (run / RESULT).is_file():
                     shutil.rmtree(run, ignore_errors=True)
         yield Layout(root)
-
-
-@contextlib.contextmanager
-def at_work(root: Path) -> Iterator[None]:
-    """Lock the directory while a process writes a point, so that no other sweep begins before its end."""
-    lock = root / f"{WORKER}{uuid.uuid4().hex}"
-    with locked(lock):
-        try:
-            yield
-        finally:
-            with contextlib.suppress(OSError):
-                lock.unlink()
 
 
 KINDS: dict[str, type[IdesignError]] = {
@@ -223,62 +208,49 @@ class PointJob:
     overrides: tuple[str, ...]
     verb: Verb
     figures: str
-    root: Path | None  # the directory of the sweep; None on a machine that may not see it
     names: Mapping[str, str]  # files that the spec names -> their names in the run
-    files: dict[str, bytes] | None = None  # what the spec names, for such a machine
+    files: dict[str, bytes] | None = None  # what the spec names, for a machine that may not see it
 
 
 PointEnd = tuple[Mapping[str, object] | None, Mapping[str, bytes] | None]
-"""The failure of a point, if it failed, and the files of its run where the directory is out of reach."""
+"""The failure of a point, or the files of its run."""
 
 
 def run_point(job: PointJob) -> PointEnd:
-    """Compute a point and write its run into the directory of the sweep, or return the files of its run.
-
-    Raises:
-        OutputError: the files cannot be written, which is not the fault of the point.
-    """
-    if job.root is not None:
-        with at_work(job.root):
-            return _compute(job, Layout(job.root).run(job.key)), None
+    """Compute a point, and return the files of its run."""
     # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
-    with _alone, tempfile.TemporaryDirectory(prefix="idesign-") as folder:
-        run = Path(folder) / "run"
+    with _alone, contextlib.ExitStack() as stack:
+        if job.files is None:
+            return _compute(job, job.draft)
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="idesign-"))
         data = Path(folder).joinpath(*_DEPTH)
         data.mkdir(parents=True)
-        for name, content in (job.files or {}).items():
+        for name, content in job.files.items():
             path = Path(os.path.normpath(data / name))
             if path.is_relative_to(folder):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
-        failure = _compute(replace(job, draft=replace(job.draft, folder=data, confine=None)), run)
-        written = {} if failure else {path.name: path.read_bytes() for path in sorted(run.iterdir())}
-        return failure, written or None
+        return _compute(job, replace(job.draft, folder=data, confine=None))
 
 
-def _compute(job: PointJob, directory: Path) -> dict[str, object] | None:
-    """Compute a point and write its run; return its failure, if it fails."""
+def _compute(job: PointJob, draft: SpecTemplate) -> PointEnd:
     from inputdesign_cli.figures.plots import draw_all
-    from inputdesign_cli.outcome.run_directory import write_run
 
     started = time.perf_counter()
     try:
-        spec = job.draft.spec(job.overrides)
+        spec = draft.spec(job.overrides)
         with bare_interruptions():
             results = run_verb(job.verb, spec)
         timing = {**(results.outcome.timing_s or {}), "point": time.perf_counter() - started}
         written = renamed(results.resolved_spec, job.names)
         results = replace(results, outcome=replace(results.outcome, timing_s=timing), resolved_spec=written)
-        write_run(results, directory, draw_all(results, job.figures) if job.figures else {})
-    except OutputError:
-        raise
+        return None, run_contents(results, draw_all(results, job.figures) if job.figures else {})
     except IdesignError as error:
         status = next((status for status, kind in KINDS.items() if kind.exit_code == error.exit_code), BROKEN)
-        return failure_of(status, error.diagnostics[0], time.perf_counter() - started)
+        return failure_of(status, error.diagnostics[0], time.perf_counter() - started), None
     except Exception as error:
         diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
-        return failure_of(BROKEN, diagnostic, time.perf_counter() - started)
-    return None
+        return failure_of(BROKEN, diagnostic, time.perf_counter() - started), None
 
 
 def failure_of(status: str, diagnostic: Diagnostic, seconds: float = 0.0) -> dict[str, object]:

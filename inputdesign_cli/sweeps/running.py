@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
-from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, OutputError
+from inputdesign_cli.errors import DataError, Diagnostic, IdesignError
 from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.run_directory import Origin, output_errors, replace_text
 from inputdesign_cli.outcome.run_files import PAGE, is_page
@@ -229,7 +229,7 @@ class SweepRun:
             return row_of(key, None)
 
     def _jobs(self, shares_files: bool) -> Iterator[PointJob]:
-        root, drawn = self.directory if shares_files else None, self.figure_format if self.figures else ""
+        drawn = self.figure_format if self.figures else ""
         for index in range(self.total):
             if self.fail_fast and self.failed:
                 return
@@ -238,7 +238,7 @@ class SweepRun:
                 content = self._known(index, key)
                 self.rows[key] = row_of(key, content) if content else None
                 if content is None:
-                    yield self.plan.job(index, root, directory=self.directory, figures=drawn)
+                    yield self.plan.job(index, self.directory, carries=not shares_files, figures=drawn)
                     continue
                 if "code" in content:
                     self._note_failure(index, content)
@@ -258,8 +258,6 @@ class SweepRun:
         """Store the answer of a worker."""
         job, end, error = finished.job, finished.answer, finished.error
         self.computed += 1
-        if isinstance(error, OutputError):
-            raise error
         lost = isinstance(error, WorkerLostError)
         if end is None:
             code, status = ("worker-lost", points.LOST) if lost else ("internal-error", points.BROKEN)

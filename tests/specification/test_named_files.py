@@ -92,7 +92,7 @@ def test_sweeps_and_watch_see_every_file(project, key, text):
     (project / "r.csv").write_text(TABLE + "4,1\n")
     assert draft.digest(draft.variant([setting])) != before
     plan = build_plan(project / "spec.yaml", [setting, "noise.variance=1,2"], zipped=False, verb="solve")
-    assert "r.csv" in plan.job(0, None, directory=project, figures="").files
+    assert "r.csv" in plan.job(0, project, carries=True, figures="").files
     assert project / "r.csv" in followed_files(project / "spec.yaml", [setting])
 
 

@@ -180,10 +180,10 @@ def test_processes_give_what_one_process_gives(spec, tmp_path):
 
 
 def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):
-    def full(outcome, directory, figures):
+    def full(layout, key, files):
         raise OutputError(Diagnostic("output-full", "no space"))
 
-    monkeypatch.setattr("inputdesign_cli.outcome.run_directory.write_run", full)
+    monkeypatch.setattr(Layout, "adopt", full)
     with pytest.raises(OutputError):
         run_sweep(spec, TWO, directory=tmp_path / "out")
     assert column(tmp_path / "out", "status") == ["pending", "pending"]
