@@ -264,29 +264,21 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
     """Return the least factor on these limits together that allows the accuracy; None if none does.
 
     The multipliers of the limits are the slope of the square of the best ratio. Newton's method uses it, in
-    logarithms, between values proved too small and values known to do. Information of noise or of a prior
-    does not grow with the powers: the square of the ratio is not the factor.
+    logarithms. Information of noise or of a prior does not grow with the powers: the square of the ratio is
+    not the factor.
     """
     stated = unreachable.problem.limits
     bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}
-    places, found = list(bounds), unreachable.nearest
-    low, high, at = 1.0, np.inf, 1.0
+    places, found, at = list(bounds), unreachable.nearest, 1.0
     for _ in range(_STEPS):
-        share = float(found.certificate.limits[places] @ np.array(list(bounds.values()))) * at
-        if found.certificate.bound > 1.0 + _EXACT:
-            low = at
-            if share < _NO_SHARE or low > _MOST:
-                return None
-            step = min(np.log(found.certificate.bound) / share, np.log(_LONGEST_STEP))
-            at = low * float(np.exp(step))
-        elif found.objective < 1.0 - _EXACT:
-            high = at
-        else:
+        # What is proved where the limits are too tight, and what is reached where they are not.
+        ratio = max(found.certificate.bound, min(found.objective, 1.0))
+        if abs(ratio - 1.0) <= _EXACT:
             return at
-        if high - low <= _EXACT * low:
-            return low
-        if at >= high:
-            at = float(np.sqrt(low * high))
+        share = float(found.certificate.limits[places] @ np.array(list(bounds.values()))) * at
+        if share < _NO_SHARE or at > _MOST:
+            return None
+        at *= float(np.exp(min(np.log(ratio) / share, np.log(_LONGEST_STEP))))
         problem, within = unreachable.problem.on(found.basis), unreachable.within
         raised = list(problem.limits)
         for index, bound in bounds.items():
@@ -294,11 +286,5 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
         problem = replace(problem, limits=tuple(raised), finer=None)
         if within is not None:
             within = np.pad(within, (0, problem.basis.size - within.size))
-        found = exchange(
-            problem,
-            found.x,
-            tolerance=0.3 * _EXACT,
-            interior=within,
-            enough=lambda objective, _: objective < 1.0 - 1e-3,
-        )
-    return low if np.isfinite(high) else None
+        found = exchange(problem, found.x, tolerance=0.3 * _EXACT, interior=within)
+    return None
