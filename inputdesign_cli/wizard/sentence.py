@@ -47,10 +47,7 @@ _MATTERS = re.compile(
     re.I,
 )
 # Words that need no remark where the rest of their clause is understood.
-_PLAIN = (
-    "am allowed move moves moved voltage valve heater pump where started begins began start run runs "
-    "running we just only like which that when after happens sits stands use keep has some per almost"
-).split()
+_PLAIN = ["am", "allowed", "move", "moves", "moved", "voltage", "valve", "heater", "pump", "where", "started", "begins", "began", "start", "run", "runs", "running", "we", "just", "only", "like", "which", "that", "when", "after", "happens", "sits", "stands", "use", "keep", "has", "some", "per", "almost"]
 # Words of a clause that says how long the experiment may take.
 _OF_TIME = re.compile(
     r"(?:experiment|test|trial|record)\w*|time|available|free|plant|have|got|i've|we've|i'd|get|gets|spend|use|give|"
