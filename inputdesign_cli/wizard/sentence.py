@@ -47,7 +47,10 @@ _MATTERS = re.compile(
     re.I,
 )
 # Words that need no remark where the rest of their clause is understood.
-_PLAIN = ["am", "allowed", "move", "moves", "moved", "voltage", "valve", "heater", "pump", "where", "started", "begins", "began", "start", "run", "runs", "running", "we", "just", "only", "like", "which", "that", "when", "after", "happens", "sits", "stands", "use", "keep", "has", "some", "per", "almost"]
+_PLAIN = (
+    "am allowed move moves moved voltage valve heater pump where started begins began start run runs running "
+    "we just only like which that when after happens sits stands use keep has some per almost"
+)
 # Words of a clause that says how long the experiment may take.
 _OF_TIME = re.compile(
     r"(?:experiment|test|trial|record)\w*|time|available|free|plant|have|got|i've|we've|i'd|get|gets|spend|use|give|"
@@ -199,7 +202,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     unclear = unwanted + [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"[\w%]", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
-    beside = [part for part in beside if any(word not in _PLAIN for word in unread(part))]
+    beside = [part for part in beside if any(word not in _PLAIN.split() for word in unread(part))]
     said_already = " ".join(answers.values())
     beside = [
         part for part in beside if not re.search(rf"(?<!\w){re.escape(part)}(?!\w)", said_already, re.I)
