@@ -47,11 +47,12 @@ def instructions(results: Results, spec: str, joint: str = "") -> list[str]:
     if joint:
         return [*said, f"Then: {joint}"]
     judge = f"Then: idesign assess {shlex.quote(spec)} log.csv"
-    columns = ",".join(f"{name}=NAME" for name in ("time", *inputs, *outputs))
-    otherwise = f"Where the log has other names of columns, add --columns {columns}."
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
         means = f"REST: the mean of {' and '.join(outputs)} at rest, before signal.csv begins"
         judge += f" --operating-point {point}   ({means}, or else of the first rows)"
-    return [*said, otherwise, judge]
+    if any(" " in name for name in (*tables["signal"].columns, *tables["predicted_output"].columns)):
+        columns = ",".join(f"{name}=NAME" for name in ("time", *inputs, *outputs))
+        said.append(f"Where the log has other names of columns, add --columns {columns}.")
+    return [*said, judge]

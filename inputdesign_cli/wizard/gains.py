@@ -253,7 +253,7 @@ class _Pair:
         begin: int,
         assumed: str,
     ) -> Gain | None:
-        """Write the gain in one form; None where its sign is not clear.
+        """Write the gain in one form, or return None if its sign is not clear.
 
         Args:
             does: the words on the effect from its verb on; `compared`: those behind its size.
@@ -304,7 +304,7 @@ class _Pair:
 
 
 def _verbs(words: Sequence[_Token]) -> list[int]:
-    """Return where verbs of what an output does stand; none stands behind an article."""
+    """Return the places of verbs that an output may have as its subject; none stands behind an article."""
     at = (i for i, one in enumerate(words) if one.stem in _RISES | _FALLS)
     return [i for i in at if _free(words, i) and words[i].text.lower() not in ("lower", "cooler")]
 

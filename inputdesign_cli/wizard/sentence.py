@@ -232,7 +232,7 @@ def _first(pattern: str, text: str, key: str) -> re.Match[str] | None:
 
 
 def _of_experiment(piece: re.Match[str], text: str) -> bool:
-    """Return whether the words of a clause about a time are those of an experiment and how long it lasts."""
+    """Return whether a clause with a time has only words about an experiment and its length."""
     begin, end = piece.span("said") if "said" in piece.re.groupindex else piece.span()
     if re.search(r"\|\s*$", text[: piece.start()]) and re.match(r"(?:with)?in\b", piece[0], re.I):
         return False  # "it rises by 2 degC within 5 min"

@@ -100,7 +100,7 @@ def _scatter(model: Model, u: Array, step: float, *, free: bool) -> Array:
 
 
 def _ratios(model: Model, spread: Array, off: Array, weights: Array) -> Array:
-    """Return the ratio of 95 % quantiles of squared distances to those of theory, (k,).
+    """Return by how much 95 % quantiles of squared distances exceed the quantiles of theory, (k,).
 
     The plant and the noise each have one ratio.
 
