@@ -49,6 +49,9 @@ def wizard(
         hint = "choose another name for the spec with -o"
         raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
     refuse_existing(output, overwrite)
+    if not output.parent.is_dir():
+        hint = f"make it first: mkdir -p {shlex.quote(str(output.parent))}"
+        raise OutputError.because("output-not-writable", f"there is no folder {output.parent}", hint)
     said = read_answers(answers, given or [])
     brief = spread(said, sentence or None)
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
@@ -90,7 +93,9 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
 
         spec = load_spec(file)
         results = questions.solve(spec)
-    place = Place(Into(overwrite=overwrite), file.stem, [file])
+    # Specs of the same name in several folders have runs of their own.
+    name = f"{file.parent.name}_{file.stem}" if file.parent.name else file.stem
+    place = Place(Into(overwrite=overwrite), name, [file])
     keep(results, place, Shown(quiet=True))
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
         with computing(file, quiet=quiet, doing="what else would do"):

@@ -14,7 +14,7 @@ from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard import questions as asking
-from inputdesign_cli.wizard.grammar import Phrase, beyond_models, short
+from inputdesign_cli.wizard.grammar import AMOUNT, Phrase, beyond_models, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, Question, bad_answer, in_their_words, question
@@ -345,7 +345,8 @@ class Conversation:
         joined = {one: ", ".join(filter(None, (earlier.get(one), text))) for one, text in said.items()}
         error = None
         # The answer adds to what is known, or else stands in its place.
-        for more in (said,) if key != asked.key else (joined, said):
+        bare = re.fullmatch(rf"\s*{AMOUNT}\s*", text, re.I) is not None  # a time may answer several questions
+        for more in (said,) if key != asked.key else (joined,) if bare else (joined, said):
             self.answers, self.unclear, self._refused = dict(kept), [*heard.unclear, *parts[1:]], refused
             error = self._added(more if self.unclear else earlier | more)
             if error is None or error.diagnostics[0].key not in more:

@@ -145,7 +145,9 @@ _SPOKEN = re.compile(
     re.I,
 )
 _NOTHING = re.compile(
-    r"\bnothing (?:happens|moves|changes) (?:in|for|during|within) (?:the )?(?:first )?(?:a )?(?=few\b)", re.I
+    r"\bnothing (?:happens|moves|changes) (?:in|for|during|within) (?:the )?(?:first )?(?:a )?"
+    r"(?=(?P<few>few\b)?)",
+    re.I,
 )
 _PIECE = re.compile(r"[^,;.|]+(?:\.\d+[^,;.|]*)*")
 _ONE_TIME = re.compile(
@@ -163,6 +165,11 @@ _TIMES_SAID = (
         "dead time",
     ),
     (rf"{_TRIAL}(?!.*\b(?:begin|start)s?\b)|\bspend\b|\bcannot have\b", "for"),
+    (
+        r"^\s*(?:(?:and|but|it|that|this|which|all|everything|the \w+)\s+)*takes?\s+(?:only\s+)?"
+        r"(?:about\s+|roughly\s+)?#\s*$",
+        "time constant",
+    ),
 )
 # Words of such a clause that are understood; others are said back.
 _OF_TIMES = re.compile(
@@ -179,7 +186,8 @@ _OF_DAY = re.compile(r"(?:\bfrom\s+)?\b(\d\d?):(\d\d)\s*(?:to|until|-|–)\s*(\d
 _SIZE_OF = rf"[-+]?{_DIGITS}\s*{gains.UNIT}"
 _MAY_MOVE = rf"(?:(?:and|it|which|that|we)\s+)*(?:may|can|could|swings?|moves?|var|{PLUS_MINUS})"
 _STANDING = re.compile(
-    rf"\b(?P<name>[a-z]+) (?:at|around|near|normally|usually|now)\s+(?P<size>{_SIZE_OF})(?=,?\s+{_MAY_MOVE})",
+    rf"\b(?P<name>[a-z]+)(?:\s+{RESTING})*?\s+(?P<at>at|around|near|normally|usually|now)\s+(?P<size>{_SIZE_OF})"
+    rf"(?=,?\s+{_MAY_MOVE})",
     re.I,
 )
 _OUTPUT = r"\b(?:the\s+)?(?:level|temp(?:erature)?|concentration|output|sensor)\s+"
@@ -445,7 +453,7 @@ def in_figures(text: str) -> str:
     """
     figures = _MINUS_SIGN.sub("-", _NEGATIVE.sub(r"\1 -", re.sub(r"\bper cent\b", "%", text, flags=re.I)))
     figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", figures)  # the end of a sentence
-    figures = _NOTHING.sub("dead time of a ", figures)
+    figures = _NOTHING.sub(lambda found: f"dead time of {'a ' * bool(found['few'])}", figures)
     figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)
     figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
@@ -476,7 +484,7 @@ def taken_as(text: str) -> list[str]:
     return [
         *(f'"a few {one["unit"] or one["of"]}" is taken as {_few(one)}' for one in _FEW.finditer(text)),
         *(
-            f'"{one[0]}" is taken as a time constant of {_time_constant(one)}'
+            f'"{one[0]}" is taken as a time constant of {_time_constant(one, said=True)}'
             for one in _SETTLES.finditer(text)
         ),
         *(
@@ -498,10 +506,15 @@ def _few(found: re.Match[str]) -> str:
 
 def _standing(found: re.Match[str]) -> str:
     """Return an operating point that stands alone, unless its name is known: "feeder, at 45 %"."""
-    if re.fullmatch(rf"{RESTING}|held|kept|point", found["name"], re.I):
+    if re.fullmatch(rf"{RESTING}|held|kept|point|which|that|it|i|we|and", found["name"], re.I):
         return found[0]
-    known = re.fullmatch(DRIVE, found["name"], re.I)
-    return f"{found['name']}{',' * (known is None)} at {found['size']}"
+    if re.fullmatch(DRIVE, found["name"], re.I):
+        return (
+            found[0]
+            if found["at"].lower() in ("at", "around", "near")
+            else f"{found['name']} at {found['size']}"
+        )
+    return f"{found['name']}, at {found['size']}"
 
 
 def _counted(text: str) -> str:
@@ -545,12 +558,14 @@ def _vague(text: str) -> bool:
     return re.search(ABOUT, text, re.I) is not None
 
 
-def _time_constant(found: re.Match[str]) -> str:
-    """Return the time constant of a settling time."""
+def _time_constant(found: re.Match[str], *, said: bool = False) -> str:
+    """Return the time constant of a settling time, in the words of an answer, or as it is `said` back."""
     constants = _SETTLED if found["settled"] else _RISEN if found["risen"] else 1.0
     low, high = float(found["number"]), float(found["high"] or found["number"])
     if not 0.0 < low < high:
         return f"{low / constants:.4g} {found['unit']}"
+    if said:
+        return f"{low / constants:.4g} to {high / constants:.4g} {found['unit']}"
     return _between(low / constants, high / constants, found["unit"])
 
 

@@ -197,7 +197,8 @@ def quantisation(text: str, span: Range) -> str | None:
     said.finish()
     if not _LEAST_BITS <= bits <= _MOST_BITS:
         raise bad_answer("converter", f"converters have {_LEAST_BITS} to {_MOST_BITS} bits")
-    return f"{{bits: {bits:.0f}, range: {short(needed(most, 'converter', 'its range'))}}}"
+    finest = f"  # values {short(most / 2.0 ** (bits - 1.0))} apart"
+    return f"{{bits: {bits:.0f}, range: {short(needed(most, 'converter', 'its range'))}}}{finest}"
 
 
 def dwell(text: str, plant: PlantAnswer) -> int:

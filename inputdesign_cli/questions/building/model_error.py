@@ -158,6 +158,10 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
     message = f"|S| of the nominal loop reaches {peak:.4g}, and the margin asks for {stated.peak:.4g} at most"
     less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
     hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
+    if stated.max_sensitivity_db is None:
+        hint += (
+            "; gain and phase margins are kept by a bound on |S|, which asks for more than the margin alone"
+        )
     return spec.complain("admissible-not-positive", message, hint=hint, key=_LOOP)
 
 
