@@ -84,7 +84,8 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     if estimate:
         rivals = outcome.identification is not None and outcome.identification.rivals
         listed = ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
-        yield "estimate", listed + "   (or other parameters, below)" * bool(rivals)
+        also = "; or other parameters, below" * bool(rivals)
+        yield "estimate", f"{listed}   (+-: one standard deviation{also})"
     yield from _lines(facts(outcome, part="estimate"))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(outcome, time_unit) or _NONE).rows:

@@ -112,6 +112,7 @@ def less_accurate(
     more = reached / designed - 1.0
     fact = f"it reaches {reached:.4g} times the admissible error, {per_cent(more)} more than {designed:.4g}"
     remedy = "Take more samples, or let the search take longer (`signal.seconds`)." if searched else ""
+    remedy = "It is below 1, which is enough." if reached <= 1.0 else remedy
     return kind.when(
         more > _FALLS_SHORT, fact, where="signal", remedy=remedy, reached=reached, designed=designed
     )

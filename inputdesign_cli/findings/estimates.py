@@ -168,7 +168,7 @@ def noise_probability(estimate: Estimate) -> float:
 @finding(
     NOTE,
     "noise-estimated-along",
-    "Copy `noise` from `model.yaml` into the spec, because the next design depends on it.",
+    "The verdict holds with it. Before another design, copy `noise` from `model.yaml` into the spec.",
 )
 def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> list[Finding]:
     """The noise has more structure than the spec says. Small orders of C and D were estimated too.

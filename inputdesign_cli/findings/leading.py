@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
-from inputdesign_cli.finding import Finding, undecided
+from inputdesign_cli.finding import NOTE, Finding, undecided
 from inputdesign_cli.findings.places import Record, argument
 from inputdesign_cli.findings.refuted_structure import DRIFT, drifting, leaking, no_leak
 from inputdesign_cli.identification import Estimate
@@ -62,6 +63,8 @@ _NEXT = {
 _DETREND = _AGAIN + "--detrend linear"
 _ORDER = list(_NEXT)
 _LEAK = 1e-3  # a sample, to begin with
+# Notes that may follow from a wrong model as well.
+_ALSO = ("start-estimated",)
 # A shift of level that takes more than this share of a record is a drift.
 _WIDE = 0.1
 
@@ -113,6 +116,20 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }
     return Leading(alike, command.format(**figures))
+
+
+def following(findings: Sequence[Finding], first: Leading) -> list[Finding]:
+    """Return all findings; what may follow from the first ones alone says so.
+
+    A lag that a model lacks looks like a drift, a wrong level, or another plant than the spec has.
+    """
+    leaders, follow = {one.code for one in first.findings}, f"This may follow from {first.findings[0].code}"
+    return [
+        one
+        if one.code in leaders or (one.severity == NOTE and one.code not in _ALSO)
+        else replace(one, message=f"{follow}: {one.message}")
+        for one in findings
+    ]
 
 
 def _integrates(estimate: Estimate) -> bool:

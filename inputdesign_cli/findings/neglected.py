@@ -130,7 +130,7 @@ def unseen(kind: FindingKind, units: Units, found: Sequence[Neglected]) -> list[
     if worst is None:
         return []
     fact = (
-        f"{worst.directed.alternatives[0].phrase} is not excluded, and could move G by {worst.may_move:.3g} "
-        f"times the admissible error, at {units.named(worst.frequency)} (95 %)"
+        f"tests show no sign of {worst.directed.alternatives[0].phrase}, but do not exclude one that moves G "
+        f"by {worst.may_move:.3g} times the admissible error, at {units.named(worst.frequency)} (95 %)"
     )
     return [kind.found(fact, where=worst.directed.test.name, may_move=worst.may_move)]

@@ -131,10 +131,10 @@ def compose(
     asked = wished(said["wish"], plant, control is not None, min(there, most * step))
     nonparametric = any("frequency_response" in line for line in asked)
     rate, output = limited(said["limits"], plant)
-    unused = nonparametric and plant.vague
-    wanders = plant.integrates and control is None
+    unused, wanders = nonparametric and plant.vague, plant.integrates and control is None
     heard = [*plant.heard, *remarks, *beyond_models(", ".join(said.values()))]
-    heard += _of_controller(plant, control, said["loop"], hold)
+    duration = _duration(there, most * step, step, hold, nonparametric=nonparametric)
+    heard += [*_of_controller(plant, control, said["loop"], hold), *_of_length(plant, duration, there, most)]
     facts = {
         "said": said,
         "plant": plant,
@@ -149,7 +149,7 @@ def compose(
         "rate": rate,
         "output": output,
         "looped": plant.vague and control is not None and not nonparametric,
-        "duration": _duration(there, most * step, step, hold, nonparametric=nonparametric),
+        "duration": duration,
         "periods": _PERIODS,
         "there": there,
         "most": most,
@@ -203,6 +203,13 @@ def _points(span: Range) -> str:
     low, high = (short(span.offset + side * span.amplitude) for side in (-1, 1))
     percent = span.unit == "%" and span.offset
     return f"  # from {low} to {high} %: not a share of {short(span.offset)}" if percent else ""
+
+
+def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> list[str]:
+    """Return a remark on a record that does not take all the time there is, since it has `most` samples."""
+    whole = f"{short(duration)} of the {short(there)} {plant.time_unit} that there are"
+    shorter = there > most * plant.sample_time and duration < there
+    return [f"the record takes {whole}: {most} samples at most, to begin with"] * shorter
 
 
 def _duration(there: float, most: float, step: float, hold: int, *, nonparametric: bool) -> float:

@@ -149,7 +149,7 @@ _NOTHING = re.compile(
     r"(?=(?P<few>few\b)?)",
     re.I,
 )
-_PIECE = re.compile(r"[^,;.|]+(?:\.\d+[^,;.|]*)*")
+_PIECE = re.compile(r"(?:(?!\s(?:and|but)\s)[^,;.|]|\.(?=\d))+", re.I)
 _ONE_TIME = re.compile(
     rf"(?P<before>[^\d%]*)(?P<amount>{ALONE}{_DIGITS}(?:\s*(?:to|-|–)\s*{_DIGITS})?\s*{UNIT_OF_TIME})"
     r"(?P<behind>[^\d%]*)",
@@ -161,7 +161,7 @@ _TIMES_SAID = (
     (r"\bsettl|\bsteady\b|\bfully\b|\bfinal\b", "settles in"),
     (
         rf"^(?!.*{_TRIAL}).*\b(?:react|respo|answer|begin|start|first)\w*(?:\s+\w+){{0,3}}?\s+(?:only )?"
-        r"(?:#\s+(?:after|later)|after #)",
+        r"(?:#\s+(?:after|later)|after (?:\w+ )?#)",
         "dead time",
     ),
     (rf"{_TRIAL}(?!.*\b(?:begin|start)s?\b)|\bspend\b|\bcannot have\b", "for"),
@@ -480,8 +480,14 @@ def in_figures(text: str) -> str:
 
 def taken_as(text: str) -> list[str]:
     """Return how "a few minutes", "settles in 2 s", "noise +- 2" and "9 V gives 18 K" in a text are taken."""
-    text = _PIECE.sub(_of_time, _counted(text))
+    text, said = _counted(text), []
+    for piece in _PIECE.finditer(text):
+        form = _of_time(piece)
+        if form != piece[0] and (quantity := re.search(r"(?:dead time|time constant).*", form)):
+            said.append(f'"{piece[0].strip()}" is taken as {quantity[0]}')
+    text = _PIECE.sub(_of_time, text)
     return [
+        *said,
         *(f'"a few {one["unit"] or one["of"]}" is taken as {_few(one)}' for one in _FEW.finditer(text)),
         *(
             f'"{one[0]}" is taken as a time constant of {_time_constant(one, said=True)}'

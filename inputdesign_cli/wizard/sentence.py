@@ -202,7 +202,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     unclear = unwanted + [part for part in parts if _MATTERS.search(_RATED.sub("", part))]
     beside = [_BARE.sub("", part) for part in parts if part not in unclear and re.search(r"[\w%]", part)]
     answers = {key: ", ".join(dict.fromkeys(said for _, said in sorted(found[key]))) for key in found}
-    beside = [part for part in beside if any(word not in _PLAIN.split() for word in unread(part))]
+    beside = [" ".join(_of_content(part)) for part in beside if _of_content(part)]
     said_already = " ".join(answers.values())
     beside = [
         part for part in beside if not re.search(rf"(?<!\w){re.escape(part)}(?!\w)", said_already, re.I)
@@ -223,6 +223,12 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")
     return Heard(answers, tuple(remarks), tuple(part.replace(grammar.UNREAD, "") for part in unclear))
+
+
+def _of_content(part: str) -> list[str]:
+    """Return the words of a part of a sentence that have content and are no part of what is understood."""
+    words = (word.strip(",;:()") for word in part.split())
+    return [word for word in words if unread(word) and word.lower() not in _PLAIN.split()]
 
 
 def _first(pattern: str, text: str, key: str) -> re.Match[str] | None:

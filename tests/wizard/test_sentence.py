@@ -597,7 +597,7 @@ def test_a_log_may_stand_in_a_sentence():
 
 def test_a_clause_that_answers_nothing_is_not_lost():
     (remark,) = in_sentence(EXCHANGER + " The moon is full.".lower()).remarks
-    assert "moon is full" in remark
+    assert "moon full" in remark
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from inputdesign_cli.findings.designed_records import level_notes
 from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal, of_first_part
 from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
-from inputdesign_cli.findings.leading import leading
+from inputdesign_cli.findings.leading import following, leading
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.findings.other_systems import prior_left_out
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
@@ -131,6 +131,8 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
         known = {one.message for one in findings}
         more = [*(one for one in first_of_all.findings if one.message not in known), *more]
     outcome = replace(results.outcome, status=verdict, assessment=assessment).saying(more)
+    if first_of_all is not None:
+        outcome = outcome.with_findings(following(outcome.findings or (), first_of_all))
     judged = replace(results, outcome=outcome)
     return Assessment(verdict, _without_model(judged, units, found) if against else judged)
 
