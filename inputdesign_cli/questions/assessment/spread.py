@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding
@@ -59,25 +60,31 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
 def reach(model: Model, estimate: Estimate) -> Array:
     """Return by how much the likelihood of the data reaches beyond the region that theory states, (k,).
 
-    Stable models are drawn about the estimate; each counts by its likelihood over the density of the draws
-    (importance sampling). The unknown size of the noise is integrated over, as Student's t does.
+    Stable models are drawn about the estimate, with another plant or with another noise. Each counts by its
+    likelihood over the density of the draws (importance sampling). The unknown size of the noise is
+    integrated over, as Student's t does.
     """
-    rng, k = np.random.default_rng(1), model.theta.size
-    records, best = estimate.search.records, estimate.search.point
-    z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, k))
-    off = scipy.linalg.solve_triangular(estimate.factor.T, z.T).T
-    exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - k * np.log(_REACH)
-    logarithms = np.full(_DRAWS, -np.inf)
-    for i, theta in enumerate(best.theta + off):
-        with suppress(*_NO_NUMBERS):
-            drawn = model.at(theta)
-            if drawn.flaw is None and drawn.radius < 1.0 and (cost := evaluate(records, theta).cost) > 0.0:
-                likelihood = -0.5 * best.freedom * np.log(cost / best.cost)
-                logarithms[i] = likelihood - scipy.special.logsumexp(exponents[i])
-    if np.max(logarithms) == -np.inf:
-        return np.ones(k)
-    weights, spread = np.exp(logarithms - np.max(logarithms)), estimate.covariance
-    return _ratios(model, np.broadcast_to(spread, (_DRAWS, k, k)), off, weights)
+    rng, records, best = np.random.default_rng(1), estimate.search.records, estimate.search.point
+    factors = np.ones(model.theta.size)
+    for part in _parts(model):
+        root = np.linalg.cholesky(estimate.information[np.ix_(part, part)])
+        z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, part.size))
+        off = np.zeros((_DRAWS, factors.size))
+        off[:, part] = scipy.linalg.solve_triangular(root.T, z.T).T
+        exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - part.size * np.log(_REACH)
+        logarithms = np.full(_DRAWS, -np.inf)
+        for i, theta in enumerate(best.theta + off):
+            with suppress(*_NO_NUMBERS):
+                drawn = model.at(theta)
+                stable = drawn.flaw is None and drawn.radius < 1.0
+                if stable and (cost := evaluate(records, theta).cost) > 0.0:
+                    likelihood = -0.5 * best.freedom * np.log(cost / best.cost)
+                    logarithms[i] = likelihood - scipy.special.logsumexp(exponents[i])
+        if np.max(logarithms) > -np.inf:
+            weights, spread = np.exp(logarithms - np.max(logarithms)), estimate.covariance
+            spreads = np.broadcast_to(spread, (_DRAWS, *spread.shape))
+            factors[part] = _ratio(part, spreads, off, weights)
+    return factors
 
 
 def _scatter(model: Model, u: Array, step: float, *, free: bool) -> Array:
@@ -96,26 +103,29 @@ def _scatter(model: Model, u: Array, step: float, *, free: bool) -> Array:
         return unknown
     # Without units: the covariance, and the distance from the model.
     spread, away = np.linalg.inv(scaled[usable]), (sizes * (found.theta - model.theta))[usable]
-    return _ratios(model, spread, away, np.ones(len(away)))
+    factors = np.ones(model.theta.size)
+    for part in _parts(model):
+        factors[part] = _ratio(part, spread, away, np.ones(len(away)))
+    return factors
 
 
-def _ratios(model: Model, spread: Array, off: Array, weights: Array) -> Array:
-    """Return by how much 95 % quantiles of squared distances exceed the quantiles of theory, (k,).
+def _parts(model: Model) -> list[NDArray[np.int64]]:
+    """Return the indices of the parameters of the plant, and of the noise alone, where there are some."""
+    return [part for part in map(np.flatnonzero, (model.in_plant, ~model.in_plant)) if part.size]
 
-    The plant and the noise each have one ratio.
+
+def _ratio(part: NDArray[np.int64], spread: Array, off: Array, weights: Array) -> float:
+    """Return by how much the 95 % quantile of squared distances exceeds that of theory, for some parameters.
 
     Args:
+        part: the parameters that count.
         spread: covariances (n, k, k) that the distances `off` (n, k) are measured by.
         weights: how much each distance counts, (n,).
     """
-    factors = np.ones(model.theta.size)
-    for part in map(np.flatnonzero, (model.in_plant, ~model.in_plant)):
-        if part.size:
-            own, away = spread[:, part[:, None], part], off[:, part]
-            squares = np.einsum("ri,ri->r", away, np.linalg.solve(own, away[:, :, None])[:, :, 0])
-            nearest = np.argsort(squares)
-            share = np.cumsum(weights[nearest])
-            quantile = squares[nearest][np.searchsorted(share, _LEVEL * share[-1])]
-            ratio = quantile / scipy.stats.chi2.ppf(_LEVEL, part.size)
-            factors[part] = min(ratio, _MOST) if np.isfinite(ratio) else _MOST
-    return factors
+    own, away = spread[:, part[:, None], part], off[:, part]
+    squares = np.einsum("ri,ri->r", away, np.linalg.solve(own, away[:, :, None])[:, :, 0])
+    nearest = np.argsort(squares)
+    share = np.cumsum(weights[nearest])
+    quantile = squares[nearest][np.searchsorted(share, _LEVEL * share[-1])]
+    ratio = float(quantile / scipy.stats.chi2.ppf(_LEVEL, part.size))
+    return min(ratio, _MOST) if np.isfinite(ratio) else _MOST
