@@ -67,10 +67,10 @@ def reach(model: Model, estimate: Estimate) -> Array:
     rng, records, best = np.random.default_rng(1), estimate.search.records, estimate.search.point
     factors = np.ones(model.theta.size)
     for part in _parts(model):
-        root = np.linalg.cholesky(estimate.information[np.ix_(part, part)])
+        # The other parameters follow as they do by theory, so that these draws are about as likely as any.
+        root = np.linalg.cholesky(estimate.covariance[np.ix_(part, part)])
         z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, part.size))
-        off = np.zeros((_DRAWS, factors.size))
-        off[:, part] = scipy.linalg.solve_triangular(root.T, z.T).T
+        off = z @ np.linalg.solve(root, estimate.covariance[part])
         exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - part.size * np.log(_REACH)
         logarithms = np.full(_DRAWS, -np.inf)
         for i, theta in enumerate(best.theta + off):
