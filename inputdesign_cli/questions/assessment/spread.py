@@ -71,6 +71,7 @@ def reach(model: Model, estimate: Estimate) -> Array:
         root = np.linalg.cholesky(estimate.covariance[np.ix_(part, part)])
         z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, part.size))
         off = z @ np.linalg.solve(root, estimate.covariance[part])
+        left = best.freedom - factors.size + part.size  # the others are integrated over, which costs freedom
         exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - part.size * np.log(_REACH)
         logarithms = np.full(_DRAWS, -np.inf)
         for i, theta in enumerate(best.theta + off):
@@ -78,7 +79,7 @@ def reach(model: Model, estimate: Estimate) -> Array:
                 drawn = model.at(theta)
                 stable = drawn.flaw is None and drawn.radius < 1.0
                 if stable and (cost := evaluate(records, theta).cost) > 0.0:
-                    likelihood = -0.5 * best.freedom * np.log(cost / best.cost)
+                    likelihood = -0.5 * left * np.log(cost / best.cost)
                     logarithms[i] = likelihood - scipy.special.logsumexp(exponents[i])
         if np.max(logarithms) > -np.inf:
             weights, spread = np.exp(logarithms - np.max(logarithms)), estimate.covariance
