@@ -117,7 +117,7 @@ PLANT = refuted(
     "plant-structure",
     "The residuals still depend on past inputs. By a score test, the plant has more structure than the "
     "model.",
-    "Raise the orders of the plant or change its delay; the message names the keys.",
+    "Raise the orders of the plant or change its delay; the message in result.json names the keys.",
 )
 NOISE = refuted(
     "noise-structure",
