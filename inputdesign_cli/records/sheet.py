@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location
 
 Detrend = Literal["none", "constant", "linear", "auto"]
-DETRENDS: dict[str, Detrend] = {kind: kind for kind in get_args(Detrend)}
 Run = tuple[str, int, int]
 """Rows of a file, the first and the last; no name: of the only file."""
 _PLAIN = (

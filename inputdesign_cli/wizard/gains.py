@@ -208,8 +208,7 @@ class _Pair:
             return None
         does = [] if verb is None else self.before[verb:]
         of_cause = [*self.between[link:], *self.behind[:2]]
-        begin = effect.begin if verb is None else self.before[verb].begin
-        return self._written(effect, cause, does, self.between[:link], of_cause, begin, "")
+        return self._written(effect, cause, does, self.between[:link], of_cause, "")
 
     def _cause_first(self) -> Gain | None:
         """Return the gain of "when the valve opens 5 % the level rises 2 cm"."""
@@ -221,9 +220,9 @@ class _Pair:
         compared = bool(self.behind) and self.behind[0].stem in _GREATER | _LESS
         if not cause.unit or (cause.unit == effect.unit and not marked):
             return None
-        if (verb is None and not (more and compared)) or not (
-            effect.unit or "by" in {one.stem for one in between[-2:]}
-        ):
+        if verb is None and not (more and compared):
+            return None
+        if not effect.unit and "by" not in {one.stem for one in between[-2:]}:
             return None
         near = before[-1:] if before and before[-1].stem in _STANDS | _ABOUT | {"by"} else []
         if not marked:
@@ -235,13 +234,7 @@ class _Pair:
         does, of_cause = (
             ([], [*start, *between]) if verb is None else (between[verb:], [*start, *between[:verb]])
         )
-        begin, assumed = (start or [cause])[0].begin, "" if marked else cause.text
-        return self._written(effect, cause, does, self.behind, of_cause, begin, assumed)
-
-    def _lets(self, verb: _Token) -> bool:
-        """Return whether a verb follows one as in "lets the level fall", or begins a clause."""
-        earlier = [one for one in (*self.before, *self.between) if one.begin < verb.begin]
-        return not any(one.stem in _RISES - _LETS for one in earlier)
+        return self._written(effect, cause, does, self.behind, of_cause, "" if marked else cause.text)
 
     def _written(
         self,
@@ -250,7 +243,6 @@ class _Pair:
         does: list[_Token],
         compared: list[_Token],
         moved: list[_Token],
-        begin: int,
         assumed: str,
     ) -> Gain | None:
         """Write the gain in one form, or return None if its sign is not clear.
@@ -259,54 +251,73 @@ class _Pair:
             does: the words on the effect from its verb on; `compared`: those behind its size.
             moved: the words on the cause.
         """
-        behind = compared[0].stem if compared else ""
-        if (
-            len(does) > 1
-            and does[0].stem in _FALLS
-            and does[0].text.lower() in _NOUNS
-            and not self._lets(does[0])
-        ):
-            return None
-        # "makes the cooler warmer", "10 degC of cooling": a word that may be a name, or a sign.
-        if any(one.stem in _FALLS | _LESS for one in (*does[1:], *compared[1:3])):
-            return None
-        rate = self.rate or _RATE.match(self.text, effect.end)
+        rate, behind = self.rate or _RATE.match(self.text, effect.end), compared[0].stem if compared else ""
         if does and does[0].stem in _STATES and not (rate or behind in _LESS | _GREATER):
             return None  # "it gets 70 degC" is no change
-        time, size = rate["time"] if rate else "", effect.text
-        speed, stems = _SPEED.fullmatch(effect.unit), {one.stem for one in (*self.before, *self.between)}
-        flows = speed is not None and (speed["size"].lower() in _FLOWS or bool(stems & _SPEEDS))
-        if speed and not (time or flows or behind in _SPEEDS) and stems & _GROWING:
-            time, size = speed["time"], f"{size[: -len(effect.unit)]}{speed['size']}"
-        falls = behind in _LESS or (bool(does) and does[0].stem in _FALLS)
-        closes = any(one.stem in _CLOSING and _free(moved, i) for i, one in enumerate(moved))
-        after = [*moved[1:], effect][: len(moved)]
-        opens = (
-            one.stem in _OPENING and next_.stem not in _CLOSING
-            for one, next_ in zip(moved, after, strict=True)
-        )
-        if closes and any(opens):
-            return None  # "opening the valve that is closed", "5 % more in the lower tank"
-        signs = (falls, closes, size.startswith("-"), cause.text.startswith("-"))
-        negative = sum(signs) % 2 == 1
+        negative = _negative(effect, cause, does, compared, moved)
+        if negative is None:
+            return None
+        time, size = (rate["time"], effect.text) if rate else self._ramp(effect, behind)
         touching = (self.text[: one.begin].rstrip() for one in (effect, cause))
         about = any(_stem(re.split(r"\s", words)[-1]) in _ABOUT for words in touching)
+        begin = min(one.begin for one in (effect, cause, *does, *moved))
         end = max(effect.end, cause.end, rate.end() if rate else 0)
-        comparatives = _BEHIND.match(self.text, end)
         of_rate = rate.span() if rate else (end, end)
-        words = [one for one in {*does, *compared, *moved} if begin <= one.begin < end]
-        words = [one for one in words if one.begin < of_rate[0] or one.begin >= of_rate[1]]
-        beside = [one for one in words if one.stem not in _UNDERSTOOD]
-        form = "".join(f"{one.text} " for one in sorted(beside, key=lambda one: one.begin))
-        form += f"{'rises by' if time else 'gain'} {'about ' * about}{'-' * negative}{size.lstrip('-')}"
-        form += f" per {time}" * bool(time) + f" per {cause.text.lstrip('-')}"
-        return Gain(begin, comparatives.end() if comparatives else end, form, assumed)
+        beside = [
+            one.text
+            for one in sorted({*does, *compared, *moved}, key=lambda one: one.begin)
+            if begin <= one.begin < end
+            and not of_rate[0] <= one.begin < of_rate[1]
+            and one.stem not in _UNDERSTOOD
+        ]
+        what = f"{'rises by' if time else 'gain'} {'about ' * about}{'-' * negative}{size.lstrip('-')}"
+        form = f"{what}{f' per {time}' * bool(time)} per {cause.text.lstrip('-')}"
+        comparatives = _BEHIND.match(self.text, end)
+        return Gain(begin, comparatives.end() if comparatives else end, " ".join([*beside, form]), assumed)
+
+    def _ramp(self, effect: _Token, behind: str) -> tuple[str, str]:
+        """Return the time and the size of "rises 2 cm/s"; no time for "gives 2 m/s", which is a speed."""
+        speed, stems = _SPEED.fullmatch(effect.unit), {one.stem for one in (*self.before, *self.between)}
+        if (
+            speed is None
+            or speed["size"].lower() in _FLOWS
+            or {*stems, behind} & _SPEEDS
+            or not stems & _GROWING
+        ):
+            return "", effect.text
+        return speed["time"], f"{effect.text[: -len(effect.unit)]}{speed['size']}"
+
+
+def _negative(
+    effect: _Token, cause: _Token, does: list[_Token], compared: list[_Token], moved: list[_Token]
+) -> bool | None:
+    """Return whether a gain is negative; None where that is not clear. The words are as of `_Pair`."""
+    # "makes the cooler warmer", "10 degC of cooling": a word that may be a name, or a sign.
+    if any(one.stem in _FALLS | _LESS for one in (*does[1:], *compared[1:3])):
+        return None
+    falls = any(one.stem in _LESS for one in compared[:1]) or any(one.stem in _FALLS for one in does[:1])
+    closes = any(one.stem in _CLOSING and _free(moved, i) for i, one in enumerate(moved))
+    opens = any(
+        one.stem in _OPENING and not (i + 1 < len(moved) and moved[i + 1].stem in _CLOSING)
+        for i, one in enumerate(moved)
+    )
+    if closes and opens:  # "opening the valve that is closed", "5 % more in the lower tank"
+        return None
+    return sum((falls, closes, effect.text.startswith("-"), cause.text.startswith("-"))) % 2 == 1
 
 
 def _verbs(words: Sequence[_Token]) -> list[int]:
-    """Return the places of verbs that an output may have as its subject; none stands behind an article."""
-    at = (i for i, one in enumerate(words) if one.stem in _RISES | _FALLS)
-    return [i for i in at if _free(words, i) and words[i].text.lower() not in ("lower", "cooler")]
+    """Return the places of verbs that an output may have as its subject.
+
+    None stands behind an article. "drop" is a verb in "lets it drop", a noun in "raises the pressure drop".
+    """
+    found = list[int]()
+    for i, one in enumerate(words):
+        noun = one.text.lower() in _NOUNS and any(words[j].stem not in _LETS for j in found)
+        adjective = one.text.lower() in ("lower", "cooler")
+        if one.stem in _RISES | _FALLS and _free(words, i) and not (noun or adjective):
+            found.append(i)
+    return found
 
 
 def _free(words: Sequence[_Token], at: int) -> bool:

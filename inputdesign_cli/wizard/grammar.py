@@ -238,10 +238,6 @@ _BASE = (
 )
 UP = "rises|grows|increases|climbs|goes up|warms|heats|raises|lifts"
 """What an output does that moves upwards."""
-_RISE = (
-    rf"(?:{UP}|changes)(?:\s+(?:by|with))?\s+"
-    rf"(?:{ABOUT}\s*)?-?{_DIGITS}\s*[^\s\d,;|]+"
-)
 _OF_SPEED = re.compile(
     rf"\b(?P<what>(?:angle|position|speed|velocity|flow)\s+)?(?:{UP}|changes)"
     rf"(?:\s+(?:by|with))?\s+(?P<size>(?:{ABOUT}\s*)?-?{_DIGITS}\s*(?P<unit>[^\s\d,;|/]+)/[a-z]+)(?=\s+per\b|\s*/)",

@@ -6,10 +6,10 @@ What is left over is asked for in other words where it may matter, and said back
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import Diagnostic, SpecError
 from inputdesign_cli.wizard import grammar, plants, wishes
 from inputdesign_cli.wizard.grammar import (
     BEYOND,
@@ -41,7 +41,7 @@ _MATTERS = re.compile(
     r"invers\w*|clos(?:e|es|ed|ing)|shut\w*|reduc\w*|less(?! is)|unstable|off|manual|slower|faster|times|"
     r"factor|accura\w*|uncertain\w*|guess\w*|total|overall|upwards?|downwards?|PRBS|binary|weekend|overnight|"
     r"dead time|delay|time constant|lag|gain|react\w*|respon[ds]\w*|answers|cannot|or|pp|p-p|negligible|"
-    r"hardly|old|had|used|hope|expect\w*|perhaps|might|predict\w*|humidity|"
+    r"hardly|range|span|band|old|had|used|hope|expect\w*|perhaps|might|predict\w*|humidity|"
     r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month|morning|afternoon|evening)s?|half|twice|doubled?|"
     r"peak\S*)\b",
     re.I,
@@ -265,18 +265,13 @@ def _taken(piece: re.Match[str]) -> str:
 
 def not_understood(*parts: str) -> SpecError:
     """Return the error about all parts of a sentence that are not understood, each with its question."""
-    named = {part: [key for key in KEYS if re.search(rf"\b{key}\b", part, re.I)] for part in parts}
-    return SpecError(
-        [
-            replace(
-                one,
-                message=f'"{part}" is not understood',
-                hint=f"say {in_other_words(part).allowed}, or leave it out",
-            )
-            for part, keys in named.items()
-            for one in bad_answer([*keys, "plant"][0], "").diagnostics
-        ]
-    )
+
+    def about(part: str) -> Diagnostic:
+        key = next((key for key in KEYS if re.search(rf"\b{key}\b", part, re.I)), "plant")
+        hint = f"say {in_other_words(part).allowed}, or leave it out"
+        return Diagnostic("bad-answer", f'"{part}" is not understood', hint=hint, key=key)
+
+    return SpecError(list(map(about, parts)))
 
 
 def spread(answers: Answers, sentence: str | None = None) -> bool:

@@ -1,6 +1,9 @@
 """What a design says is to be applied and logged, and how the record is judged."""
 
+import json
 import shlex
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,7 +29,8 @@ def words(applied, caused, point=None):
     ("said", "parts"),
     [
         (words(["u1 valve (%)", "u2"], ["y1", "y2"], [40.0, 5.0]),
-         ("log time, u1, u2, y1 and y2 every 2 s", "--operating-point u1=40,u2=5,y1=REST,y2=REST")),
+         ("log time, u1, u2, y1 and y2 every 2 s", "--columns time=NAME,u1=NAME,u2=NAME,y1=NAME,y2=NAME",
+          "--operating-point u1=40,u2=5,y1=REST,y2=REST")),
         # A converter of 31 steps of 24/31 V has no level of 10 V: the record swings about another.
         (words(["u1"], ["y1"], [10.5]), ("--operating-point u1=10.5,y1=REST",)),
         (words(["u1"], ["y1"]), ("idesign assess spec.yaml log.csv",)),
@@ -77,6 +81,15 @@ def test_the_command_that_solve_names_judges_its_record(run, tmp_path):
         record("log.csv", plant)
         code, out, err = run(*command, "--no-figures", "--set", f"accuracy.model_error.relative={asked}")
         assert code == expected, out + err
+        if expected == EXIT_MISSED:  # the command that judges the additional record, too, runs as printed
+            record("MORE.csv", plant, 1.001)
+            then = shlex.split(out.splitlines()[-1].removeprefix("Then: idesign "))
+            assert run(*then, "--no-figures", "--quiet")[0] in (EXIT_DONE, EXIT_MISSED)
+            both = json.loads((tmp_path / "runs/log_and_1_more_assessed/result.json").read_text())
+            assert [Path(one).name for one in both["made_from"][1:]] == ["log.csv", "MORE.csv"]
+            Path("MORE.csv").unlink()
+            shutil.rmtree("runs/log_and_1_more_assessed")
+        assert ("Then: idesign assess" in out) == (expected == EXIT_MISSED)
     # Records that are judged together do not stand in the way of the first alone.
     record("log.csv", [1, -0.5])
     record("more.csv", [1, -0.5], 1.001)

@@ -143,6 +143,26 @@ SENTENCE = (
 
 
 @pytest.mark.slow
+def test_a_missing_folder_is_refused_before_any_question(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
+    code, _, err = run("wizard", SENTENCE, "-o", "new/mine.yaml")
+    assert (code, err.count("error[output-not-writable]")) == (2, 1)
+    assert sys.stdin.readline() == "no\n"
+
+
+def test_specs_of_one_name_in_two_folders_have_runs_of_their_own(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("inputdesign_cli.wizard.composing.with_spectrum", lambda draft, solve: draft)
+    monkeypatch.setattr("inputdesign_cli.wizard.solving.verdict", lambda *_: [])
+    for folder in ("tank", "room"):
+        (tmp_path / folder).mkdir()
+        code, _, err = run(
+            *("wizard", SENTENCE, "-o", f"{folder}/mine.yaml", "--solve", "-a", "hold=no", "-a", "return=no"),
+            *("-a", "converter=no", "-a", "time=10 min"),
+        )
+        assert code == 0, err
+        assert (tmp_path / "runs" / f"{folder}_mine" / "signal.csv").is_file()
+
+
 def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
     """A line that is not understood ends it, as later lines answer other questions; defaults fill the end."""
     monkeypatch.setattr("inputdesign_cli.wizard.composing.with_spectrum", lambda draft, solve: draft)

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,10 +12,10 @@ import scipy.signal
 
 from inputdesign_cli import assess, load_spec, parse_spec
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
-from inputdesign_cli.finding import REFUTED, UNDECIDED, Finding
+from inputdesign_cli.finding import NOTE, REFUTED, UNDECIDED, Finding
 from inputdesign_cli.findings import kinds
 from inputdesign_cli.findings.faults import follows_inputs
-from inputdesign_cli.findings.leading import leading
+from inputdesign_cli.findings.leading import Leading, following, leading
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.findings.refuted_structure import no_leak, remedies_of
 from inputdesign_cli.questions import explore
@@ -127,6 +128,15 @@ def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys)
 @pytest.mark.parametrize("fault", ["noise", "drift", "lag", "inverse", "delay"])
 def test_the_command_ends_nearly_every_matter(fault, plant, tmp_path):
     assert sum(ended(fault, plant, seed, tmp_path) for seed in range(10)) >= 9
+
+
+def test_what_may_follow_from_the_first_objection_says_so():
+    """Nothing but its message changes. Notes on what was done to a record follow from nothing."""
+    first = Finding("plant-structure", REFUTED, "a lag is missing")
+    drift = Finding("drift", REFUTED, "it drifts", "y1", {"probability": 1e-9})
+    note = Finding("segments", NOTE, "two segments")
+    found = following([note, drift, first], Leading([first], "idesign explore log.csv"))
+    assert found == [note, replace(drift, message="This may follow from plant-structure: it drifts"), first]
 
 
 @pytest.mark.parametrize("seed", [0, 10])

@@ -71,7 +71,8 @@ def reach(model: Model, estimate: Estimate) -> Array:
         root = np.linalg.cholesky(estimate.covariance[np.ix_(part, part)])
         z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, part.size))
         off = z @ np.linalg.solve(root, estimate.covariance[part])
-        left = best.freedom - factors.size + part.size  # the others are integrated over, which costs freedom
+        # The others are integrated over, which costs freedom.
+        left = max(best.freedom - factors.size + part.size, 1)
         exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - part.size * np.log(_REACH)
         logarithms = np.full(_DRAWS, -np.inf)
         for i, theta in enumerate(best.theta + off):
