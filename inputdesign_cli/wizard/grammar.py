@@ -144,6 +144,7 @@ _SPOKEN = re.compile(
     rf"|to\s+(?:{'|'.join(_COUNTED)}|\d+)\s+{UNIT_OF_TIME}))",
     re.I,
 )
+_DIES_AWAY = re.compile(r"\b(?:dies (?:away|out|down)|decays(?: away)?)(?=\s+(?:in|within|over)\b)", re.I)
 _NOTHING = re.compile(
     r"\bnothing (?:happens|moves|changes) (?:in|for|during|within) (?:the )?(?:first )?(?:a )?"
     r"(?=(?P<few>few\b)?)",
@@ -449,6 +450,7 @@ def in_figures(text: str) -> str:
     """
     figures = _MINUS_SIGN.sub("-", _NEGATIVE.sub(r"\1 -", re.sub(r"\bper cent\b", "%", text, flags=re.I)))
     figures = re.sub(r"(?<=\d)\.(?=\s|$)", " .", figures)  # the end of a sentence
+    figures = _DIES_AWAY.sub("fades", figures)
     figures = _NOTHING.sub(lambda found: f"dead time of {'a ' * bool(found['few'])}", figures)
     figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)

@@ -444,8 +444,27 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("lag 3 s; at the end the valve must be where it started", "return", "yes"),
     ],
 )
-def test_a_part_of_a_sentence_answers_its_question(part, question, answer):
+def test_a_part_of_a_sentence_answers_its_question(part, question, answer, tmp_path):
+    """What is taken for an answer is one, too, beside other answers without units."""
     assert in_sentence(f"{part}; noise 0.1, white").answers[question] == answer
+    if question in ("hold", "converter", "limits", "return", "drift", "loop", "signals"):  # whole answers
+        said = {"plant": "gain 2, time constant 180 s, dead time 6 s", "range": "40 +- 5", "time": "1 day"}
+        compose(ENGINEER | said | {question: answer}, "x", tmp_path).spec()
+
+
+@pytest.mark.parametrize("fades", ["fades in", "that fades over", "which dies away in", "varies within"])
+@pytest.mark.parametrize(
+    "noise", ["noise of 0.1", "the reading scatters by 0.1", "the level is noisy by 0.1"]
+)
+def test_noise_fades_in_the_time_that_is_said(noise, fades, tmp_path):
+    """Also where nobody says how long the experiment may take: the time was taken for that."""
+    _, text = written(
+        f"{noise}, {fades} about ten minutes; gain 2, lag 5 min, dead time 30 s; 40 +- 5; PI", tmp_path
+    )
+    assert (
+        re.search(r"standard_deviation: (\S+)", text)[1],
+        re.search(r"correlation_time: (\S+)", text)[1],
+    ) == (*("0.1", "600"),)
 
 
 PLAIN = (
