@@ -363,8 +363,12 @@ def width_for(page: Figure) -> float:
 
 def _legend(handles: Sequence[Artist], page: Figure, place: Mapping[str, object]) -> dict[str, Any]:
     """Return the settings of a legend at a place, with as many columns as the page has room for."""
-    columns = _columns([str(handle.get_label()) for handle in handles], _LETTERS_PER_INCH * width_for(page))
-    return {"handles": handles, "ncols": columns, "handlelength": 2.0, "columnspacing": 1.2, **place}
+    room = int(_LETTERS_PER_INCH * width_for(page))
+    # A label wider than the page would leave no room for the axes.
+    widest = max(room - 2 * _BESIDE_LABEL, 1)
+    labels = [textwrap.fill(str(handle.get_label()), widest) for handle in handles]
+    listed = {"handles": handles, "labels": labels, "ncols": _columns(labels, room)}
+    return {**listed, "handlelength": 2.0, "columnspacing": 1.2, **place}
 
 
 def _columns(labels: Sequence[str], room: float) -> int:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _ITEM = re.compile(r"^\s*- ", re.MULTILINE)
 _BLANK = "\ue000"  # stands for a blank that stays
+_OF_NOISE = re.compile(r"[cd]\d+(?:\[\d+\])?")  # names that the program gives to parameters of noise
 _LOOSE = re.compile(r" ([,;)]|:(?!:)|\.(?!\.))")
 
 
@@ -75,9 +76,17 @@ def _templates(package: str) -> Environment:
         "spoken": spoken,
         "backwards": lambda name: " ".join(reversed(spoken(name).split("."))),
         "sentence": lambda text: f"{text[0].upper()}{text[1:]}.",
+        "of_plant": of_plant,
     }
     found.globals["joined"] = lambda mark, *parts: mark.join(filter(None, map(_tidy, parts)))
     return found
+
+
+def of_plant(parameters: Mapping[str, float], digits: int = 4) -> list[str]:
+    """Return the parameters of a plant as words, without those of its noise: `gain 2`."""
+    return [
+        f"{name} {value:.{digits}g}" for name, value in parameters.items() if not _OF_NOISE.fullmatch(name)
+    ]
 
 
 def shown(value: object) -> str:

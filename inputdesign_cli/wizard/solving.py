@@ -5,14 +5,13 @@ Every number is that of a design that was computed. `templates/verdict.txt` has 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.outcome.results import Result
-from inputdesign_cli.outcome.sentences import sentences
+from inputdesign_cli.outcome.sentences import of_plant, sentences
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.specification.models.units import SECONDS
@@ -23,7 +22,6 @@ _LIMITS = {"rate": "the rate", "amplitude.output": "the output"}
 _ROOM, _TRIES = 1.1, 3
 _LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
-_OF_NOISE = re.compile(r"[cd]\d+(?:\[\d+\])?")  # parameters that nobody has named
 
 
 def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> list[str]:
@@ -73,16 +71,9 @@ def _said(part: str, facts: Mapping[str, object], clock: float = 1.0) -> list[st
     filters: dict[str, Callable[..., str]] = {
         "lasting": lambda time: lasting(time * clock),
         "decibels": decibels,
-        "listed": _listed,
+        "listed": lambda parameters: ", ".join(of_plant(parameters, 3)),
     }
     return sentences("inputdesign_cli.wizard", "verdict.txt", part, facts, filters)
-
-
-def _listed(parameters: Mapping[str, float]) -> str:
-    """Write the parameters of a plant, and leave out its noise."""
-    return ", ".join(
-        f"{name} {value:.3g}" for name, value in parameters.items() if not _OF_NOISE.fullmatch(name)
-    )
 
 
 def _scatter(result: Result) -> float:

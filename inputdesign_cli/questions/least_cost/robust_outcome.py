@@ -28,6 +28,7 @@ from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.outcome import robust as parts
 from inputdesign_cli.outcome.curves import Curves, FanCurves
 from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.sentences import of_plant
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound_curves import axis
 from inputdesign_cli.questions.common.robust import (
@@ -384,5 +385,5 @@ def fan_curves(
 
 def _with_parameters(name: str, parameters: Mapping[str, float]) -> str:
     """Return the name of a plant with its first parameters, as many as a legend has room for."""
-    said = [f"{label} {value:.3g}" for label, value in list(parameters.items())[:_SAID]]
-    return ", ".join([name, *said, *[".."] * (len(parameters) > _SAID)])
+    said = of_plant(parameters, 3)
+    return ", ".join([name, *said[:_SAID], *[".."] * (len(said) > _SAID)])
