@@ -150,7 +150,11 @@ NONLINEAR = refuted(
 )
 # Drift makes other tests fail; an error of G makes tests of the noise fail.
 OF_MANY = {"drift": DRIFT, "plant": PLANT, "noise": NOISE}
-_MOST = {"drift": "along a trend", "plant": "most on those {} samples ago", "noise": "most {} samples apart"}
+_MOST = {
+    "drift": "they follow a trend",
+    "plant": "most on inputs {} earlier",
+    "noise": "those {} apart are correlated most",
+}
 OF_ONE = {"plant": MISSING, "noise": MISSING, "change": CHANGED, "nonlinear": NONLINEAR}
 _LONG = ", or compare with a long FIR model (B: [0, 1, 1, ..])"
 
@@ -163,8 +167,9 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
     for fault, kind in OF_MANY.items():
         test = next((test for test in failing if test.fault == fault and test not in directed), None)
         if test is not None:
-            p, most = test.probability, _MOST[fault].format(test.lag)
-            fact = f"{most}{_where(model, test)}; with a right model the probability is {chance(p)}"
+            p, samples = test.probability, f"{test.lag} sample{'s' * (test.lag != 1)}"
+            most = f"{_MOST[fault].format(samples)}{_where(model, test)}"
+            fact = f"{most}; with a right model the probability of that is {chance(p)}"
             remedy = _sentence(f"{remedies[fault]}{_LONG * (fault == 'plant')}")
             found.append(kind.found(fact, where=test.name, remedy=remedy, probability=p, lag=test.lag))
     for test in failing:

@@ -291,7 +291,7 @@ class _Pair:
 def _negative(
     effect: _Token, cause: _Token, does: list[_Token], compared: list[_Token], moved: list[_Token]
 ) -> bool | None:
-    """Return whether a gain is negative; None where that is not clear. The words are as of `_Pair`."""
+    """Return whether a gain is negative; None if that is not clear. The arguments are as in `_written`."""
     # "makes the cooler warmer", "10 degC of cooling": a word that may be a name, or a sign.
     if any(one.stem in _FALLS | _LESS for one in (*does[1:], *compared[1:3])):
         return None
@@ -307,7 +307,7 @@ def _negative(
 
 
 def _verbs(words: Sequence[_Token]) -> list[int]:
-    """Return the places of verbs that an output may have as its subject.
+    """Return the places of the verbs that may say what an output does.
 
     None stands behind an article. "drop" is a verb in "lets it drop", a noun in "raises the pressure drop".
     """

@@ -73,6 +73,16 @@ def test_names_and_units_are_drawn_as_they_are():
     assert draw(bound(BoundPanel(W, 0.008 * G, G, names=" → ".join(long))))
 
 
+@pytest.mark.parametrize("width", ["column", "page"])
+def test_a_label_wider_than_the_page_leaves_room_for_the_axes(width):
+    """The legend of a fan had the parameters of a plant in one line, and the axes were a strip beside it."""
+    fan, found = CURVES["fan"], []
+    wide = replace(fan, active={", ".join(["plant 31", *["time_constant 4.32e+03"] * 4]): fan.nominal})
+    rendered(painter(wide), width=width, seen=found.append)
+    (axes,) = found[0].axes
+    assert axes.get_position().width > 0.7
+
+
 @pytest.mark.first(12)
 @pytest.mark.parametrize("name", CURVES)
 def test_a_png_of_the_promised_size_has_labels_in_one_size_and_no_legend_hides_a_curve(name):

@@ -117,7 +117,7 @@ def _parts(model: Model) -> list[NDArray[np.int64]]:
 
 
 def _ratio(part: NDArray[np.int64], spread: Array, off: Array, weights: Array) -> float:
-    """Return by how much the 95 % quantile of squared distances exceeds that of theory, for some parameters.
+    """Return the ratio of the 95 % quantile of squared distances to the quantile of chi-squared.
 
     Args:
         part: the parameters that count.
