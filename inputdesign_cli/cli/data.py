@@ -48,7 +48,7 @@ def explore(
         raise typer.BadParameter("a model that is judged needs no further spec", param_hint="--spec")
     ending = "explored" if validate is None else "validated"
     sources = [*filter(None, [spec, validate]), *data]
-    place = Place(into, f"{data[0].stem}_{ending}", sources)
+    place = Place(into, f"{data[0].stem}_{ending}", sources, numbered=True)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
 
@@ -70,9 +70,8 @@ def explore(
         else:
             removed = found.levels.split() if rows.detrend == "none" else []
             options = [*typed(rows), *(point if point and "--detrend" not in removed else removed)]
-            again = ["-o", f"{place.directory}_assessed"]  # the usual place holds the run of the other spec
             logs = (argument(str(path)) for path in data)
-            then = shlex.join(["idesign", "assess", found_spec, *options, *again, *logs])
+            then = shlex.join(["idesign", "assess", found_spec, *options, *logs])
         typer.echo(f"Then: {then}")
 
 
@@ -98,7 +97,7 @@ def identify(
             "it says which structure is estimated; `idesign explore DATA` finds one without a spec",
             param_hint="--spec",
         )
-    place = Place(into, f"{data[0].stem}_identified", [spec, *data])
+    place = Place(into, f"{data[0].stem}_identified", [spec, *data], numbered=True)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.run_directory import check_counted_once
@@ -129,7 +128,8 @@ def assess(
     """
     # Records that are judged together are another run than the first of them alone.
     together = f"_and_{len(data) - 1}_more" if len(data) > 1 else ""
-    place = Place(into, f"{data[0].stem}{together}_assessed", [spec, *data], judges=True)
+    sources = [spec, *data]
+    place = Place(into, f"{data[0].stem}{together}_assessed", sources, judges=True, numbered=True)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.run_directory import check_counted_once
@@ -146,9 +146,6 @@ def assess(
         )
     again, explores = typed(changes, levels, rows), ["idesign", "explore", "--spec", str(spec)]
     explores += typed(replace(levels, remove_means=False))  # what explore estimates itself
-    place_of_next = Path("runs") / f"{data[0].stem}_explored"
-    if spec.resolve().parent == place_of_next.resolve():  # the spec is to stay as it is
-        explores += ["-o", f"{place_of_next}_again"]
     begins = {
         "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
         # The longer beginning comes first: columns that the command has are not named twice.
@@ -156,7 +153,7 @@ def assess(
         "idesign explore": [*explores, *typed(rows)],
         "idesign solve SPEC": ["idesign", "solve", str(spec), *typed(changes)],
     }
-    results = _with_typed(assessment.results, begins)
+    results = _with_typed(assessment.results, begins, explored=_explored(spec, data))
     keep(results, place, shown)
     if not (shown.quiet or shown.json_output or into.no_output):
         more = ["idesign", "assess", str(spec), *map(str, data), "MORE.csv", *again]
@@ -165,21 +162,33 @@ def assess(
     _end(assessment.verdict)
 
 
-def _with_typed(results: Results, begins: Mapping[str, Sequence[str]]) -> Results:
+def _with_typed(results: Results, begins: Mapping[str, Sequence[str]], *, explored: bool) -> Results:
     """Return an assessment whose next command names the spec and the options that were typed.
 
     Args:
         begins: how commands begin -> the words that are to stand there.
+        explored: whether `explore` has chosen the structure by the same data: it would choose it again.
     """
     judged = results.outcome.assessment
     assert judged is not None
     command = judged.next or ""
+    if explored and command.startswith("idesign explore"):
+        command = "idesign solve SPEC  # explore knows no better structure here: take a record more"
     begin = next((one for one in begins if command.startswith(one)), None)
     if begin is not None:
         command = shlex.join(begins[begin]) + command.removeprefix(begin)
     return replace(
         results, outcome=replace(results.outcome, assessment=replace(judged, next=command or None))
     )
+
+
+def _explored(spec: Path, data: Sequence[Path]) -> bool:
+    """Return whether `idesign explore` has written this spec from the same data."""
+    from inputdesign_cli.outcome.run_files import SPEC, known_result
+
+    made = known_result(spec.parent) if spec.name == SPEC else {}
+    known = {(spec.parent / str(name)).resolve() for name in made.get("made_from", ())}
+    return "exploration" in made and known >= {one.resolve() for one in data}
 
 
 def campaign(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,17 +61,26 @@ def name_of(file: Path) -> str:
     return "stdin" if str(file) == STANDARD_STREAM else file.stem
 
 
+# A place with such a run keeps it: another place is taken.
+_OTHERS = {
+    *("output-other-run", "output-is-the-spec", "output-spec-changed"),
+    *("output-signal-changed", "campaign-exists"),
+}
+
+
 @dataclass(frozen=True)
 class Place:
     """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first.
 
-    A run without files goes on with what is in the directory.
+    A run without files goes on with what is in the directory. Where the default place of one that is
+    `numbered` holds a run of something else, it takes the first of runs/`name`_2, .. that does not.
     """
 
     into: Into
     name: str = ""
     sources: Sequence[Path] = ()
     judges: bool = False  # the run has a verdict
+    numbered: bool = False
     asked: str = ""  # the spec as it was read
     figures: Figures | None = None  # their form, if the spec has one
     relocates: bool = True  # whether files that the spec names are named from the directory of the run
@@ -99,11 +109,20 @@ class Place:
             OutputError: the directory cannot take the run, see `check_place`, and `output-is-the-spec`.
         """
         place = self if spec is None else replace(self, asked=spec.to_yaml(), figures=spec.figures)
-        if place.origin is not None and not place.into.no_output:
-            from inputdesign_cli.outcome.run_directory import check_place
+        if place.origin is None or place.into.no_output:
+            return place
+        from inputdesign_cli.outcome.run_directory import check_place
 
-            check_place(place.directory, place.origin, place.spared(place.asked))
-        return place
+        free = self.numbered and self.into.output is None
+        for number in itertools.count(2):
+            try:
+                check_place(place.directory, place.origin, place.spared(place.asked))
+                return place
+            except OutputError as error:
+                if not free or error.diagnostics[0].code not in _OTHERS:
+                    raise
+                place = replace(place, name=f"{self.name}_{number}")
+        raise AssertionError("there are always further numbers")
 
     def spared(self, spec: str) -> str:
         """Return the `spec.yaml` of the run: the user's own text where it is the spec itself.

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from inputdesign_cli import questions
+from inputdesign_cli.cli.options import Into
+from inputdesign_cli.cli.run import Place
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.figures import plots
 from inputdesign_cli.outcome.results import Results
@@ -272,6 +274,31 @@ def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
     check_place(tmp_path / "run", Origin(files, judges=True), spec)
     assert code_of(check_place, tmp_path / "run", Origin(files), spec, kind=OutputError) == "output-other-run"
     check_place(tmp_path / "run", Origin(files, overwrite=True), spec)
+
+
+def test_runs_of_the_same_data_by_other_specs_stand_side_by_side(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    spec = questions.load_spec(write(tmp_path / "a" / "a.yaml", "a"))
+    other = Path("runs/log_assessed_2/spec.yaml")  # the spec itself lies in such a place
+
+    def place(file, into=Into()):
+        return (
+            Place(into, "log_assessed", [file, tmp_path / "log.csv"], numbered=True).checked(spec).directory
+        )
+
+    def written(file):
+        where = place(file)
+        origin = Origin([file, tmp_path / "log.csv"], spec.to_yaml())
+        write_run(Results(typed({"format": 1, "title": "a"}), f"title: {file}\n"), where, origin=origin)
+        return str(where)
+
+    names = [tmp_path / name for name in ("a.yaml", "b.yaml", "a.yaml")]
+    usual = "runs/log_assessed"
+    monkeypatch.setattr(type(spec), "to_yaml", lambda self: "")
+    assert [written(one) for one in names] == [usual, f"{usual}_2", usual]
+    assert str(place(other)) == f"{usual}_3"
+    assert str(place(other, Into(overwrite=True))) == usual
+    assert code_of(place, other, Into(Path(usual)), kind=OutputError) == "output-other-run"
 
 
 def test_a_report_replaces_its_own_pages_only_or_goes_to_standard_output(run, analyse, tmp_path, monkeypatch):

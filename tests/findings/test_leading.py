@@ -91,6 +91,21 @@ def test_the_command_ends_the_matter(fault, seed, tmp_path):
     assert ended(fault, IN_Q, seed, tmp_path)
 
 
+@pytest.mark.parametrize(("known", "named"), [("log.csv", "solve"), ("other.csv", "explore")])
+def test_a_structure_that_explore_chose_by_the_same_data_is_not_explored_again(
+    known, named, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    record(tmp_path / "log.csv", "delay", 0)
+    Path("run").mkdir()
+    Path("run/spec.yaml").write_text(f"plant: {IN_Q}{SPEC}")
+    made = {"format": 1, "exploration": {}, "made_from": ["../spec.yaml", f"../{known}"]}
+    Path("run/result.json").write_text(json.dumps(made))
+    code, out, _ = caller(monkeypatch, capsys)("assess", "run/spec.yaml", "log.csv", "--no-figures")
+    assert code == EXIT_UNDECIDED
+    assert out.splitlines()[-1].startswith(f"next: idesign {named} ")
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize("fault", ["drift", "delay"])
 def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys):
