@@ -210,7 +210,7 @@ def _phases(axes: Axes, panels: Sequence[of.ResponsePanel]) -> None:
 
 
 def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
-    """Draw a line for every plant, the binding plants in colour with their parameters; one is the limit."""
+    """Draw a line for every plant, in colour those that decide the design; one is the limit."""
     axes = page.add_subplot()
     style.plain_decades(axes, "y")
     w, rows, number = curves.frequency, curves.ratios[:_MOST_LINES], len(curves.ratios)
@@ -222,7 +222,7 @@ def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
         axes.plot(w, largest, color=GREY, linestyle=DOTTED, linewidth=1.4, label=label)
     axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
     for (name, ratio), color in zip(list(curves.active.items())[:MOST_NAMED], OTHERS, strict=False):
-        axes.plot(w, ratio, color=color, linewidth=1.4, label=f"binding: {name}")
+        axes.plot(w, ratio, color=color, linewidth=1.4, label=f"decides: {name}")
     shown = rows if len(rows) else curves.nominal
     top = 1.3 * max(float(shown.max()), 1.0)
     style.plot_limit(axes, top)

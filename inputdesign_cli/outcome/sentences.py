@@ -77,6 +77,7 @@ def _templates(package: str) -> Environment:
         "backwards": lambda name: " ".join(reversed(spoken(name).split("."))),
         "sentence": lambda text: f"{text[0].upper()}{text[1:]}.",
         "of_plant": of_plant,
+        "parameter": parameter,
     }
     found.globals["joined"] = lambda mark, *parts: mark.join(filter(None, map(_tidy, parts)))
     return found
@@ -87,6 +88,11 @@ def of_plant(parameters: Mapping[str, float], digits: int = 4) -> list[str]:
     return [
         f"{name} {value:.{digits}g}" for name, value in parameters.items() if not _OF_NOISE.fullmatch(name)
     ]
+
+
+def parameter(name: str) -> str:
+    """Return the name of a parameter, that of the noise as one: `noise d1`."""
+    return f"noise {name}" if _OF_NOISE.fullmatch(name) else name
 
 
 def shown(value: object) -> str:

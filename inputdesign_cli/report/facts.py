@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.outcome import Outcome, Simulation
 from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss, objective
-from inputdesign_cli.outcome.sentences import sentences, shown, spoken
+from inputdesign_cli.outcome.sentences import parameter, sentences, shown, spoken
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 
 # The template of each part of a result: what a run does not need is not compiled.
@@ -97,7 +97,7 @@ def estimate_table(outcome: Outcome) -> Rows | None:
         spread = found.standard_deviation[name]
         said = "0" if abs(value) < _NOTHING * spread else f"{value:.6g}"
         limits = f"{value - _NORMAL * spread:.4g} to {value + _NORMAL * spread:.4g}"
-        rows.append((name, said, f"{spread:.2g}", limits))
+        rows.append((parameter(name), said, f"{float(f'{spread:.2g}'):g}", limits))
     return Rows(("parameter", "estimate", "standard deviation", "95 % limits"), tuple(rows))
 
 
