@@ -103,14 +103,14 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--json", default=Path(__file__).with_suffix(".json"))
     asked = parser.parse_args()
-    scenarios, fresh = (40, 150) if asked.quick else (200, 3000)
+    scenarios, draws = (40, 150) if asked.quick else (200, 3000)
     times, violations = [], []
     for name, (_, covariance) in PLANTS.items():
         for order in ORDERS:
             times.append(times_of(name, order))
             print(f"{name}, order {order}: {times[-1]['ratio']:.1f} times as long")
         for seed in SEEDS:
-            stated = f"{{covariance: {covariance}, scenarios: {scenarios}, fresh: {fresh}, seed: {seed}}}"
+            stated = f"{{covariance: {covariance}, scenarios: {scenarios}, fresh: {draws}, seed: {seed}}}"
             task = build_convex(parse_spec(text_of(name), overrides=[f"uncertainty={stated}"]))
             done = task.designed()
             assert task.asked.plants is not None
@@ -132,7 +132,7 @@ def main() -> None:
             )
             print(f"  seed {seed}: {fresh.share:.4f} of eps({found.support})", end="")
             print(f" = {risk.after:.4f} {'kept' if kept else 'MISSED'}")
-    listed = {"scenarios": scenarios, "fresh": fresh, "times": times, "violations": violations}
+    listed = {"scenarios": scenarios, "fresh": draws, "times": times, "violations": violations}
     Path(asked.json).write_text(json.dumps(listed, indent=1) + "\n", encoding="utf-8")
 
 
