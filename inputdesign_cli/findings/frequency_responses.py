@@ -52,9 +52,10 @@ BIASED = doubt(
 @finding(NOTE, "response-without-model", "Compare it with the model in `frequency_response.png`.")
 def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
     """The frequency response was measured without a model. Even a right model misses 5 % of the discs."""
-    entries = "" if of.entries == 1 else f", counted over {of.entries} entries of G"
-    outside, by = of.model_outside or 0.0, ", measured from the reference r" if of.excitation == "r" else ""
-    fact = f"the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies{entries}{by}"
+    outside = of.model_outside or 0.0
+    fact = (
+        f"from {of.excitation}, the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies"
+    )
     found = kind.found(fact, where="frequency_response.csv", model_outside=outside)
     return [found, *BIASED.when(of.caveat, where="r")]
 

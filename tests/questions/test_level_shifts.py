@@ -142,7 +142,6 @@ def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths, take
     assert found is answers[taken]
     steps = " ".join(rest.notes)
     assert bool(shifts_in([steps])) == (rest.lengths != (100,))
-    assert ("too few for a segment" in steps) == (lengths[0] == 49)
 
 
 LINEAR = "plant: {B: [0, 0.3], F: [1, -0.7]}\nnoise: {C: [1, 0.4], variance: 0.01}\n"

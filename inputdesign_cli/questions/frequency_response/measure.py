@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -163,7 +163,7 @@ def measure(
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
     if terms is None:
-        delays = partial(response_delays, model, step=units.step)
+        delays = response_delays(model, max(data.lengths), step=units.step)
         response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
         if response is None:
             message = f"{name} excites no frequency enough for a response without a model"
