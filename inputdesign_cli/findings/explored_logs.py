@@ -18,6 +18,7 @@ from inputdesign_cli.explore import (
 )
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.rivals import most_apart
+from inputdesign_cli.identification.adequacy import failed
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
@@ -184,10 +185,10 @@ def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
     be nonlinear or change, or have unrecorded inputs.
     """
     # Enough samples refute every model of a real plant, and a poor fit alone may be strong noise.
-    failed = {test.name: test for test in found.estimate.tests.failed}
-    if not all(failed.keys() & names for names in _TESTS):
+    failing = {test.name: test for test in failed(found.estimate.tests.scores)}
+    if not all(failing.keys() & names for names in _TESTS):
         return []
-    least, doubtful = min(test.probability for test in failed.values()), []
+    least, doubtful = min(test.probability for test in failing.values()), []
     for i, fit in enumerate(found.validation.simulation):
         output = signal_name("y", i, found.model.outputs)
         fact = f"the best simulation explains {fit:.1f} % of {output} (tests: probability {chance(least)})"

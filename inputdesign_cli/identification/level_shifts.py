@@ -92,7 +92,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     # Zero, then ever longer ones.
     lags = [0.0, *(x for k in range(12) if (x := _SHORTEST * _GROWTH**k) <= _SHARE * records.longest)]
     stretches, outputs = _stretches(records), records.y.shape[1]
-    through = _responses(records, point.theta, lags, white)
+    through = _responses(records, point.theta, lags)
     for (begin, length), output in product(stretches, range(outputs)):
         inner = slice(_FEWEST, length - _FEWEST)
         of_sample, _ = _scores(white, begin, output, through[output, :length, -1])
@@ -130,17 +130,14 @@ def _smooth(samples: int, lag: float) -> Array:
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
-def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> Array:
+def _responses(records: Records, theta: Array, lags: Sequence[float]) -> Array:
     """Return the responses (p, n, m) to lagged steps and to a pulse, in errors of the longest record."""
     at, length = int(np.argmax(records.lengths)), records.longest
     begin = sum(records.lengths[:at])
     every = np.zeros((records.samples, len(lags) + 1))
     signals = [*(_smooth(length, lag) for lag in lags), np.eye(1, length)[0]]
     every[begin : begin + length] = np.column_stack(signals)
-    through = records.whitened(theta, every)
-    if white.whitening is not None:
-        through = white.whitening.through(through.transpose(2, 1, 0)).transpose(2, 1, 0)
-    return through[:, begin : begin + length]
+    return records.whitened(theta, every)[:, begin : begin + length]
 
 
 def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:
