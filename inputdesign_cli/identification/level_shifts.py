@@ -46,8 +46,7 @@ class LevelShift:
     ends: int  # likely settled from this sample on
     rises: bool  # whether the output is larger after it
     test: ScoreTest  # of the likelihood ratio, which counts every sample, lag and output that was tried
-    score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
-    looks: int
+    looks: int  # how many those are
     alone: bool  # whether it explains more than a line through its record, or single samples next to it
 
     @property
@@ -74,10 +73,9 @@ def level_shifts(
     return first, tuple(found), white
 
 
-def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
-    """Return the probability that all these shifts are chance, by the likelihood ratio and by the score."""
-    ratios, looks = [shift.test.statistic for shift in shifts], shifts[0].looks
-    return _by_chance(ratios, looks), _by_chance([shift.score for shift in shifts], looks)
+def chance_of_shifts(shifts: Sequence[LevelShift]) -> float:
+    """Return the probability that all these shifts are chance, by the likelihood ratio."""
+    return _by_chance([shift.test.statistic for shift in shifts], shifts[0].looks)
 
 
 def _by_chance(statistics: Sequence[float], looks: int) -> float:
@@ -116,7 +114,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     begin, length = next(one for one in stretches if sample < sum(one))
     begins = max(sample - 1 - round(_UNSURE * lag), begin)
     ends = min(sample + 2 + round(_SETTLED * lag), begin + length)
-    return LevelShift(output, sample, lag, begins, ends, rising, test, largest, looks, alone)
+    return LevelShift(output, sample, lag, begins, ends, rising, test, looks, alone)
 
 
 def _stretches(records: Records) -> list[tuple[int, int]]:

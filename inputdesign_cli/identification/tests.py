@@ -143,16 +143,12 @@ class Tests:
 
         Tests of many signals that a shift upsets count with the shift removed.
         """
-        directed = tuple(one.test for one in self.directed)
-        others = failed(self.scores, directed)
+        others = failed(self.scores, tuple(one.test for one in self.directed))
         if not self.shifts or not others or self.coloured:
             return () if self.coloured else self.shifts
-        # Likelihood ratios are compared with one, scores with the other.
-        by_ratio, by_score = chance_of_shifts(self.shifts)
-        compared = [(by_ratio if one.of_structure else by_score, one.test) for one in self.directed]
-        alone = all(own < test.probability for own, test in compared if test in others)
-        outweighed = any(by_ratio >= test.probability for test in self.beside_shifts)
-        return self.shifts if alone and not outweighed else ()
+        beside = [*self.beside_shifts, *(one.test for one in self.directed if one.test in others)]
+        by_chance = chance_of_shifts(self.shifts)
+        return self.shifts if all(by_chance < test.probability for test in beside) else ()
 
     @property
     def failed_besides(self) -> tuple[ScoreTest, ...]:

@@ -332,7 +332,7 @@ def _doubted(terms: ResponseTask, judged: Judged) -> Judged:
     data, periods, repeats, model = counted.data, counted.periods, counted.repeats, terms.experiment.model
     if spikes := period_spikes(data.y, periods, repeats=repeats):
         where = [places(units, data, one.samples) for one in spikes]
-        spiked = responses.spiked_periods(units, spikes, where, len(data.y), counted.kept)
+        spiked = responses.spiked_periods(units, spikes, where)
         return replace(judged, scattered=tuple(spiked))
     # The noise of the data near frequency zero; noise of the spec may go on rising below the lowest line.
     lowest = int(np.argmin(judged.frequencies))
