@@ -154,23 +154,26 @@ def limits_not_kept(
         signal: the statements about its record, whose samples have the `bounds`; None without one.
     """
     channels = {"input": power.input, "output": power.output, "excitation": power.excitation}
-    kept: list[tuple[str, float, float, bool]] = []  # key, value, limit, and whether it is an upper one
+    kept: list[tuple[str, str, float, float, bool]] = []  # key, channel, value, limit, whether an upper one
     for limit in limits:
         values = channels[limit.kind] or ()
         value = sum(values) if limit.channel is None else values[limit.channel]
-        kept.append((limit.key, value, limit.bound, limit.upper))
+        of = "" if limit.channel is None else f"{limit.channel + 1}"
+        kept.append((limit.key, of, value, limit.bound, limit.upper))
     for key, bound, peaks in (
         ("limits.amplitude.input", bounds.amplitude, None if signal is None else signal.input_peak),
         ("limits.amplitude.output", bounds.output, None if signal is None else signal.output_peak),
         ("limits.rate", bounds.rate, None if signal is None else signal.input_move),
     ):
         each = [] if bound is None else bound.tolist()
-        kept += [(key, value, most, True) for value, most in zip(peaks or (), each, strict=False)]
+        pairs = enumerate(zip(peaks or (), each, strict=False), start=1)
+        kept += [(key, f"{j}", value, most, True) for j, (value, most) in pairs]
     if longest is not None:
-        kept.append(("limits.samples", samples, longest, True))
+        kept.append(("limits.samples", "", samples, longest, True))
     found = []
-    for key, value, most, upper in kept:
+    for key, channel, value, most, upper in kept:
         beyond = value / most if upper else most / max(value, 1e-300)
-        fact = f"{key} is {most:.6g}, and the excitation has {value:.6g}"
+        of = f" of channel {channel}" if channel else ""
+        fact = f"{key}{of} is {most:.6g}, and the excitation has {value:.6g}"
         found += LIMIT_NOT_KEPT.when(beyond > 1.0 + _ROUNDING, fact, where=key, value=value, limit=most)
     return found

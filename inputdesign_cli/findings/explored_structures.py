@@ -36,8 +36,9 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
         orders += f"; times in {log.time_unit}" * taken.orders.physical
         delays = " and ".join(
-            f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {low} to {high})"
+            f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {low} to {most or 'more'})"
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
+            for most in ("" if high is None else f"{high}",)
         )
         tried, family = len(chosen.candidates), taken.orders.family
         better = max(one.validation for one in chosen.candidates) - taken.validation

@@ -4,6 +4,8 @@ A supplier proposes regressors: past inputs, past residuals, slow trends; `direc
 parameters. The part that parameters and unknown starts can explain is taken off first, so that the statistic
 is chi-squared whatever was estimated. Past residuals lack the estimated part as well. If unknown starts are
 many, as in a record with gaps, that alone correlates residuals. Scores are compared with this correlation.
+In a narrow band the noise is known no better than its model there, and a statistic follows F instead
+([satterthwaite-1946]).
 
 All of this holds for the right noise. If the stated noise model is refuted, a larger one is to be estimated
 before other tests say anything.
@@ -43,7 +45,7 @@ class ScoreTest:
     fault: Fault  # what is wrong if it fails
     statistic: float
     freedom: int
-    probability: float  # of a statistic as large if the model is right
+    probability: float  # of a statistic as large if the model is right, see `White.probability`
     lag: int | None  # of past inputs or residuals, where they explain most; of trends None
     output: int = 0  # of which residuals are explained most
     source: int = 0  # by which input or other residual
@@ -83,7 +85,7 @@ class Score(NamedTuple):
     """The part of residuals that regressors explain beyond estimated parameters and starts."""
 
     statistic: float  # chi-squared where the model is right
-    freedom: int
+    directions: Array  # ((N + M) p, freedom), orthonormal, of the regressors
     sizes: Array  # (m,), of each regressor alone, in standard deviations up to a common factor
 
 
@@ -92,12 +94,12 @@ def score(white: White, columns: Array, means: Array) -> Score:
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     regressors = white.unexplained(columns / norms)
     scores = regressors.T @ white.residuals - white.mean_left(columns / norms, means / norms)
-    _, sizes, right = np.linalg.svd(regressors, full_matrices=False)
+    left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
     kept = sizes > DEPENDENT
     along = (right[kept] @ scores) / sizes[kept]
     return Score(
         float(np.sum(along**2)) / white.variance,
-        int(np.sum(kept)),
+        left[:, kept],
         scores / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT),
     )
 
@@ -112,15 +114,20 @@ def score_tests(records: Records, theta: Array, white: White, *, feedback: bool)
 def tested(white: White, tried: Regressors) -> ScoreTest | None:
     """Return the test of regressors, or None if the estimate explains all of them."""
     found = score(white, tried.white(white), tried.means(white))
-    if not found.freedom:
+    freedom = found.directions.shape[1]
+    if not freedom:
         return None
     output, largest = divmod(int(np.argmax(np.abs(found.sizes))), tried.columns.shape[2])
     lag = tried.lags[largest] if tried.lags else None
     # Lag by lag all inputs, or all residuals.
     source = largest % tried.lags.count(tried.lags[0]) if tried.lags else 0
-    statistic, freedom = found.statistic, found.freedom
-    probability = float(scipy.special.chdtrc(freedom, statistic))
-    return ScoreTest(tried.name, tried.fault, statistic, freedom, probability, lag, output, source)
+    # What past residuals explain has no band of its own.
+    probability = (
+        float(scipy.special.chdtrc(freedom, found.statistic))
+        if tried.of_residuals
+        else white.probability(found.statistic, found.directions)
+    )
+    return ScoreTest(tried.name, tried.fault, found.statistic, freedom, probability, lag, output, source)
 
 
 def failed(

@@ -131,9 +131,9 @@ def directed_tests(
 
 def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
     found, mean = _score(white, group[0])
-    statistic = found.statistic
+    statistic, directions = found.statistic, found.directions
     larger: Model | None = None
-    if scipy.special.chdtrc(1, statistic) < _OPEN:
+    if white.probability(statistic, directions) < _OPEN:
         ends = [(one[0].estimated(), one) for one in group if one[0].estimated is not None]
         if ends:
             ends.sort(key=lambda end: -end[0][1])
@@ -148,7 +148,7 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
     fault = "plant" if any(one.fault == "plant" for one in alternatives) else first.fault
     name = " or ".join(sorted(alternative.name for alternative in alternatives))
     return Directed(
-        ScoreTest(name, fault, statistic, 1, float(scipy.special.chdtrc(1, statistic)), None),
+        ScoreTest(name, fault, statistic, 1, white.probability(statistic, directions), None),
         alternatives,
         size=float(found.sizes[0]) / size,
         deviation=1.0 / size,

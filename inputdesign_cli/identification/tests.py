@@ -143,9 +143,11 @@ class Tests:
 
         Tests of many signals that a shift upsets count with the shift removed.
         """
+        if self.coloured:
+            return ()
         others = failed(self.scores, tuple(one.test for one in self.directed))
-        if not self.shifts or not others or self.coloured:
-            return () if self.coloured else self.shifts
+        if not (self.shifts and others):
+            return self.shifts
         beside = [*self.beside_shifts, *(one.test for one in self.directed if one.test in others)]
         by_chance = chance_of_shifts(self.shifts)
         return self.shifts if all(by_chance < test.probability for test in beside) else ()

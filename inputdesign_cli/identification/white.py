@@ -22,6 +22,8 @@ from inputdesign_cli.plant.filtering import filtered
 
 DEPENDENT = 1e-6
 """Signals of norm one of which less is left depend on the others."""
+# A relative variance of the noise so small changes probabilities of 0.001 by a few per cent of themselves.
+_WELL_KNOWN = 1e-3
 # A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
 # Coefficients of an autoregression: samples needed for each, and the most that are tried.
@@ -120,6 +122,23 @@ class White:
     def means(self) -> Array:
         """Return the means (k,) of the scores of the parameters."""
         return -self.variance * _traces(self.echoes, self._of_starts)
+
+    def probability(self, statistic: float, directions: Array) -> float:
+        """Return the probability of a sum of squares as large by chance, along orthonormal D ((N + M) p, f).
+
+        It is chi-squared in units of the noise along these directions, whose power is known by the estimate.
+        With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of this power changes by
+        2 tr(D^T T_k D) / f for each delta theta_k. If v is the variance of this change, the statistic over f
+        is F with f and 2 / v degrees of freedom. White directions have v = 0. A narrow band where the noise
+        has a zero or a pole next to the unit circle has 0.1 and more.
+        """
+        freedom, v = directions.shape[1], 0.0
+        if np.any(self.echoes):
+            slopes = 2.0 * _traces(self.echoes, self._correlations(directions)) / freedom
+            v = self.variance * float(np.sum((slopes @ self.spread) ** 2))
+        if v <= _WELL_KNOWN:
+            return float(scipy.special.chdtrc(freedom, statistic))
+        return float(scipy.special.fdtrc(freedom, 2.0 / v, statistic / freedom))
 
     @cached_property
     def spread(self) -> Array:

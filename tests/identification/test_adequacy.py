@@ -7,7 +7,7 @@ import scipy.stats
 
 from inputdesign_cli.identification import identify, noises_of_residuals
 from inputdesign_cli.identification.adequacy import ScoreTest, failed
-from inputdesign_cli.identification.white import autoregression
+from inputdesign_cli.identification.white import White, autoregression
 from inputdesign_cli.levels import SHARES, level
 from inputdesign_cli.plant import PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
@@ -73,6 +73,28 @@ def test_the_level_is_shared_by_all_tests():
     one = ScoreTest("x", "noise", 1.0, 1, 0.19 * level("many signals"), 1)
     assert failed([*five[1:], one]) == (one,)
     assert sum(SHARES.values()) <= 1.0
+
+
+@pytest.mark.parametrize("w", [0.02, 0.2, 1.5])
+def test_noise_is_known_no_better_than_its_zero(w):
+    """log |1 - c exp(-jw)|^2 has the variance of c times its derivative squared: F with 2 over that."""
+    c, n = 0.9, 2000
+    psi = scipy.signal.lfilter([0, 1.0], [1.0, -c], np.random.default_rng(8).standard_normal(n))[:, None]
+    white = White(
+        root=np.eye(1),
+        lengths=(n,),
+        residuals=np.zeros(n),
+        variance=1.0,
+        starts=np.zeros((n, 0)),
+        explained=psi,
+        basis=psi / np.linalg.norm(psi),
+        echoes=scipy.signal.lfilter([0, 1.0], [1.0, -c], np.eye(1, n))[:, :, None, None],
+    )
+    along = np.cos(w * np.arange(n))[:, None]
+    slope = 2.0 * np.real(np.exp(-1j * w) / (1.0 - c * np.exp(-1j * w)))
+    variance = slope**2 / np.sum(psi**2)
+    expected = scipy.stats.f.sf(11.0, 1, 2.0 / variance) if variance > 1e-3 else scipy.stats.chi2.sf(11.0, 1)
+    assert white.probability(11.0, along / np.linalg.norm(along)) == pytest.approx(expected, rel=0.02)
 
 
 def test_the_lag_is_where_the_missing_coefficient_stands():
