@@ -56,12 +56,6 @@ PART_NOT_ROBUST = note(
     "experiment within `campaign.power_cap` and `limits` is enough.",
     "Raise `campaign.power_cap` or a limit, or write `campaign.last: nominal`.",
 )
-PART_ALONE = note(
-    "part-alone",
-    "The next part is planned as if there were no data. The data are accurate enough, but tests leave the "
-    "model undecided.",
-    "Apply the part.",
-)
 PART_BETWEEN_MINIMA = note(
     "part-between-minima",
     "The next part separates minima of the likelihood. Other parameters explain the data nearly as "
@@ -91,38 +85,26 @@ def shorter(kind: FindingKind, given: str, plan: str, samples: int, planned: int
 
 
 def hardly_followed(
-    given: str,
-    plan: str,
-    *,
-    likeness: float,
-    spliced: float,
-    like: float,
-    follows: bool,
-    other: str | None,
-    scale: float = 1.0,
+    given: str, plan: str, likeness: float, *, like: float, follows: bool, other: str | None, scale: float
 ) -> list[Finding]:
     """Return a finding if what was applied is not the plan that was due.
 
     Args:
-        likeness: correlation with the plan; `spliced`: with shifted or lost samples put in their places.
-        like: the correlation from which on a record follows its plan.
+        likeness: correlation with the plan; from `like` on a record follows its plan.
         follows: whether the record may be one of the plan.
         other: the file of a plan that the record follows better.
-        scale: at which the plan was applied, if that is not 1 up to chance.
+        scale: at which the plan was applied; 1 up to chance.
     """
-    seen = f"{given} and {plan} have a correlation of {likeness:.2f}"
+    fact = f"{given} and {plan} have a correlation of {likeness:.2f}"
     if other is not None:
-        found = PART_REPEATED.found(f"{given} repeats {other}. {seen}", where=given)
-        more: dict[str, object] = {"other": other}
+        found = PART_REPEATED.when(other, f"{fact}, and {given} repeats {other}", where=given)
     elif scale != 1.0 and abs(likeness) > like:
-        found = RECORD_SCALED.found(f"{given} is {scale:.4g} times {plan}", where=given)
-        more = {"scale": scale}
-    elif likeness > like:
-        return []
+        found = RECORD_SCALED.when(scale, f"{given} is {scale:.4g} times {plan}", where=given)
     else:
-        fact = f"{seen}, and of {spliced:.2f} with shifted or lost samples put in place"
-        found, more = RECORD_UNLIKE_PLAN.found(fact, where=given, severity=NOTE if follows else DOUBT), {}
-    return [replace(found, figures={"plan": plan, "correlation": likeness, "in_step": spliced, **more})]
+        severity = NOTE if follows else DOUBT
+        found = RECORD_UNLIKE_PLAN.when(likeness <= like, fact, where=given, severity=severity)
+    figures = {"plan": plan, "correlation": likeness, "scale": scale, "other": other}
+    return [replace(one, figures=figures) for one in found]
 
 
 @finding(NOTE, "no-estimate-yet", "Apply the next part.")
@@ -142,11 +124,10 @@ def estimate_not_used(kind: FindingKind, share: float | None, why: str) -> list[
         share: of the way from the last estimate to this one; None if no model on the way can be used.
         why: the accuracy cannot be evaluated at this one; empty where its poles are the reason.
     """
-    if share is None:
-        return [kind.found("nor can any model on the way to it from the last one be used", why=why)]
-    reason = why or "its poles are too near to the unit circle, or outside"
-    fact = f"{reason}. The plan is made at {100 * share:.0f} % of the way to it from the last one"
-    return kind.when(share != 1.0, fact, share=share, why=reason)
+    fact = why or "its poles are too near to the unit circle, or outside"
+    way = "no model" if share is None else f"the model at {100 * share:.0f} %"
+    fact = f"{fact}. On the way from the last estimate {way} can be used"
+    return kind.when(share != 1.0, fact, share=share, why=why)
 
 
 @finding(DOUBT, "campaign-doubted", "Check the model structure before you apply more.")
@@ -157,26 +138,20 @@ def campaign_doubted(kind: FindingKind) -> list[Finding]:
 
 @finding(REFUTED, "campaign-refuted", "Try `idesign explore`, or `idesign next DIR --regardless`.")
 def campaign_refuted(
-    kind: FindingKind, directory: Path, samples: int, end: int, records: Sequence[str], *, every: bool
+    kind: FindingKind, directory: Path, samples: int, end: int, records: Sequence[str]
 ) -> list[Finding]:
     """The campaign ends because the data refute the model. More samples would not help.
 
     Args:
         samples: applied, of at most `end`.
-        records: the files that count; `every`: whether none was withdrawn.
+        records: the files that count.
     """
-    listed = " ".join(str(directory / name) for name in (["record_??.csv"] if every else records))
-    return [
-        kind.found(
-            f"see the other notes. {samples} of at most {end} samples were applied",
-            where=str(directory),
-            remedy=f"Look for another structure with `idesign explore {listed}`, or continue with this one: "
-            f"`idesign next {directory} --regardless`.",
-            samples=samples,
-            end=end,
-            records=list(records),
-        )
-    ]
+    listed = " ".join(str(directory / name) for name in records)
+    fact = f"see the other notes. {samples} of at most {end} samples were applied"
+    remedy = f"Look for another structure with `idesign explore {listed}`, or continue with this one: "
+    remedy += f"`idesign next {directory} --regardless`."
+    where, names = str(directory), list(records)
+    return [kind.found(fact, where=where, remedy=remedy, samples=samples, end=end, records=names)]
 
 
 def planned_otherwise(
@@ -188,7 +163,6 @@ def planned_otherwise(
     beyond: bool,
     part_cost: float,
     fragile: bool,
-    alone: bool = False,
     parts: bool = False,
 ) -> list[Finding]:
     """Return findings for a plan that is not as the spec asks.
@@ -200,7 +174,6 @@ def planned_otherwise(
         share: of its power that the part has.
         beyond: whether a sample costs more than the cap; it costs `part_cost`.
         fragile: whether a robust last part was wanted and not found.
-        alone: whether it is planned without the data.
         parts: whether it is to separate minima.
     """
     percent, cost = f"{100 * share:.0f} % of the power of {file}", f"{part_cost:.4g} a sample"
@@ -210,6 +183,5 @@ def planned_otherwise(
         *PART_SCALED.when(share < _NEARLY, percent, where=file, share=share),
         *EARLIER_PARTS_COST.when(beyond, cost, where=file, cost=part_cost),
         *PART_NOT_ROBUST.when(fragile, file, where=file),
-        *PART_ALONE.when(alone, file, where=file),
         *PART_BETWEEN_MINIMA.when(parts, file, where=file),
     ]

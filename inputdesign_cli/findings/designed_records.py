@@ -10,7 +10,6 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.signal.selection import Record
-from inputdesign_cli.signal.settings import Quantiser
 
 _FALLS_SHORT = 5e-3
 _FAR = 0.1  # from the bound over all records, as a share
@@ -32,7 +31,7 @@ RECORD_DEAR = doubt(
     "record-dear",
     "The record costs far more than the spectrum. A short record loses the response after its last sample. "
     "A PRBS has a spectrum of its own.",
-    "Take more samples.",
+    "Take more samples, or another `signal.type`.",
 )
 RECORD_LONGER = note(
     "record-longer",
@@ -62,60 +61,47 @@ def too_short(kind: FindingKind, values: int, fewest: int) -> list[Finding]:
     return kind.when(values < fewest, fact, where="signal.samples", values=values, fewest=fewest)
 
 
-def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
-    """Return a finding if a record misses the accuracy; limits, a level or the length may hold its power."""
+def accuracy_missed(record: Record) -> list[Finding]:
+    """Return a finding if a record misses the accuracy."""
     if not (record.met or np.isfinite(record.worst_ratio)):
         return [RECORD_UNDETERMINED.found(where="signal.samples")]
     fact, ratio = f"its worst ratio is {record.worst_ratio:.7g}", record.worst_ratio
-    remedy = "" if held else "Take more samples: too little of the response comes before the last one."
-    return RECORD_MISSES.when(not record.met, fact, where="signal", remedy=remedy, worst_ratio=ratio)
+    return RECORD_MISSES.when(not record.met, fact, where="signal", worst_ratio=ratio)
 
 
-def length_of_record(
-    record: Record, asked: int, block: int, shares: Mapping[str, float], *, shaped: bool = True
-) -> list[Finding]:
+def requirement_missed(names: Sequence[str], ratio: float) -> list[Finding]:
+    """Return a finding if a record misses a requirement at which its search does not aim."""
+    fact = f"the worst ratio of {' and '.join(names)} is {ratio:.4g}"
+    return RECORD_MISSES.when(ratio > 1.0 + _FALLS_SHORT, fact, where="signal", worst_ratio=ratio)
+
+
+def length_of_record(record: Record, asked: int, block: int) -> list[Finding]:
     """Return a finding if a record is longer than was asked for, or dear for want of samples.
 
     Args:
         asked: its samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
-        shares: of each limit on single samples that it takes.
-        shaped: whether the record has the spectrum of the design; a PRBS has its own.
     """
     size, times = len(record.samples), 1.0 + record.extra_power
     if record.method == "given":
         return []
     if size > asked + block:
-        nearest = max(shares, key=lambda name: shares[name], default=None)
-        share = f". It uses {100 * shares[nearest]:.3g} % of limits.{nearest}" if nearest else ""
-        fact = f"{size} samples, to one per cent, where the spectrum alone needs {asked}{share}"
+        fact = f"{size} samples, to one per cent, where the spectrum alone needs {asked}"
         return [RECORD_LONGER.found(fact, where="signal", samples=size, of_spectrum=asked)]
-    fact = f"{times:.3g} times as much, since "
-    fact += (
-        f"much of the response comes after its {size} samples" if shaped else "its type has another spectrum"
-    )
-    remedy = "" if shaped else "Leave signal.type out, or take multisine or filtered_noise."
     dear = record.extra_power > _DEAR
-    return RECORD_DEAR.when(dear, fact, where="signal.samples", remedy=remedy, times=times)
+    return RECORD_DEAR.when(dear, f"{times:.3g} times as much", where="signal.samples", times=times)
 
 
-@finding(NOTE, "record-less-accurate", "Take more samples, or more candidates (`signal.candidates`).")
-def less_accurate(
-    kind: FindingKind, reached: float, designed: float, *, searched: bool = False
-) -> list[Finding]:
+@finding(NOTE, "record-less-accurate", "Take more samples, candidates or seconds (`signal`), if it matters.")
+def less_accurate(kind: FindingKind, reached: float, designed: float) -> list[Finding]:
     """The record is less accurate than the design. Finite length or limits on samples reduce accuracy.
 
     Args:
         reached, designed: multiples of the admissible error.
-        searched: whether the record was searched, not drawn.
     """
     more = reached / designed - 1.0
     fact = f"it reaches {reached:.4g} times the admissible error, {per_cent(more)} more than {designed:.4g}"
-    remedy = "Take more samples, or let the search take longer (`signal.seconds`)." if searched else ""
-    remedy = "It is below 1, which is enough." if reached <= 1.0 else remedy
-    return kind.when(
-        more > _FALLS_SHORT, fact, where="signal", remedy=remedy, reached=reached, designed=designed
-    )
+    return kind.when(more > _FALLS_SHORT, fact, where="signal", reached=reached, designed=designed)
 
 
 @finding(NOTE, "bound-of-power-only", "Take `signal.hold: auto` if the actuator may keep its values as long.")
@@ -127,18 +113,9 @@ def short_windows(kind: FindingKind, seen: int, remembered: float, distance: flo
         remembered: the slowest time constant of the plant in samples.
         distance: of the record from the bound, as a share.
     """
-    helps = int(np.ceil(0.1 * remembered)) if np.isfinite(remembered) else None
     fact = f"the slowest time constant is {remembered:.3g} samples, and a window of the bound has {seen}"
-    fact += f". A `signal.hold` of about {helps} would see it all" if helps else ""
     far = distance is not None and distance > _FAR and remembered > seen
-    return kind.when(far, fact, where="signal.hold", seen=seen, hold=helps, distance=distance)
-
-
-@finding(DOUBT, "record-misses-requirement", "Take more samples, or loosen the requirement.")
-def requirement_missed(kind: FindingKind, names: Sequence[str], ratio: float) -> list[Finding]:
-    """The record misses a requirement that the design meets. Its search aims at another requirement."""
-    fact = f"the worst ratio of {' and '.join(names)} is {ratio:.4g}"
-    return kind.when(ratio > 1.0 + _FALLS_SHORT, fact, where="signal", worst_ratio=ratio)
+    return kind.when(far, fact, where="signal.hold", seen=seen, distance=distance)
 
 
 @finding(
@@ -154,10 +131,8 @@ def start_matters(kind: FindingKind, growth: float) -> Finding:
     Args:
         growth: the factor by which errors grow if the start is not known.
     """
-    if not np.isfinite(growth):
-        fact = "otherwise the record does not determine all parameters"
-        return kind.found(fact, where="signal", growth=None)
-    return kind.found(f"otherwise errors are {growth:.3g} times as large", where="signal", growth=growth)
+    fact = f"otherwise errors are {growth:.3g} times as large"
+    return kind.found(fact, where="signal", growth=growth if np.isfinite(growth) else None)
 
 
 @finding(
@@ -179,44 +154,14 @@ def noise_moves_input(kind: FindingKind, deviations: Array, peaks: Sequence[floa
     return kind.when(seen, fact, where="limits.amplitude", deviations=deviations.tolist())
 
 
-@finding(NOTE, "level-rounded", "State `signal.offset` at a value of the converter, or give it more bits.")
-def level_rounded(kind: FindingKind, quantisers: Sequence[Quantiser], peak: float) -> list[Finding]:
-    """The record moves about another level than signal.offset. A converter has only values of its own.
+def other_signal(kind: str, power: float | None = None) -> Finding:
+    """Return the finding that a record is of another kind or spectrum than the first choice.
 
     Args:
-        quantisers: one an input, in a converter's own units.
-        peak: the largest move from the level; a shift of a small share of it is not worth a note.
-    """
-    return [
-        kind.found(
-            f"input {j} stands at {one.operating_point:.6g} in place of {one.offset:.6g}",
-            where="signal.offset",
-            level=one.operating_point,
-            offset=one.offset,
-        )
-        for j, one in enumerate(quantisers, start=1)
-        if abs(one.operating_point - one.offset) > _SEEN * peak
-    ]
-
-
-def other_signal(kind: str) -> Finding:
-    """Return the finding that a record is of another kind than the first choice."""
-    return OTHER_SIGNAL.found(f"it is {kind}", where="signal.type", kind=kind)
-
-
-def other_spectrum(asked: str, kind: str, limits: Sequence[str], power: float | None, goal: str) -> Finding:
-    """Return the finding that another record stands in for one that was not found.
-
-    Args:
-        asked: the kind of signal that was asked for; `kind`: that of the record.
-        limits: the keys that the record keeps.
         power: the limit on the input power that gives its spectrum; None if that is the designed one.
-        goal: of the design.
     """
-    first = f"no record of {asked} with the {'cheapest' if goal == 'cost' else 'designed'} spectrum meets"
-    another = "that spectrum" if power is None else f"that of limits.input_power: {power:.4g}"
-    fact = f"{first} the accuracy within {' and '.join(limits)}. It is {kind} with {another}"
-    return OTHER_SIGNAL.found(fact, where="signal.type", kind=kind, input_power=power)
+    spectrum = "" if power is None else f", with the spectrum of limits.input_power: {power:.4g}"
+    return OTHER_SIGNAL.found(f"it is {kind}{spectrum}", where="signal.type", kind=kind, input_power=power)
 
 
 def level_notes(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -28,13 +28,11 @@ _SUPPORT = 1e-3
 
 
 @finding(NOTE, "no-excitation-needed", "Use a record of normal operation, or ask for more accuracy.")
-def nothing_needed(kind: FindingKind, experiment: Experiment, *, at_every_plant: bool) -> Finding:
+def nothing_needed(kind: FindingKind, experiment: Experiment) -> Finding:
     """No excitation is needed. Noise in normal operation or prior knowledge meets the required accuracy."""
     sources = ["the noise in normal operation"] if experiment.loop is not None else []
     sources += ["experiment.prior"] if experiment.prior is not None else []
-    kept = " at every plant that is not left out" if at_every_plant else ""
-    fact = f"the information of {' and '.join(sources) or 'the noise'} meets the accuracy{kept}"
-    return kind.found(fact, sources=sources)
+    return kind.found(f"the information of {' and '.join(sources) or 'the noise'} is enough", sources=sources)
 
 
 @finding(DOUBT, "input-without-power", "Take criterion D, A or E, which need information on every parameter.")
@@ -146,8 +144,8 @@ def limits_not_kept(
     power: Powers,
     signal: Signal | None = None,
     bounds: Bounds = Bounds(),
-) -> Iterator[Finding]:
-    """Yield a finding for each limit that the excitation does not keep.
+) -> list[Finding]:
+    """Return a finding for each limit that the excitation does not keep.
 
     Args:
         limits: on powers.
@@ -156,31 +154,26 @@ def limits_not_kept(
         signal: the statements about its record, whose samples have the `bounds`; None without one.
     """
     channels = {"input": power.input, "output": power.output, "excitation": power.excitation}
+    kept: list[tuple[str, str, float, float, bool]] = []  # key, channel, value, limit, whether an upper one
     for limit in limits:
-        found, most = channels[limit.kind] or (), limit.bound
-        value, of = sum(found), str(limit.kind)
-        if limit.channel is not None:
-            value, of = found[limit.channel], f"{limit.kind} {limit.channel + 1}"
-        beyond = value / most if limit.upper else most / max(value, 1e-300)
-        fact = f"the power of {of} is {value:.6g}, {'above' if limit.upper else 'below'} {most:.6g}"
-        if beyond > 1.0 + _ROUNDING:
-            yield _broken(limit.key, fact, value=value, limit=most)
+        values = channels[limit.kind] or ()
+        value = sum(values) if limit.channel is None else values[limit.channel]
+        of = "" if limit.channel is None else f"{limit.channel + 1}"
+        kept.append((limit.key, of, value, limit.bound, limit.upper))
     for key, bound, peaks in (
         ("limits.amplitude.input", bounds.amplitude, None if signal is None else signal.input_peak),
         ("limits.amplitude.output", bounds.output, None if signal is None else signal.output_peak),
         ("limits.rate", bounds.rate, None if signal is None else signal.input_move),
     ):
-        each = [] if bound is None or peaks is None else bound.tolist()
-        for channel, (value, most) in enumerate(zip(peaks or (), each, strict=False), start=1):
-            of = f" in channel {channel}" if len(each) > 1 else ""
-            if value > most * (1.0 + _ROUNDING):
-                fact = f"the record reaches {value:.6g}{of}, above {most:.6g}"
-                yield _broken(key, fact, value=value, limit=most, channel=channel)
-    if longest is not None and samples > longest:
-        fact = f"the experiment has {samples} samples, more than {longest}"
-        yield _broken("limits.samples", fact, value=samples, limit=longest)
-
-
-def _broken(key: str, fact: str, **figures: object) -> Finding:
-    said = f"{key} is not kept, {fact}"
-    return LIMIT_NOT_KEPT.found(said, where=key, remedy="", severity=None, **figures)
+        each = [] if bound is None else bound.tolist()
+        pairs = enumerate(zip(peaks or (), each, strict=False), start=1)
+        kept += [(key, f"{j}", value, most, True) for j, (value, most) in pairs]
+    if longest is not None:
+        kept.append(("limits.samples", "", samples, longest, True))
+    found = []
+    for key, channel, value, most, upper in kept:
+        beyond = value / most if upper else most / max(value, 1e-300)
+        of = f" of channel {channel}" if channel else ""
+        fact = f"{key}{of} is {most:.6g}, and the excitation has {value:.6g}"
+        found += LIMIT_NOT_KEPT.when(beyond > 1.0 + _ROUNDING, fact, where=key, value=value, limit=most)
+    return found

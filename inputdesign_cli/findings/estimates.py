@@ -5,18 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.finding import DOUBT, NOTE, UNDECIDED, Finding, FindingKind, finding
-from inputdesign_cli.findings.refuted_structure import quantities
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.outcome.model_words import blocks_of, predictor_of
+from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 
 # Of a standard deviation: nearer to where an expression ends, an estimate was stopped there.
 _ASIDE = 0.001
-# A first residual beyond this number of standard deviations is reported.
-_SEEN_AT_ONCE = 3.0
-_NORMAL = 1.96  # 95 % of a Gaussian estimate
 
 
 def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
@@ -63,46 +60,32 @@ def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list
 @finding(
     NOTE, "short-record", "Take a longer record for smaller ones. Accuracy is judged by simulated estimates."
 )
-def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int, *, none: bool) -> list[Finding]:
+def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int) -> list[Finding]:
     """The errors of the estimate are larger than first-order theory states, as the record is short.
 
     Records of the estimated model were simulated and estimated again. The factor is how much farther those
     estimates scatter.
     """
-    times = f"{factor:.3g} times for the plant, {of_noise:.3g} times for the noise"
-    fact = f"{times}, by {runs} simulated records"
-    if none:  # nothing was measured: the numbers say only that they are large
-        fact = f"most of {runs} simulated records give no estimate, so that {factor:.3g} times is taken"
+    fact = (
+        f"{factor:.3g} times for the plant, {of_noise:.3g} times for the noise, by {runs} simulated records"
+    )
     return [kind.found(fact, factor=factor, of_noise=of_noise, runs=runs)]
 
 
 @finding(
     NOTE,
     "start-estimated",
-    "If the plant was at rest before, `identify` and `assess` are more accurate with its levels as "
+    "If the plant was at rest before, `identify` and `assess` are more accurate with its exact levels as "
     "--operating-point.",
 )
-def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Finding]:
-    """The initial state of a record was estimated too. To estimate it, and the levels, costs accuracy.
-
-    Args:
-        levels: whether the user gave the level of an output.
-    """
-    if not estimate.start.free:
-        return []
-    remedy = kind.remedy
-    if levels:
-        remedy = "The record does not begin at rest, or levels of --operating-point are not exact."
-    if not estimate.start.rest_refuted:
-        return [] if levels else [kind.found("whether it begins at rest was not asked")]
+def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
+    """The initial state of a record was estimated too. To estimate it, and the levels, costs accuracy."""
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
-    fact = "the first residuals together are larger than the noise explains"
-    if np.max(ratio) > _SEEN_AT_ONCE:
-        fact = f"a first residual is {first:.3g}, and the noise {noise:.3g}"
+    fact = f"from rest the first residual would be {first:.3g}, and the noise {noise:.3g}"
     where = f"y{output + 1}"
-    return [kind.found(fact, where=where, remedy=remedy, first_residual=first, noise=noise)]
+    return kind.when(estimate.start.free, fact, where=where, first_residual=first, noise=noise)
 
 
 @finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")
@@ -124,23 +107,12 @@ def on_the_circle(kind: FindingKind, model: Model, estimate: Estimate) -> list[F
     "Lower the order of a polynomial. For a physical quantity take more data, or list it in `plant.known` "
     "if it is known.",
 )
-def near_zero(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
+def near_zero(kind: FindingKind, estimate: Estimate) -> list[Finding]:
     """A parameter may be zero. Zero lies within one standard deviation of its estimate."""
     deviations = np.sqrt(np.diag(estimate.covariance))
-    vague = np.flatnonzero(deviations > np.abs(estimate.theta))
-    quantity, found = quantities(model), []
-    delays = model.dead_times[vague]
-    for physical, remedy in (
-        (True, "The data hardly determine it. Take more of them, or list what is known in plant.known."),
-        (False, "Nothing need be done: a polynomial of one order less may do as well."),
-    ):
-        listed = ", ".join(estimate.names[k] for k in vague[~delays] if quantity[k] == physical)
-        found += kind.when(listed, listed, where=listed, remedy=remedy)
-    for k in vague[delays]:
-        most, name = float(estimate.theta[k] + _NORMAL * deviations[k]), estimate.names[k]
-        fact = f"{name}, a dead time of at most {most:.3g} (95 %)"
-        found.append(kind.found(fact, where=name, remedy="Nothing", at_most=most))
-    return found
+    vague = np.flatnonzero(deviations > np.abs(estimate.theta)).tolist()
+    listed = ", ".join(f"{estimate.names[k]} +- {deviations[k]:.2g}" for k in vague)
+    return kind.when(listed, listed, where=", ".join(estimate.names[k] for k in vague))
 
 
 @finding(NOTE, "input-taken-as-band-limited", "If the input is held in between, write `plant.sample: zoh`.")
@@ -181,10 +153,6 @@ def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> 
     if probability is None:
         return []
     noise = {letter: rows for letter, rows in blocks_of(model)["noise"].items() if letter in ("C", "D")}
-    orders = [
-        f"{letter} of order {max(len(row) for row in (rows if isinstance(rows[0], list) else [rows])) - 1}"
-        for letter, rows in noise.items()
-    ]
-    fact = f"{' and '.join(orders)}, since the residuals with that of the spec were not white"
     stated = ", ".join(f"{letter}: {rows}" for letter, rows in noise.items())
+    fact = f"{stated}. The probability of the residuals with that of the spec is {chance(probability)}"
     return [kind.found(fact, where="noise", probability=probability, noise=stated)]

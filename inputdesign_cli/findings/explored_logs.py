@@ -18,6 +18,7 @@ from inputdesign_cli.explore import (
 )
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.rivals import most_apart
+from inputdesign_cli.identification.adequacy import failed
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
@@ -53,18 +54,15 @@ def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
 
 @finding(DOUBT, "input-only-answers", "Move the reference of the loop, or add dither to the input.")
 def undriven(kind: FindingKind, parts: Parts) -> list[Finding]:
-    """An input follows from the outputs alone. The inverse of the controller explains the data as well."""
-    inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
+    """An input follows from the outputs alone. The inverse of the controller explains the data as well.
+
+    A controller has a reference at rest, or one column was computed from the other.
+    """
     found = []
     for j in only_answers(parts):
-        name = signal_name("u", j, inputs)
+        name, same = signal_name("u", j, parts[0][0].shape[1]), exact_multiple(parts, j)
         fact = f"{name}, and the plant is not identifiable"
-        if same := exact_multiple(parts, j):
-            output, factor = signal_name("y", same[0], outputs), same[1]
-            fact = (
-                f"{name} is {factor:.4g} {output} in every row, but for a level. A proportional controller "
-                "has a reference at rest, or one column was computed from the other"
-            )
+        fact += f": it is {same[1]:.4g} y{same[0] + 1} in every row, but for a level" if same else ""
         found.append(kind.found(fact, where=name))
     return found
 
@@ -91,10 +89,7 @@ def _too_simple(kind: FindingKind, found: Found, moving: Parts) -> list[Finding]
     needed = max(candidate.orders.unknowns for candidate in found.taken)
     order = order_of_excitation(moving)
     if order < needed:
-        single = [[(u[:, [j]], y) for u, y in moving] for j in range(len(found.moving))]
-        together = min(map(order_of_excitation, single)) >= needed
-        why = "the inputs move together" if together else "the input moves too simply"
-        fact = f"{why}, persistently exciting of order {order}, and the model needs {needed}"
+        fact = f"persistently exciting of order {order}, alone or together, and the model needs {needed}"
         return [kind.found(fact, order=order, needed=needed)]
     left, j = min(zip(left_of_inputs(moving), found.moving, strict=True))
     fact = f"u{j + 1} follows from the other inputs and their pasts but for {100.0 * left:.2g} % of its power"
@@ -104,21 +99,15 @@ def _too_simple(kind: FindingKind, found: Found, moving: Parts) -> list[Finding]
 @finding(DOUBT, "parameter-undetermined", "Move that input more, or leave it out with `--columns`.")
 def _open(kind: FindingKind, found: Found) -> list[Finding]:
     """The record does not determine a parameter. Its deviation is many times its value."""
-    named = open_parameters(found, _UNDETERMINED)
-    return kind.when(named, ", ".join(named), where="".join(named[:1]).split(" = ")[0])
-
-
-def open_parameters(found: Found, share: float = 1.0) -> list[str]:
-    """Return parameters of plants in s (no dead times) that deviate by more than a share of their value."""
     estimate, model = found.estimate, found.model
     if not all(candidate.orders.physical for candidate in found.taken):
         return []
     deviations = np.sqrt(np.diag(estimate.covariance))
-    open_ = model.in_plant & ~model.dead_times & ~(deviations <= share * np.abs(estimate.theta))
-    return [
-        f"{estimate.names[k]} = {estimate.theta[k]:.3g} +- {deviations[k]:.2g}"
-        for k in np.flatnonzero(open_).tolist()
+    open_ = model.in_plant & ~model.dead_times & ~(deviations <= _UNDETERMINED * np.abs(estimate.theta))
+    named = [
+        f"{estimate.names[k]} = {estimate.theta[k]:.3g} +- {deviations[k]:.2g}" for k in np.flatnonzero(open_)
     ]
+    return kind.when(named, ", ".join(named), where="".join(named[:1]).split(" = ")[0])
 
 
 def doubtful_model(
@@ -131,7 +120,7 @@ def doubtful_model(
         step, unit: the sample time.
         integrates: whether the user says that the plant is an integrator.
     """
-    unstable = _unstable(parts, step, unit)
+    unstable = _unstable(parts)
     if unstable:  # what stable models say of such a plant is wrong
         return unstable
     return [
@@ -156,22 +145,17 @@ def _unjudged(kind: FindingKind, found: Found) -> list[Finding]:
 
 @finding(DOUBT, "simulation-explains-little", "Move the inputs more, or record for longer.")
 def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
-    """The simulation explains next to nothing. Chance would explain as much of the validation part."""
+    """The simulation explains next to nothing. Chance would explain as much of the validation part.
+
+    Of an output that wanders, the inputs do not help to predict what is new from sample to sample.
+    """
     unseen, doubtful = int(np.sum(found.validation.counted)), []
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
         output = signal_name("y", i, found.model.outputs)
         luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
         # What wanders leaves any simulation; what is new in it from sample to sample does not wander.
         little = not found.helped[i] > 0.0 if found.wanders[i] else fit < max(LEAST_FIT, luck)
-        fact = (
-            f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone. The inputs "
-            f"hardly act, or by more than {chosen.swept.most} samples later"
-        )
-        if found.wanders[i]:
-            fact = (
-                f"{output} wanders, and the inputs do not help to predict it from sample to sample. That the "
-                f"simulation explains {fit:.1f} % may be chance"
-            )
+        fact = f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone"
         doubtful += kind.when(little, fact, where=output, fit_percent=fit, chance_percent=luck)
     return doubtful
 
@@ -201,10 +185,10 @@ def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
     be nonlinear or change, or have unrecorded inputs.
     """
     # Enough samples refute every model of a real plant, and a poor fit alone may be strong noise.
-    failed = {test.name: test for test in found.estimate.tests.failed}
-    if not all(failed.keys() & names for names in _TESTS):
+    failing = {test.name: test for test in failed(found.estimate.tests.scores)}
+    if not all(failing.keys() & names for names in _TESTS):
         return []
-    least, doubtful = min(test.probability for test in failed.values()), []
+    least, doubtful = min(test.probability for test in failing.values()), []
     for i, fit in enumerate(found.validation.simulation):
         output = signal_name("y", i, found.model.outputs)
         fact = f"the best simulation explains {fit:.1f} % of {output} (tests: probability {chance(least)})"
@@ -272,25 +256,21 @@ def _rivalled(kind: FindingKind, found: Found) -> list[Finding]:
     return []
 
 
-@finding(DOUBT, "plant-unstable", "Identify the plant with its loop: `idesign identify DATA --spec SPEC`.")
-def _unstable(kind: FindingKind, parts: Parts, step: float, unit: str) -> list[Finding]:
+@finding(
+    DOUBT,
+    "plant-unstable",
+    "Identify the plant with its loop: `idesign identify DATA --spec SPEC`. SPEC states A with this pole and "
+    "the controller.",
+)
+def _unstable(kind: FindingKind, parts: Parts) -> list[Finding]:
     """The plant is unstable. It has a pole outside the unit circle, and only stable models are searched."""
     outputs, found = parts[0][1].shape[1], []
-    clock = f"sample_time: {step:.6g}{'' if unit == 's' else f', time_unit: {unit}'}"
     for i in range(outputs):
         unstable, output = unstable_pole(parts, i), signal_name("y", i, outputs)
-        if unstable is None:
-            continue
-        pole, deviation = unstable
-        below = np.poly([pole, pole.conjugate()] if pole.imag else [pole]).real
-        A = ", ".join(f"{a:.4g}" for a in below)
-        B = ", ".join(["0", "1", "1"][: below.size])
-        radius = abs(pole)
-        remedy = (
-            f"Identify it with its loop: idesign identify DATA --spec SPEC. In SPEC write {clock}, plant: "
-            f"{{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and the controller as it was, "
-            "experiment: {controller: {numerator: [..], denominator: [..]}}. Raise orders where tests fail"
-        )
-        fact = f"{output} has a pole at a radius of {radius:.4g} +- {deviation:.1g}"
-        found.append(kind.found(fact, where=output, remedy=remedy, radius=radius, deviation=deviation))
+        if unstable is not None:
+            pole, deviation = unstable
+            A = ", ".join(f"{a:.4g}" for a in np.poly([pole, pole.conjugate()] if pole.imag else [pole]).real)
+            radius = abs(pole)
+            fact = f"{output} has a pole at a radius of {radius:.4g} +- {deviation:.1g}, A: [{A}]"
+            found.append(kind.found(fact, where=output, radius=radius, deviation=deviation))
     return found

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, Severity, doubt
+from inputdesign_cli.finding import Finding, doubt
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.levels import level
 from inputdesign_cli.outcome import Nominal
@@ -127,30 +127,13 @@ def far_from_nominal(distance: Distance) -> list[Finding]:
     found, another = distance.nominal, distance.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
         return []
-    kind, fact = FAR, f"the parameters of G are {found.deviations:.3g} standard deviations away"
-    if another:
-        sign = ", and has the opposite sign at low frequency" if found.opposite_sign else ""
-        kind = ANOTHER
-        fact = f"{distance.place} differs by {100 * distance.share:.0f} % of the larger one{sign}"
-    statistic = f"chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom"
-    fact = f"{fact} ({'; '.join((statistic, *distance.listed))})"
+    kind = ANOTHER if another else FAR
+    sign = ", with the opposite sign at low frequency" if found.opposite_sign else ""
+    apart = f"{found.deviations:.3g} standard deviations apart{sign}"
+    if distance.share:
+        apart += f"; {distance.place} differs by {100 * distance.share:.0f} % of the larger one"
+    fact = "; ".join((apart, *distance.listed))
     return [kind.found(fact, where="plant", deviations=found.deviations, probability=found.probability)]
-
-
-def of_first_part(distance: Distance) -> list[Finding]:
-    """Return a note if the first of several parts finds a plant far from the spec's, as it may."""
-    found = distance.nominal
-    sign = ", and G has the opposite sign at low frequency: check the signs of the record"
-    fact = f"{found.deviations:.3g} standard deviations{sign if found.opposite_sign else ''}"
-    return FAR.when(
-        found.probability <= level("far from nominal"),
-        fact,
-        where="plant",
-        remedy="From now on plans rest on the estimates.",
-        severity=Severity.NOTE,
-        deviations=found.deviations,
-        probability=found.probability,
-    )
 
 
 def _apart(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import NOTE, REFUTED, Finding, FindingKind, finding, refuted
 from inputdesign_cli.findings.outlying_values import visible_step
-from inputdesign_cli.findings.places import SHOWN, Record, file_of, of_file, places, rows_of, without_option
+from inputdesign_cli.findings.places import Record, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.faults import frozen, shifted, spikes
@@ -29,13 +29,13 @@ SPIKES = refuted(
     "spikes",
     "A few samples dominate the residuals. They hold most of the sum of squares of an output. They are "
     "measurement spikes, or events that the model does not describe.",
-    "Leave out faulty rows with `--without`, which cuts the record there.",
+    "Leave out faulty rows, which cuts the record there: `--without ROWS`.",
 )
 FROZEN = refuted(
     "sensor-stands-still",
     "An output stands still while the input moves. It keeps its value for longer than rounding explains. "
     "The sensor is frozen or saturated, or the logger repeats its last value.",
-    "Leave these rows out with `--without`, which cuts the record there.",
+    "Leave these rows out, which cuts the record there: `--without ROWS`.",
 )
 
 COARSE = refuted(
@@ -48,37 +48,29 @@ COARSE = refuted(
 
 def faults(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
     """Return a finding for each output and kind of fault, with its rows."""
-    found = []
+    found, samples = [], len(estimate.errors)
     for one in spikes(estimate.errors):
-        if follows_inputs(estimate.errors[list(one.samples), one.output], one.samples, data.u):
-            continue
-        rows, name = rows_of(data, [(at, at) for at in one.samples]), _named(units, one.output)
-        fact = (
-            f"{len(one.samples)} of {len(estimate.errors)} samples of {name} hold {100.0 * one.share:.3g} % "
-            f"of the squares (at {places(units, data, one.samples)})"
-        )
-        option = without_option(rows)
-        remedy = f"Leave out rows that are faults of measurement: {option}."
-        times, at = [float(data.time[at]) for at in one.samples], [row for _, row, _ in rows]
-        found.append(
-            SPIKES.found(
-                fact, where=name, remedy=remedy, share=one.share, times=times, rows=at, option=option
-            )
-        )
+        if not follows_inputs(estimate.errors[list(one.samples), one.output], one.samples, data.u):
+            name = signal_name("y", one.output, units.outputs)
+            share = f"{len(one.samples)} of {samples} samples of {name} hold {100.0 * one.share:.3g} %"
+            fact = f"{share} of the squares, at {places(units, data, one.samples)}"
+            rows = rows_of(data, [(at, at) for at in one.samples])
+            found.append(_on_rows(SPIKES, rows, fact, name, share=one.share))
     for output, runs in _still(estimate, data).items():
-        rows, name = rows_of(data, runs), _named(units, output)
-        still = sum(last - first + 1 for first, last in runs)
-        listed = ", ".join(
-            f"rows {first} to {last}{of_file(data, at)}"
-            for (at, _), (_, first, last) in zip(runs[:SHOWN], rows, strict=False)
-        )
-        more = ", .." * (len(runs) > SHOWN)
-        fact = f"{name} keeps its value for {still} of {len(data.y)} samples ({listed}{more})"
-        option = without_option(rows)
-        remedy = f"Leave these rows out, which cuts the record there: {option}."
-        span = [[first, last] for _, first, last in rows]
-        found.append(FROZEN.found(fact, where=name, remedy=remedy, samples=still, rows=span, option=option))
+        name, still = signal_name("y", output, units.outputs), sum(last - first + 1 for first, last in runs)
+        begins = places(units, data, [first for first, _ in runs])
+        fact = f"{name} keeps its value for {still} of {samples} samples, from {begins}"
+        found.append(_on_rows(FROZEN, rows_of(data, runs), fact, name, samples=still))
     return [*found, *_coarse(units, estimate, data)]
+
+
+def _on_rows(
+    kind: FindingKind, runs: Sequence[tuple[str, int, int]], fact: str, where: str = "", **figures: object
+) -> Finding:
+    """Return a finding on runs of rows (file, first and last), with the option that leaves them out."""
+    option, rows = without_option(runs), [[first, last] for _, first, last in runs]
+    remedy = kind.remedy.replace("--without ROWS", option)
+    return kind.found(fact, where=where, remedy=remedy, severity=None, rows=rows, option=option, **figures)
 
 
 def _coarse(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
@@ -94,11 +86,8 @@ def _coarse(units: Units, estimate: Estimate, data: Record) -> list[Finding]:
         left = float(np.var(data.y[:, output] - simulated))
         noise = float(np.sqrt(max(left - step**2 / 12.0, 0.0)))
         error = rounding_error(step, noise)
-        name = _named(units, output)
-        fact = (
-            f"{name} in steps of {step:.3g}, and noise of about {noise:.2g}. Levels may be wrong by "
-            f"{error:.2g}, {100.0 * error / spread:.2g} % of the deviation of {name}"
-        )
+        name = signal_name("y", output, units.outputs)
+        fact = f"{name} in steps of {step:.3g}, and noise of about {noise:.2g}. Levels may be {error:.2g} off"
         off = error > _ROUNDED_OFF * spread
         found += COARSE.when(off, fact, where=name, step=step, noise=noise, error=error)
     return found
@@ -129,7 +118,7 @@ def biasing(units: Units, estimate: Estimate, data: Record, fitted: Sequence[flo
     Args:
         fitted: (p,), per cent of each output that the simulation explains.
     """
-    fits = {_named(units, output): fit for output, fit in enumerate(fitted)}
+    fits = {signal_name("y", output, units.outputs): fit for output, fit in enumerate(fitted)}
     matters = {
         COARSE.code: lambda one: True,
         SPIKES.code: lambda one: fits[one.where] < _HALF,
@@ -145,19 +134,14 @@ def loop_faults(kind: FindingKind, controller: TransferMatrix | None, data: Reco
         return []
     found = {}
     for one in shifted(controller, data.u, data.y, data.r, data.lengths):
-        several = data.u.shape[1] > 1 and one.letter != "y"
-        name = f"{one.letter}{one.channel + 1}" if several else one.letter
-        count = abs(one.lag)
+        name = signal_name(one.letter, one.channel, 1 if one.letter == "y" else data.u.shape[1])
+        count, way = abs(one.lag), "late" if one.lag > 0 else "early"
         fact = (
-            f"{name} is {count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}. u = r - C y "
-            f"leaves {100 * one.left:.3g} % of u unexplained, and {100 * one.then:.2g} % with {name} shifted"
+            f"{name} is {count} sample{'s' * (count > 1)} {way}. u = r - C y leaves {100 * one.left:.3g} % "
+            f"of u unexplained, and {100 * one.then:.2g} % with {name} shifted"
         )
-        found[fact] = kind.found(fact, where=name, lag=one.lag, left=one.left, then=one.then)
+        found[name] = kind.found(fact, where=name, lag=one.lag, left=one.left, then=one.then)
     return list(found.values())
-
-
-def _named(units: Units, output: int) -> str:
-    return f"y{output + 1}" if units.outputs > 1 else "y"
 
 
 def _still(estimate: Estimate, data: Record) -> dict[int, list[tuple[int, int]]]:
@@ -172,55 +156,38 @@ def _still(estimate: Estimate, data: Record) -> dict[int, list[tuple[int, int]]]
 @finding(
     REFUTED,
     "level-shift",
-    "Leave those rows out with `--without`, or record what changed as a further input.",
+    "Leave the shift out: `--without ROWS`; or record what changed as a further input.",
 )
 def shifted_levels(kind: FindingKind, estimate: Estimate, data: Record, time_unit: str) -> list[Finding]:
     """An output shifts without an input. A load or the gain may have changed."""
     if not estimate.tests.shifted or data.recorded is None:
         return []
-    every = np.arange(len(data.y))
-    what, runs = _described(estimate.tests.shifted, data, data.recorded.rows, every, time_unit)
-    option = without_option(runs)
-    remedy = f"Leave the shift out: {option}; or record what changed as a further input."
-    rows = [[first, last] for _, first, last in runs]
-    probability = chance_of_shifts(estimate.tests.shifted)[0]
-    return [kind.found(what, remedy=remedy, probability=probability, rows=rows, option=option)]
+    return [_shifts(kind, data, estimate.tests.shifted, np.arange(len(data.y)), time_unit)]
 
 
 @finding(NOTE, "shifts-left-out", "Leave the same rows out for identify and assess: `--without ROWS`.")
 def left_out(
-    kind: FindingKind,
-    log: Record,
-    shifts: Sequence[LevelShift],
-    samples: NDArray[np.int64],
-    time_unit: str,
-    *,
-    short: int,
+    kind: FindingKind, log: Record, shifts: Sequence[LevelShift], samples: NDArray[np.int64], time_unit: str
 ) -> Finding:
     """Shifts of an output were left out, and each part has its own level. A load may have changed.
 
+    Too short segments next to them are left out as well.
+
     Args:
         samples: positions in the log of the samples by which the shifts are numbered.
-        short: how many more samples were left out, since the parts next to the shifts were too short.
     """
-    rows = np.arange(len(log.y)) if log.recorded is None else log.recorded.rows
-    what, runs = _described(shifts, log, rows, samples, time_unit)
-    listed = " and ".join(f"{first} to {last}{f' of {name}' if name else ''}" for name, first, last in runs)
-    besides = f", and {short} samples next to them, too few for a segment" if short else ""
-    option = without_option(runs)
-    fact = f"{what} (a change of load, or of the gain?). Rows {listed}{besides}"
-    remedy = f"Leave the same rows out for identify and assess: {option}."
-    return kind.found(fact, remedy=remedy, rows=[[first, last] for _, first, last in runs], option=option)
+    return _shifts(kind, log, shifts, samples, time_unit)
 
 
-def _described(
-    shifts: Sequence[LevelShift],
+def _shifts(
+    kind: FindingKind,
     record: Record,
-    rows: NDArray[np.int64],
+    shifts: Sequence[LevelShift],
     samples: NDArray[np.int64],
     time_unit: str,
-) -> tuple[str, list[tuple[str, int, int]]]:
-    """Return what shifts when, and the file and rows of each shift."""
+) -> Finding:
+    """Return a finding that says what shifts when, with the rows of each shift."""
+    rows = np.arange(len(record.y)) if record.recorded is None else record.recorded.rows
     events, runs = [], []
     for shift in sorted(shifts, key=lambda one: one.sample):
         at, first, last = samples[[shift.sample, shift.begins, shift.ends - 1]].tolist()
@@ -230,5 +197,6 @@ def _described(
             f"({record.time[at]:.6g} {time_unit})"
         )
         runs.append((file_of(record.files, at), int(rows[first]), int(rows[last])))
-    probability = chance(chance_of_shifts(shifts)[0])
-    return f"{' and '.join(events)}, which no input explains (probability {probability} by chance)", runs
+    probability = chance_of_shifts(shifts)
+    fact = f"{' and '.join(events)}, which no input explains (probability {chance(probability)} by chance)"
+    return _on_rows(kind, runs, fact, probability=probability)

@@ -52,9 +52,10 @@ BIASED = doubt(
 @finding(NOTE, "response-without-model", "Compare it with the model in `frequency_response.png`.")
 def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
     """The frequency response was measured without a model. Even a right model misses 5 % of the discs."""
-    entries = "" if of.entries == 1 else f", counted over {of.entries} entries of G"
-    outside, by = of.model_outside or 0.0, ", measured from the reference r" if of.excitation == "r" else ""
-    fact = f"the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies{entries}{by}"
+    outside = of.model_outside or 0.0
+    fact = (
+        f"from {of.excitation}, the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies"
+    )
     found = kind.found(fact, where="frequency_response.csv", model_outside=outside)
     return [found, *BIASED.when(of.caveat, where="r")]
 
@@ -245,41 +246,30 @@ def nonlinear_response(
     """
     if found is None:
         return []
-    frequency, severity, remedy = float(w[found.line]), NOTE, "Nothing"
+    frequency, p = float(w[found.line]), found.probability
     fact = f"about {found.share:.2g} of the admissible error, at {frequency:.3g} {units.per_time}"
-    if found.matters:
-        severity, remedy = DOUBT if decided else UNDECIDED, ""
-        fact += f", by the cube of {found.cubed}" if found.cubed else ""
-        fact += f" (probability of chance {found.probability:.2g})"
-    share, cubed, p = found.share, found.cubed or None, found.probability
-    figures = {"share": share, "frequency": frequency, "cubed": cubed, "probability": p}
-    return [replace(kind.found(fact, severity=severity, remedy=remedy), figures=figures)]
+    fact += f", by the cube of {found.cubed}" if found.cubed else ""
+    severity = NOTE if not found.matters else DOUBT if decided else UNDECIDED
+    figures = {"share": found.share, "frequency": frequency, "cubed": found.cubed or None, "probability": p}
+    said = kind.found(f"{fact} (probability of chance {p:.2g})", severity=severity)
+    return [replace(said, figures=figures)]
 
 
-@finding(UNDECIDED, "spiked-periods", "Empty the faulty cells, and assess again.", "spikes")
+@finding(
+    UNDECIDED, "spiked-periods", "Empty the faulty cells, and assess again; of two periods, both.", "spikes"
+)
 def spiked_periods(
-    kind: FindingKind,
-    units: Units,
-    found: Sequence[Spikes],
-    places: Sequence[str],
-    samples: int,
-    periods: int,
+    kind: FindingKind, units: Units, found: Sequence[Spikes], places: Sequence[str]
 ) -> list[Finding]:
     """A few samples dominate the differences between periods. No verdict is possible.
 
     Args:
         places: where the samples of each of them stand, in words.
-        samples: of the record.
-        periods: of the same phase; of two nobody knows which one is wrong.
     """
-    either = ", one of each two a period apart" if periods == 2 else ""
     spiked = []
     for one, place in zip(found, places, strict=True):
         name = signal_name("y", one.output, units.outputs)
-        fact = (
-            f"{len(one.samples)} of {samples} samples of {name} (at {place}{either}) hold "
-            f"{100 * one.share:.3g} % of the squares"
-        )
+        fact = f"{name} at {place}, with {100 * one.share:.3g} % of the squares"
         spiked.append(kind.found(fact, where=name, samples=list(one.samples), share=one.share))
     return spiked
 

@@ -10,12 +10,13 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.drift import slopes_of
 from inputdesign_cli.finding import NOTE, Finding, undecided
 from inputdesign_cli.findings.places import Record, argument
-from inputdesign_cli.findings.refuted_structure import DRIFT, drifting, leaking, no_leak
+from inputdesign_cli.findings.refuted_structure import DRIFT, PLANT
 from inputdesign_cli.identification import Estimate
+from inputdesign_cli.outcome.model_words import blocks_of
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.plant.model import SampledPlant
 
@@ -87,22 +88,14 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     against = [one for one in findings if undecided([one])]
     if not against:
         return None
-    first = min(against, key=lambda one: _ORDER.index(one.code) if one.code in _ORDER else len(_ORDER))
+    first = min(against, key=lambda one: _rank(one.code))
     alike, command = [one for one in against if one.code == first.code], _NEXT.get(first.code, _EXPLORE)
-    lined = data.lined or (estimate is not None and _integrates(estimate))
-    if estimate and not lined and _may_drift(first, data) and np.any(slopes_of(data.parts)):
-        found = [one for one in against if one.code == DRIFT.code]
-        alike = found or [DRIFT.found("they follow a line", remedy="Remove the trend.", where="y")]
-        command = _DETREND
-    drifts, own = [one for one in against if one.code == DRIFT.code], command == _NEXT[DRIFT.code]
-    shifts = first.code == "level-shift" and _may_drift(first, data)
-    if estimate is not None and ((drifts and (own or first.code == "plant-structure")) or shifts):
-        # Past inputs, or a shift of most of a record, explain what a leak takes away.
-        if leaks := _leaking(estimate, data.time):
-            model = estimate.search.records.kind.model
-            alike, command = drifts or [drifting(model, "its level shifts for most of the record")], leaks
-        elif own and _drifts(estimate):
-            command = _EXPLORE
+    instead = "" if estimate is None else _slow_cause(first, against, estimate, data)
+    if instead:
+        drifts = [one for one in against if one.code == DRIFT.code]
+        alike, command = drifts or [DRIFT.found("they follow a line", where="y")], instead
+    elif estimate is not None and first.code == DRIFT.code and _drifts(_model(estimate)):
+        command = _EXPLORE
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed
         command = _EXPLORE
@@ -118,6 +111,64 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     return Leading(alike, command.format(**figures))
 
 
+def _slow_cause(first: Finding, against: Sequence[Finding], estimate: Estimate, data: Record) -> str:
+    """Return the command for a drift along a line, or for a leak of an integrator, that explains the rest.
+
+    Past inputs, or a shift of most of a record, explain what a leak takes away. A line in the output of a
+    plant that integrates may be its response to the input.
+    """
+    model, rows = _model(estimate), first.figures.get("rows")
+    wide = isinstance(rows, list) and any(last - begin > _WIDE * len(data.y) for begin, last in rows)
+    shift = first.code == "level-shift"
+    if _rank(first.code) < _rank("level-shift") or (shift and not wide):
+        return ""
+    integrates = bool(np.any(np.abs(model.plant_points) < INTEGRATES))
+    if not (data.lined or integrates) and np.any(slopes_of(data.parts)):
+        return _DETREND
+    of_drift = first.code in (DRIFT.code, PLANT.code) and any(one.code == DRIFT.code for one in against)
+    if not (shift or of_drift) or _no_leak(estimate) or not (denominator := _leaking(model)):
+        return ""
+    rate = _LEAK / float(np.median(np.diff(data.time)))
+    return (
+        f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
+        f'--set "plant.continuous.denominator={denominator}"  # it may leak'
+    )
+
+
+def _rank(code: str) -> int:
+    return _ORDER.index(code) if code in _ORDER else len(_ORDER)
+
+
+def _model(estimate: Estimate) -> Model:
+    return estimate.search.records.kind.model
+
+
+def _leaking(model: Model) -> str:
+    """Return the denominator with a leak of a plant that is known to integrate; empty for another plant.
+
+    A tank whose outflow grows with its level looks as if its noise drifted.
+    """
+    plant = blocks_of(model)["plant"]
+    match plant, plant.get("continuous", {}):
+        case {"parameters": known}, {"denominator": [*others, 0 | "0"]} if "leak" not in known and not any(
+            isinstance(one, list) for one in others
+        ):
+            return f"[{', '.join(f'{one}' for one in others)}, leak]"
+    return ""
+
+
+def _no_leak(estimate: Estimate) -> bool:
+    """Return whether past inputs explain the residuals better than a leak: a lag is missing, for example."""
+    failing = (test.probability for test in estimate.tests.failed_besides if test.fault == "plant")
+    leak = (test.probability for test in estimate.tests.scores if test.name == "leak")
+    return min(failing, default=1.0) < min(leak, default=1.0)
+
+
+def _drifts(model: Model) -> bool:
+    """Return whether the noise of the model drifts already."""
+    return not model.continuous and cast(SampledPlant, model).integrates
+
+
 def following(findings: Sequence[Finding], first: Leading) -> list[Finding]:
     """Return all findings; what may follow from the first ones alone says so.
 
@@ -130,34 +181,3 @@ def following(findings: Sequence[Finding], first: Leading) -> list[Finding]:
         else replace(one, message=f"{follow}: {one.message}")
         for one in findings
     ]
-
-
-def _integrates(estimate: Estimate) -> bool:
-    """Return whether the plant integrates, so that a line in the output may be its answer to the input."""
-    points = estimate.search.records.kind.model.plant_points
-    return bool(np.any(np.abs(points) < INTEGRATES))
-
-
-def _leaking(estimate: Estimate, time: Array) -> str:
-    """Return the command that lets a plant leak which is known to integrate; empty if it does not leak."""
-    if no_leak(estimate) or not (denominator := leaking(estimate.search.records.kind.model)):
-        return ""
-    rate = _LEAK / float(np.median(np.diff(time)))
-    return (
-        f"{_AGAIN}--set plant.parameters.leak={rate:.1g} "
-        f'--set "plant.continuous.denominator={denominator}"  # it may leak'
-    )
-
-
-def _drifts(estimate: Estimate) -> bool:
-    """Return whether the noise of the model drifts already."""
-    model = estimate.search.records.kind.model
-    return not model.continuous and cast(SampledPlant, model).integrates
-
-
-def _may_drift(first: Finding, data: Record) -> bool:
-    """Return whether a drift along a line may explain a finding."""
-    rows = first.figures.get("rows")
-    if first.code == "level-shift" and isinstance(rows, list):
-        return any(last - begin > _WIDE * len(data.y) for begin, last in rows)
-    return _ORDER.index(first.code) > _ORDER.index("level-shift") if first.code in _ORDER else True

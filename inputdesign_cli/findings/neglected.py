@@ -96,11 +96,10 @@ def objections(kind: FindingKind, units: Units, found: Sequence[Neglected], *, m
     against = []
     for one in mattering(found):
         test, moves, tried = one.directed.test, one.moves.largest, one.directed.alternatives[0]
-        along = "" if moves > 1.0 else ", and beyond it with the error of the estimate"
         against.append(
             kind.found(
                 f"{tried.phrase} would move G by {moves:.3g} times the admissible error about "
-                f"{units.named(one.frequency)}{along} (probability {chance(test.probability)} without it)",
+                f"{units.named(one.frequency)} (probability {chance(test.probability)} without it)",
                 where=test.name,
                 remedy=OF_ONE[test.fault].remedy,
                 severity=severity,

@@ -19,7 +19,7 @@ from inputdesign_cli.outcome.shares import chance
 PRIOR_LEFT_OUT = note(
     "prior-left-out",
     "The estimate does not include the prior. `experiment.prior` gives information without its parameters, "
-    "which serves neither an estimate nor a verdict.",
+    "which serves no estimate, no verdict and no top-up.",
     "Write its parameters beside the matrix, or name the `model.yaml` or the records of the earlier data.",
 )
 PRIOR_CONTRADICTED = refuted(
@@ -51,12 +51,6 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
     return [*PRIOR_LEFT_OUT.when(without, where=_PRIOR), *(contradictions(estimate) if stated else [])]
 
 
-def prior_left_out() -> Finding:
-    """Return the finding that a prior without parameters does not count for a top-up either."""
-    fact = "nor does the experiment below count on it: spec.yaml has the information of the data instead"
-    return PRIOR_LEFT_OUT.found(fact, where="experiment.prior")
-
-
 def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     """Return a finding where the prior and the data are not of one system, or are of one record.
 
@@ -81,13 +75,13 @@ def differences(kind: FindingKind, estimate: Estimate, files: Sequence[str], loo
     Args:
         looks: how often it is asked; all records and looks share the level (Bonferroni).
     """
-    probability, name = min(zip(estimate.tests.alike, files, strict=False), default=(1.0, ""))
-    others = [other for other in files if other != name]
-    against = others[0] if len(others) == 1 else "the other records"
+    if not estimate.tests.alike:
+        return []
+    probability, name = min(zip(estimate.tests.alike, files, strict=False))
+    against = " and ".join(other for other in files if other != name)
     fact = f"{name} and {against} (probability {chance(probability)} for one system)"
     certain = probability * len(estimate.tests.alike) * looks < level("one system")
-    found = kind.when(certain, fact, where=name, probability=probability, against=against)
-    return found if estimate.tests.alike else []
+    return kind.when(certain, fact, where=name, probability=probability, against=against)
 
 
 def shared(one: Array, other: Array) -> NDArray[np.bool_]:

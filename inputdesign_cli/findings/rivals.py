@@ -99,22 +99,20 @@ def other_minima(
     doubtful = beyond(model, estimate, errors or unstated, information)
     decides = beyond(model, estimate, errors) if errors else doubtful
     undecided = {id(one.rival) for one in decides}
-    found = []
-    for one in [*decides, *(one for one in doubtful if id(one.rival) not in undecided)]:
-        matters = id(one.rival) in undecided
-        fact = f"{_values(estimate, one.rival)}, {_higher(one.rival)}, with another G ({_far(units, one)})"
-        if errors and not matters:
-            fact += ", a difference within the admissible error"
-        found.append(
-            kind.found(
-                fact,
-                severity=UNDECIDED if matters else DOUBT,
-                ratio=one.ratio,
-                measure=one.measure,
-                excess=one.rival.excess,
-            )
+    return [
+        kind.found(
+            _said(units, estimate, one.rival, one),
+            severity=severity,
+            ratio=one.ratio,
+            measure=one.measure,
+            excess=one.rival.excess,
         )
-    return found
+        for severity, some in (
+            (UNDECIDED, decides),
+            (DOUBT, [one for one in doubtful if id(one.rival) not in undecided]),
+        )
+        for one in some
+    ]
 
 
 @finding(NOTE, "minimum-ruled-out", "Check whether `uncertainty` is right.")
@@ -123,8 +121,8 @@ def ruled_out(kind: FindingKind, estimate: Estimate, found: Sequence[Rival]) -> 
     if not found:
         return []
     first = min(found, key=lambda one: one.excess)
-    fact = f"{_values(estimate, first)}, {_higher(first)}{_more(found)}"
-    return [kind.found(fact, where="uncertainty", excess=first.excess, minima=len(found))]
+    fact, minima = _said(None, estimate, first), len(found)
+    return [kind.found(fact, where="uncertainty", excess=first.excess, minima=minima)]
 
 
 @finding(DOUBT, "other-minimum-foreseen", "Excite more frequencies, or fix the dead time with `plant.known`.")
@@ -134,13 +132,10 @@ def foreseen_rivals(
     """Other parameters would explain a record of the design nearly as well. Estimates may end there."""
     if not found:
         return []
-    nearest = min(found, key=lambda one: one.rival.excess)
-    fact = (
-        f"{_values(estimate, nearest.rival)}, {_higher(nearest.rival)}{_more(found)}, with another G "
-        f"({_far(units, nearest)})"
-    )
-    figures = {"excess": nearest.rival.excess, "ratio": nearest.ratio, "minima": len(found)}
-    return [replace(kind.found(fact, remedy=f"{remedy[:1].upper()}{remedy[1:]}."), figures=figures)]
+    nearest, minima = min(found, key=lambda one: one.rival.excess), len(found)
+    fact, excess = _said(units, estimate, nearest.rival, nearest), nearest.rival.excess
+    remedy = f"{remedy[:1].upper()}{remedy[1:]}."
+    return [kind.found(fact, remedy=remedy, excess=excess, ratio=nearest.ratio, minima=minima)]
 
 
 @finding(NOTE, "other-minima-not-looked-at", "Allow more time, or try `idesign simulate`.")
@@ -149,17 +144,10 @@ def not_foreseen(kind: FindingKind, reason: str) -> Finding:
     return kind.found(reason)
 
 
-def _higher(one: Rival) -> str:
-    return f"-2 log likelihood {abs(one.excess):.3g} {'higher' if one.excess >= 0.0 else 'lower'}"
-
-
-def _more(found: Sequence[object]) -> str:
-    return f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-
-
-def _far(units: Units, one: Apart) -> str:
-    return f"by {one.ratio:.3g} times {one.measure} about {units.named(one.w)}"
-
-
-def _values(estimate: Estimate, rival: Rival) -> str:
-    return ", ".join(f"{estimate.names[i]} = {rival.theta[i]:.4g}" for i in most_apart(estimate, rival))
+def _said(units: Units | None, estimate: Estimate, rival: Rival, apart: Apart | None = None) -> str:
+    """Return the parameters of another minimum, how likely it is, and how far its G is away."""
+    values = ", ".join(f"{estimate.names[i]} = {rival.theta[i]:.4g}" for i in most_apart(estimate, rival))
+    fact = f"{values}, -2 log likelihood {rival.excess:+.3g}"
+    if units is not None and apart is not None:
+        fact += f", G {apart.ratio:.3g} times {apart.measure} away about {units.named(apart.w)}"
+    return fact

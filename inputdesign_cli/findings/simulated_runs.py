@@ -22,36 +22,35 @@ CONFIDENCE_MISSED = doubt(
 
 def confidence_missed(designed: Coverage | None, recorded: Coverage | None) -> list[Finding]:
     """Return findings where a design, or its record, keeps less than was asked, by more than chance."""
-    asked, found = None if designed is None else designed.asked, []
-    for of, coverage in (("of this design", designed), ("with this record", recorded)):
-        if asked is None or coverage is None or coverage.kept_limits is None or coverage.kept is None:
-            continue
-        fact = f"{100 * coverage.kept:.1f} % of {coverage.runs} {of}, of {100 * asked:g} % asked"
-        missed = coverage.kept_limits[1] < asked
-        found += CONFIDENCE_MISSED.when(missed, fact, where=of, kept=coverage.kept, asked=asked)
-    return found
+    asked = None if designed is None else designed.asked
+    each = [("this design", designed), ("this record", recorded)]
+    return [
+        one
+        for of, coverage in each
+        if coverage is not None
+        for one in _missed(of, coverage.kept, coverage.kept_limits, asked)
+    ]
 
 
 def runs_miss_confidence(designed: Coverage | None, tried: TriedInput) -> list[Finding]:
     """Return a finding if runs of the design keep less than the exact confidence that was asked for."""
-    limits, kept = tried.within_r_adm_limits, tried.within_r_adm
-    asked = None if designed is None else designed.asked
-    if designed is None or asked is None or limits is None or kept is None:
+    asked = None if designed is None or tried.on_design_model is not None else designed.asked
+    return _missed("simulation", tried.within_r_adm, tried.within_r_adm_limits, asked)
+
+
+def _missed(
+    of: str, kept: float | None, limits: tuple[float, float] | None, asked: float | None
+) -> list[Finding]:
+    if asked is None or kept is None or limits is None:
         return []
-    fact = f"{100 * kept:.1f} % of the runs stay within r_adm, where exact: {asked:g} was asked for"
-    calibrated = designed.runs is not None
-    remedy = "" if calibrated else "Leave out runs: 0, ask for a little more, or take more samples."
-    missed = tried.on_design_model is None and limits[1] < asked
-    return CONFIDENCE_MISSED.when(missed, fact, where="simulation", remedy=remedy, kept=kept, asked=asked)
+    fact = f"{of} has {100 * kept:.1f} %, where {100 * asked:g} % was asked for"
+    return CONFIDENCE_MISSED.when(limits[1] < asked, fact, where=of, kept=kept, asked=asked)
 
 
 @finding(NOTE, "other-length", "Nothing. The runs are compared with predictions for the simulated length.")
 def other_length(kind: FindingKind, counted: int, simulated: int) -> list[Finding]:
     """The simulated records and the design differ in length. Records may consist of whole periods."""
-    fact = (
-        f"the design counts {counted} sample{'s' * (counted != 1)}, the records have {simulated}. Runs and "
-        f"ellipses.png are for {simulated}, bound.csv for {counted}"
-    )
+    fact = f"samples of the design {counted}, of the runs {simulated}. bound.csv is for the former"
     differ = counted != simulated
     return kind.when(differ, fact, where="simulation", counted=counted, simulated=simulated)
 
@@ -61,15 +60,12 @@ def initial_estimate_off(kind: FindingKind, units: Units, inputs: Mapping[str, T
     """The true system is not the design model. Fewer runs stay within r_adm than at the design model."""
     for name, entry in inputs.items():
         modelled = None if entry.on_design_model is None else entry.on_design_model.within_r_adm
-        found, theory, violations = entry.within_r_adm, entry.theory_on_truth, entry.violations
+        found, theory = entry.within_r_adm, entry.theory_on_truth
         if modelled is None or found is None or modelled - found < _GAP:
             continue
         fact = f"{name.replace('_', ' ')}: {100 * found:.0f} % of the runs, not {100 * modelled:.0f} %"
         if theory is not None:
             fact += f". r_u reaches {theory.worst_ratio:.2f} r_adm at {theory.frequency:.3g} {units.per_time}"
-        if violations is not None:
-            low, middle, high = violations.frequency_quantiles
-            fact += f". 9 in 10 violations lie at {low:.3g} to {high:.3g}, median {middle:.3g}"
         return [kind.found(fact, where=name, within=found, on_design_model=modelled)]
     return []
 

@@ -49,14 +49,13 @@ RAISED_PLANTS = doubt(
 def ended_early(status: str, objective: Objective) -> list[Finding]:
     """Return what the end of the time left open: the proof, or the bound over every spectrum."""
     if status == "gap_open":
-        best, far = objective.lower_bound, "nothing is proved yet of other designs"
-        if objective.upper_bound:
-            far = f"no other design gets above {objective.upper_bound:.6g}"
-        elif best:
-            gap = 1.0 if objective.relative_gap is None else objective.relative_gap
-            far = f"no other design gets below {best:.6g} ({per_cent(gap, 2)} lower)"
-        fact = f"{what_ended()} ended the design, and {far}"
+        bound = objective.upper_bound or objective.lower_bound
+        gap = 1.0 if objective.relative_gap is None else objective.relative_gap
+        far = (
+            f"no other design gets beyond {bound:.6g} ({per_cent(gap, 2)})" if bound else "nothing is proved"
+        )
         remedy, share = f"To close the gap, {more_time()}.", objective.relative_gap
+        fact = f"{what_ended()} ended the design, and {far}"
         return [DESIGN_UNFINISHED.found(fact, where="solver", remedy=remedy, relative_gap=share)]
     remedy = f"To have it, {more_time()}, or write solver.any_spectrum_tolerance: 0.01."
     fact = f"{what_ended()} came before it"
@@ -113,20 +112,14 @@ def unstable_draws(kind: FindingKind, rejected: int, drawn: int) -> list[Finding
 
 def floor_findings(floor: FloorUse | None, scenarios: int) -> list[Finding]:
     """Return what `uncertainty.floor` means for what is promised at a number of plants."""
-    found: list[Finding] = []
     if floor is None:
-        return found
-    lost, raised, where = list(floor.lost), len(floor.raised) - len(floor.lost), "uncertainty.floor"
-    share = f"{floor.share:g} of that at the plant of the spec"
-    if floor.worst:
-        first = floor.worst[0]
-        values = ", ".join(f"{name} {value:.4g}" for name, value in first.parameters.items())
-        reaches = "" if first.peak is None else f" (|S| reaches {first.peak:.4g})"
-        fact = (
-            f"{len(lost)} of {scenarios} plants, like plant {first.scenario}{reaches}: {values}. Their "
-            f"r_adm is {share}"
-        )
-        found.append(LOST_PLANTS.found(fact, where=where, lost=lost))
-    at = [number for number in floor.raised if number not in lost]
-    fact = f"{raised} of {scenarios} plants, which have an r_adm of {share}"
-    return [*found, *RAISED_PLANTS.when(raised > 0, fact, where=where, raised=at)]
+        return []
+    lost, where = list(floor.lost), "uncertainty.floor"
+    raised = [number for number in floor.raised if number not in lost]
+    of_spec = f"of {scenarios} plants, with {floor.share:g} of r_adm at the plant of the spec"
+    first = floor.worst[0].parameters if floor.worst else {}
+    like = f". One has {', '.join(f'{name} {value:.4g}' for name, value in first.items())}"
+    return [
+        *LOST_PLANTS.when(floor.worst, f"{len(lost)} {of_spec}{like}", where=where, lost=lost),
+        *RAISED_PLANTS.when(raised, f"{len(raised)} {of_spec}", where=where, raised=raised),
+    ]

@@ -52,13 +52,14 @@ def answering(kind: FindingKind, units: Units, estimate: Estimate) -> list[Findi
 
 @finding(REFUTED, "input-logged-late", "Find when the plant really gets its input, and log both together.")
 def _late(kind: FindingKind, inputs: int, outputs: int, test: ScoreTest) -> Finding:
-    """An output moves before the input. The input was logged late, or the columns use different clocks."""
+    """An output moves before the input. The input was logged late, or the columns use different clocks.
+
+    Or columns are swapped.
+    """
     name, output = signal_name("u", test.source, inputs), signal_name("y", test.output, outputs)
-    fact = (
-        f"{output} responds to {name} up to {test.lag} sample{'s' * (test.lag != 1)} early (probability "
-        f"{chance(test.probability)} by chance). It was logged late, columns are swapped, or clocks differ"
-    )
-    return kind.found(fact, where=name, samples=test.lag, probability=test.probability)
+    p, early = test.probability, f"{test.lag} sample{'s' * (test.lag != 1)}"
+    fact = f"{output} responds to {name} up to {early} early (probability {chance(p)} by chance)"
+    return kind.found(fact, where=name, samples=test.lag, probability=p)
 
 
 def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
@@ -78,8 +79,8 @@ def perhaps_swapped(kind: FindingKind, parts: Sequence[tuple[Array, Array]]) -> 
     inputs, outputs = u.mean(axis=0), y.mean(axis=0)
     seldom, often = int(np.argmin(outputs)), float(inputs.min(initial=1.0))
     name = signal_name("y", seldom, len(outputs))
-    shares = [f"{100.0 * share:.2g} %" for share in (outputs[seldom], often)]
-    fact = f"{name} moves in {shares[0]} of the rows, and the inputs in {shares[1]}"
+    share = f"{100.0 * outputs[seldom]:.2g} % of the rows"
+    fact = f"{name} moves in {share}, and the inputs in {100.0 * often:.2g} %"
     held = _HELD * outputs[seldom] < often
     return kind.when(outputs[seldom] > 0.0 and held and often > 0.5, fact, where=name)
 
@@ -100,9 +101,7 @@ def idle(
     found = []
     for j, zero, expected in perhaps_other_inputs(nominal, estimated, estimate, units.step):
         name = signal_name("u", j, units.inputs)
-        fact = (
-            f"{name} (probability {chance(zero)} for no effect), though the plant of the spec would respond"
-        )
+        fact = f"{name} (probability {chance(zero)}, and {chance(expected)} for G of the spec)"
         found += kind.when(expected < _OTHERWISE, fact, where=name, probability=zero)
     return found
 

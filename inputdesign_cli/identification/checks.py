@@ -44,9 +44,9 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
     Raises:
         SpecError: `constant-input`, `constant-output`; it has the `names` of the parameters.
     """
-    alike = f"only a static gain could be seen, and {', '.join(names)} cannot be told apart"
+    static = f"only a static gain could be seen, not {', '.join(names)} each"
     for letter, signals, code, says in (
-        ("u", u, "constant-input", alike),
+        ("u", u, "constant-input", static),
         ("y", y, "constant-output", "it shows neither the input nor noise"),
     ):
         for index, signal in enumerate(signals.T):
@@ -69,10 +69,9 @@ def check_noisy(covariance: Array, y: Array) -> None:
     for index, power in enumerate(np.mean(y**2, axis=0)):
         if covariance[index, index] <= _EXACT * power:
             name = signal_name("y", index, y.shape[1])
-            which = "the output" if y.shape[1] == 1 else name
             raise bad_spec(
                 "noise-free-data",
-                f"the model explains {which} to the last digit: there is no noise to estimate its variance",
+                f"the model explains {name} to the last digit: there is no noise to estimate its variance",
                 hint=f"is {name} computed from u? Real data have noise",
                 key=name,
             )

@@ -9,7 +9,7 @@ for example the reference of a loop, are instruments: G is the response of y to 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -34,8 +34,6 @@ _FREEDOM = 8
 _PARABOLA = 3
 _BEGINNING, _TRIED = 16, 20
 _DEPENDENT = 1e-7
-# Rad: a phase that turns further over the lines of a parabola is not followed by it.
-_TURN = 1.0
 # Of its largest value: where a response to a pulse begins.
 _BEGUN = 0.1
 
@@ -68,15 +66,14 @@ def frequency_response(
     x: Array | None = None,
     *,
     lengths: Sequence[int] | None = None,
-    delays: Callable[[int], NDArray[np.int64]] | None = None,
+    delays: NDArray[np.int64] | None = None,
 ) -> FrequencyResponse | None:
     """Return the response from consecutive records; None if they are too short or excite no frequency enough.
 
     Args:
         u, y: (N, r), (N, p).
         x: (N, r), the external excitation; None: u itself, which then must not depend on y.
-        delays: gives presumed delays of the inputs (p, r) for records of a number of samples. They are tried
-            if they turn the phase fast, and kept if less remains unexplained; not with external signals.
+        delays: presumed delays of the inputs (p, r), in samples; of no use with external signals.
     """
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
@@ -85,18 +82,9 @@ def frequency_response(
         periods = _settled(period, len(y))
         response = periodic_response(u, y, periods, excited_harmonics(outside, periods))
         return None if response is None else of_periods(response, period)
-    found = _usable(_local_polynomial(records))
-    if x is not None or delays is None:
-        return found
-    longest = max(len(y) for *_, y in records)
-    late = delays(longest)
-    # A parabola cannot follow a phase that turns so far.
-    turns = 2.0 * np.pi * late.max() * _window(records) / longest > _TURN
-    other = _usable(_delayed(late, records)) if turns else None
-    if found is None or other is None:
-        return found or other
-    unexplained = [np.mean(np.log(np.maximum(one.noise, 1e-300))) for one in (found, other)]
-    return found if unexplained[0] <= unexplained[1] else other
+    late = x is None and delays is not None and np.any(delays)
+    found = _delayed(delays, records) if late and delays is not None else _local_polynomial(records)
+    return _usable(found) or _usable(_local_polynomial(records))
 
 
 def _settled(period: int, samples: int) -> Periods:

@@ -26,10 +26,9 @@ def perhaps_other_inputs(
     """
     gradient, now, before = *_response(estimated, step), _response(nominal, step)[1]
     found = []
-    for j in range(estimated.inputs):
-        zero = _chance(estimate, gradient[..., j], now[..., j], exactly=True)
+    for j, zero in _zeros(estimate, gradient, now, 2).items():
         expected = _chance(estimate, gradient[..., j], (now - before)[..., j], exactly=False)
-        if zero is not None and zero >= _ZERO and expected is not None:
+        if expected is not None:
             found.append((j, zero, expected))
     return found
 
@@ -37,13 +36,17 @@ def perhaps_other_inputs(
 def perhaps_zero(model: Model, estimate: Estimate, step: float = 1.0, *, inputs: bool = False) -> list[int]:
     """Return the outputs (from zero), or `inputs`, whose part of G may be zero, and is not known to be."""
     gradient, G = _response(model, step)
-    found, axis = [], 3 if inputs else 2
-    for number in range(gradient.shape[axis]):
-        change = np.take(gradient, number, axis)
-        chance = _chance(estimate, change, np.take(G, number, axis - 1), exactly=True)
-        if np.any(change) and chance is not None and chance > _ZERO:
-            found.append(number)
-    return found
+    axis = 2 if inputs else 1
+    return [i for i in _zeros(estimate, gradient, G, axis) if np.any(np.take(gradient, i, axis + 1))]
+
+
+def _zeros(estimate: Estimate, gradient: ComplexArray, G: ComplexArray, axis: int) -> dict[int, float]:
+    """Return the outputs or inputs, along an axis of G (n, p, r), with the probability of zero by chance."""
+    each = (
+        (i, _chance(estimate, np.take(gradient, i, axis + 1), np.take(G, i, axis), exactly=True))
+        for i in range(G.shape[axis])
+    )
+    return {i: chance for i, chance in each if chance is not None and chance >= _ZERO}
 
 
 def _response(model: Model, step: float) -> tuple[ComplexArray, ComplexArray]:

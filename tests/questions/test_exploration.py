@@ -66,17 +66,6 @@ def test_the_spec_that_is_written_solves_at_once(run):
     assert low - 1e-9 <= np.min(played) < np.max(played) <= high + 1e-9
 
 
-def test_a_damping_above_one_is_said_as_two_lags(tmp_path):
-    rng = np.random.default_rng(3)
-    u = np.repeat(rng.choice([-1.0, 1.0], 40), 15)
-    x = scipy.signal.lfilter([0, 0.1], [1, -0.9], scipy.signal.lfilter([0, 0.3], [1, -0.7], u))
-    rows = np.column_stack([np.arange(600), u, x + 0.02 * rng.standard_normal(600)])
-    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time_s,u,y", comments="")
-    findings = explore(tmp_path / "log.csv", structure="sopdt").results.findings
-    (lags,) = (one.figures["lags"] for one in findings if one.code == "two-lags")
-    assert lags == pytest.approx([-1 / np.log(0.9), -1 / np.log(0.7)], rel=0.15)
-
-
 def test_the_model_is_judged_on_other_data(run, tmp_path):
     other = lag_log(tmp_path / "other.csv", seed=1)
     judged = explore(other, model=load_spec(run / "model.yaml", design=False))

@@ -117,7 +117,7 @@ FAULTS = {
 }
 FIGURES = {
     **{name: ("samples", k - 1) for name, k in zip(LATE, (2, 3, 6, 12), strict=True)},
-    "spikes": ("times", [100.0, 301.0, 400.0]),
+    "spikes": ("rows", [[102, 102], [303, 303], [402, 402]]),
     "a still sensor": ("rows", [[202, 261]]),
 }
 

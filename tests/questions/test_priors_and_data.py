@@ -61,7 +61,7 @@ def test_a_prior_without_its_estimate_counts_neither_for_the_verdict_nor_for_the
     written = yaml.safe_load(stated.results.resolved_spec)["experiment"]["prior"]
     assert written["parameters"] == pytest.approx(stated.results.result["identification"]["theta"])
     found = [codes_in(one.results.result).count("prior-left-out") for one in (stated, plain)]
-    assert found == [2, 0]  # for the estimate, and for the top-up
+    assert found == [1, 0]
 
 
 def test_a_prior_with_its_estimate_counts_as_its_record_does(lag_record, tmp_path):

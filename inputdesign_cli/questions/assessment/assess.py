@@ -17,14 +17,13 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, bad_spec
-from inputdesign_cli.finding import Finding, reasons
+from inputdesign_cli.finding import NOTE, Finding, reasons
 from inputdesign_cli.findings.designed_records import level_notes
-from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal, of_first_part
+from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal
 from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
 from inputdesign_cli.findings.leading import following, leading
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
-from inputdesign_cli.findings.other_systems import prior_left_out
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
 from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results
@@ -108,7 +107,8 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
         more += objections(units, without, met=met)
         if distance is not None and not distance.nominal.within_uncertainty:
             far = far_from_nominal(distance)
-            more += far if first is None or not far else of_first_part(distance) if first else []
+            # Plans of a campaign rest on its estimates, once it has some.
+            more += far if first is None else [replace(one, severity=NOTE) for one in far if first]
     findings = [*(results.outcome.findings or ()), *more]
     first_of_all = leading(findings, found.estimate, found.data)
     against = {} if first_of_all is None else reasons(first_of_all.findings)
@@ -188,8 +188,6 @@ def _topped_up(
         levels, data = found.preparation.levels, found.data
         swings = np.abs(data.u - data.u.mean(axis=0)).max(axis=0)
         remarks += level_notes(levels, signal.operating_point, data.means, swings)
-    if task.has_prior and found.estimate.prior is None:
-        remarks.append(prior_left_out())
     design = topped.outcome.saying(remarks)
     reached = 0.0 if signal is None else signal.worst_ratio or 0.0
     left = max([one.worst_ratio for one in design.requirements or ()] + [reached])

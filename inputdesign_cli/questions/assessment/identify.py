@@ -287,7 +287,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         *unsettled(model, estimate),
         *larger_noise(model, found.noise_refuted),
         *found.scatter,
-        *started(estimate, levels=any(name.startswith("y") for name in found.preparation.operating_point)),
+        *started(estimate),
         *on_the_circle(model, estimate),
         # Faults of measurement stand alone, as they upset other tests.
         *(
@@ -301,7 +301,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
             ]
         ),
         *([] if at_ends else hardly_explained(units, model, estimate)),
-        *near_zero(model, estimate),
+        *near_zero(estimate),
         *band_limited(model, estimate),
         *differences(estimate, [name for name, _ in found.data.files]),
         *prior_notes(estimate, stated=task.has_prior),

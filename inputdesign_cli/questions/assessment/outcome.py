@@ -233,9 +233,7 @@ def response_without_model(
     """
     some = list(range(units.inputs)) if inputs is None else list(inputs)
     u, r = data.u[:, some], None if data.r is None else data.r[:, some]
-
-    def delays(samples: int) -> NDArray[np.int64]:
-        return response_delays(model, samples, step=units.step)[:, some]
+    delays = response_delays(model, max(data.lengths), step=units.step)[:, some]
 
     for reference in [r, None]:
         if reference is None or not np.any(np.all(reference == u, axis=0)):

@@ -54,7 +54,7 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
     times = np.sqrt(np.maximum(factors, 1.0))  # nothing is stated more sharply than by theory
     wider = replace(estimate, factor=estimate.factor / times[:, None])
     of_plant, of_noise = (float(times[part].max(initial=1.0)) for part in (model.in_plant, ~model.in_plant))
-    return wider, scattered(of_plant, of_noise, _RUNS, none=bool(factors.max() >= _MOST))
+    return wider, scattered(of_plant, of_noise, _RUNS)
 
 
 def reach(model: Model, estimate: Estimate) -> Array:

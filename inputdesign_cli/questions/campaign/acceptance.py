@@ -249,8 +249,7 @@ def accepted(
     findings = hardly_followed(
         given,
         due.file,
-        likeness=match.likeness,
-        spliced=match.spliced,
+        match.likeness,
         like=LIKE,
         follows=match.follows,
         other=other,

@@ -175,8 +175,8 @@ def _again(
         except DataError as error:
             raise DataError([named(one) for one in error.diagnostics]) from error
     if found.refuted:
-        every, end = len(counting) == len(campaign.records), task.rules.end
-        said = said.saying(campaign_refuted(memory.directory, campaign.done, end, counting, every=every))
+        refuted = campaign_refuted(memory.directory, campaign.done, task.rules.end, counting)
+        said = said.saying(refuted)
     results = _decided(task, campaign, files, said, found)
     provenance = {**results.outcome.provenance, "made_from": list(memory.made_from)}
     return replace(results, outcome=replace(results.outcome, provenance=provenance))
@@ -268,7 +268,6 @@ def _next_part(
         beyond=plan.beyond,
         part_cost=plan.part_cost,
         fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal" and not plan.alone,
-        alone=plan.alone,
         parts=plan.kind == "parting",
     )
     # The times of a part continue the times of the last one.

@@ -175,8 +175,7 @@ def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = Non
             return rest, found
         if another.split == "none" != found.split:
             return rest, found
-        short = len(rest.y) - len(less.y) - len(shifting)
-        step = left_out(rest, shifts, found.samples, rest.time_unit, short=short)
+        step = left_out(rest, shifts, found.samples, rest.time_unit)
         rest, found = replace(less, findings=(*rest.findings, step)), another
     return (whole, first) if found.estimate.tests.shifted else (rest, found)
 

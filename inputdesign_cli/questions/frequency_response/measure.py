@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -163,7 +163,7 @@ def measure(
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
     if terms is None:
-        delays = partial(response_delays, model, step=units.step)
+        delays = response_delays(model, max(data.lengths), step=units.step)
         response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
         if response is None:
             message = f"{name} excites no frequency enough for a response without a model"
@@ -332,7 +332,7 @@ def _doubted(terms: ResponseTask, judged: Judged) -> Judged:
     data, periods, repeats, model = counted.data, counted.periods, counted.repeats, terms.experiment.model
     if spikes := period_spikes(data.y, periods, repeats=repeats):
         where = [places(units, data, one.samples) for one in spikes]
-        spiked = responses.spiked_periods(units, spikes, where, len(data.y), counted.kept)
+        spiked = responses.spiked_periods(units, spikes, where)
         return replace(judged, scattered=tuple(spiked))
     # The noise of the data near frequency zero; noise of the spec may go on rising below the lowest line.
     lowest = int(np.argmin(judged.frequencies))

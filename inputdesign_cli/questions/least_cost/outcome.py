@@ -256,7 +256,7 @@ def _findings(done: Designed, used: out.Powers) -> list[Finding]:
     """Return the findings that a user should know before trusting a number."""
     found, problem = done.design.result, done.problem
     if not done.excites:
-        return [designs.nothing_needed(done.experiment, at_every_plant=bool(done.kept))]
+        return [designs.nothing_needed(done.experiment)]
     findings = [
         *designs.inputs_without_power(used.excitation or ()),
         *designs.short_experiment(done.experiment),

@@ -21,7 +21,7 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import Goal, PowerLimit
 from inputdesign_cli.design.convex.record_bound import RecordBound, bound_over_records
 from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.findings.designed_records import other_signal, other_spectrum
+from inputdesign_cli.findings.designed_records import other_signal
 from inputdesign_cli.questions.common.record import (
     Made,
     RecordRequest,
@@ -306,8 +306,7 @@ def _other_record(request: RecordRequest, design: Design, other: Made, record: R
     asked, own = (design_cost(each, request.cost) for each in (design, other.design))
     extra = (1.0 + record.extra_power) * own / asked - 1.0
     kind = _WORDS.get(record.method, record.method)
-    goal, power = design.problem.goal, other.input_power
-    found = other_spectrum(_words(request), kind, request.limit_keys, power, goal)
+    found = other_signal(kind, other.input_power)
     return replace(other, record=replace(record, extra_power=extra), findings=(found,))
 
 

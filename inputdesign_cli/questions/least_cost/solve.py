@@ -46,7 +46,6 @@ from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcom
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.questions.least_cost.sought import Sought
-from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.selection import Record
 
 _GAINED = 1.001  # a bound over records this much above that of the power has gained nothing
@@ -212,16 +211,12 @@ class ConvexTask(SpectrumTask):
             signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
         if made.input_power is not None:
             signal = replace(signal, spectrum_of={"input_power": made.input_power})
-        shares, block = signal.of_limits or {}, request.settings.block
-        limited = any(limit.upper for limit in problem.limits) or bool(shares)
-        held = limited or request.bounds.hard or request.settings.level is not None
         asked = request.samples or done.experiment.samples
-        shaped = record.method == "given" or not kind_of(record.method).flat
         findings = [
             *([] if coverage is None else confidence_missed(coverage, signal.confidence)),
             *made.findings,
-            *of_records.accuracy_missed(record, held=held),
-            *of_records.length_of_record(record, asked, block, shares, shaped=shaped),
+            *of_records.accuracy_missed(record),
+            *of_records.length_of_record(record, asked, request.settings.block),
         ]
         if known is not None:
             cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)
@@ -235,9 +230,7 @@ class ConvexTask(SpectrumTask):
             near = distance is not None and distance <= _NEAR
             if spectral and not near:  # a record that is near the best there is needs no other
                 designed = float(np.sqrt(done.design.result.objective))
-                findings += of_records.less_accurate(
-                    record.worst_ratio, designed, searched=distance is not None
-                )
+                findings += of_records.less_accurate(record.worst_ratio, designed)
             names = list(dict.fromkeys(requirement.name for requirement in problem.side))
             findings += of_records.requirement_missed(names, worst_ratio(problem.side)(known))
         return self.applied(results, done.experiment, record, signal, problem.requirements, findings)
