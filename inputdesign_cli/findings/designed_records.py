@@ -10,6 +10,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.signal.selection import Record
+from inputdesign_cli.signal.settings import Quantiser
 
 _FALLS_SHORT = 5e-3
 _FAR = 0.1  # from the bound over all records, as a share
@@ -92,7 +93,7 @@ def length_of_record(record: Record, asked: int, block: int) -> list[Finding]:
     return RECORD_DEAR.when(dear, f"{times:.3g} times as much", where="signal.samples", times=times)
 
 
-@finding(NOTE, "record-less-accurate", "Take more samples, candidates or seconds (`signal`), if it matters.")
+@finding(NOTE, "record-less-accurate", "Take more samples, candidates or seconds (`signal`).")
 def less_accurate(kind: FindingKind, reached: float, designed: float) -> list[Finding]:
     """The record is less accurate than the design. Finite length or limits on samples reduce accuracy.
 
@@ -101,7 +102,10 @@ def less_accurate(kind: FindingKind, reached: float, designed: float) -> list[Fi
     """
     more = reached / designed - 1.0
     fact = f"it reaches {reached:.4g} times the admissible error, {per_cent(more)} more than {designed:.4g}"
-    return kind.when(more > _FALLS_SHORT, fact, where="signal", reached=reached, designed=designed)
+    remedy = "It is below 1, which is enough." if reached <= 1.0 else ""
+    return kind.when(
+        more > _FALLS_SHORT, fact, where="signal", remedy=remedy, reached=reached, designed=designed
+    )
 
 
 @finding(NOTE, "bound-of-power-only", "Take `signal.hold: auto` if the actuator may keep its values as long.")
@@ -152,6 +156,26 @@ def noise_moves_input(kind: FindingKind, deviations: Array, peaks: Sequence[floa
     fact = f"it adds a standard deviation of {fact}"
     seen = any(size > _SEEN * peak for _, (size, peak) in beside)
     return kind.when(seen, fact, where="limits.amplitude", deviations=deviations.tolist())
+
+
+@finding(NOTE, "level-rounded", "State `signal.offset` at a value of the converter, or give it more bits.")
+def level_rounded(kind: FindingKind, quantisers: Sequence[Quantiser], peak: float) -> list[Finding]:
+    """The record moves about another level than signal.offset. A converter has only values of its own.
+
+    Args:
+        quantisers: one an input, in a converter's own units.
+        peak: the largest move from the level; a shift of a small share of it is not worth a note.
+    """
+    return [
+        kind.found(
+            f"input {j} stands at {one.operating_point:.6g} in place of {one.offset:.6g}",
+            where="signal.offset",
+            level=one.operating_point,
+            offset=one.offset,
+        )
+        for j, one in enumerate(quantisers, start=1)
+        if abs(one.operating_point - one.offset) > _SEEN * peak
+    ]
 
 
 def other_signal(kind: str, power: float | None = None) -> Finding:

@@ -12,6 +12,7 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, finding
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Powers, Signal
+from inputdesign_cli.outcome.design import Loop
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.signal.limits import Bounds
 
@@ -25,6 +26,7 @@ _FREE = 1e-3
 # Samples a parameter below which first-order theory understates errors by a tenth or more.
 _FEW = 20
 _SUPPORT = 1e-3
+_NEAR = 0.9  # of the |S| that is allowed
 
 
 @finding(NOTE, "no-excitation-needed", "Use a record of normal operation, or ask for more accuracy.")
@@ -98,6 +100,21 @@ def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Fi
             fact = f"an error of {least:.4g} times |G| is allowed, and G may have the wrong sign"
             found[fact] = kind.found(fact, ratio=least)
     return list(found.values())
+
+
+@finding(
+    NOTE,
+    "loop-near-its-limit",
+    "Tune it slower (a larger `tau_c` of `accuracy.loop.tuning.simc`), or allow a larger |S|.",
+)
+def near_its_limit(kind: FindingKind, loops: Iterable[Loop | None]) -> list[Finding]:
+    """The loop itself takes most of the |S| that is allowed. Little is left for the error of the model."""
+    found = []
+    for loop in filter(None, loops):
+        peak, most = loop.nominal_peak, loop.max_sensitivity
+        if peak is not None and most is not None and peak > _NEAR * most:
+            found.append(kind.found(f"{peak:.4g} of {most:.4g} with this plant", peak=peak, allowed=most))
+    return found
 
 
 @finding(NOTE, "excitation-almost-free", "Give `cost.excitation_power` a small weight, or limit it.")

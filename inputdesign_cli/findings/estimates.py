@@ -90,14 +90,17 @@ def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
 
 @finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")
 def on_the_circle(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
-    """A noise polynomial has a root on the unit circle. The covariance is unreliable."""
+    """The noise hardly fades in this record, or is a difference of white noise. Deviations are unreliable.
+
+    D, or C, has a root on the unit circle.
+    """
     samples = len(estimate.errors)
     letters = " and ".join(
         letter
         for letter, polynomials in predictor_of(model).items()
         if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
     )
-    fact = f"{letters}, as far as {samples} samples can show"
+    fact = f"{letters} has a root on the unit circle, as far as {samples} samples can show"
     return kind.when(letters, fact, where=letters, samples=samples)
 
 
@@ -138,9 +141,7 @@ def noise_probability(estimate: Estimate) -> float:
 
 
 @finding(
-    NOTE,
-    "noise-estimated-along",
-    "The verdict holds with it. Before another design, copy `noise` from `model.yaml` into the spec.",
+    NOTE, "noise-estimated-along", "Before another design, copy `noise` from `model.yaml` into the spec."
 )
 def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> list[Finding]:
     """The noise has more structure than the spec says. Small orders of C and D were estimated too.
@@ -153,6 +154,11 @@ def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> 
     if probability is None:
         return []
     noise = {letter: rows for letter, rows in blocks_of(model)["noise"].items() if letter in ("C", "D")}
-    stated = ", ".join(f"{letter}: {rows}" for letter, rows in noise.items())
-    fact = f"{stated}. The probability of the residuals with that of the spec is {chance(probability)}"
+    stated = " and ".join(
+        f"{letter} of order {max(len(row) for row in (rows if isinstance(rows[0], list) else [rows])) - 1}"
+        for letter, rows in noise.items()
+    )
+    fact = (
+        f"{stated}, since residuals with that of the spec were not white (probability {chance(probability)})"
+    )
     return [kind.found(fact, where="noise", probability=probability, noise=stated)]

@@ -7,9 +7,13 @@ from collections.abc import Sequence
 from inputdesign_cli.explore import Found
 from inputdesign_cli.finding import NOTE, Finding, FindingKind, finding
 from inputdesign_cli.findings.places import Record
+from inputdesign_cli.findings.prepared_records import JITTER_EVENED
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.plant import Model
+
+_MORE = 0.05  # per cent of the output, below which structures explain the same
 
 
 def explored_structures(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> list[Finding]:
@@ -23,6 +27,7 @@ def explored_structures(log: Record, found: Found, loops: Sequence[tuple[int, fl
         *_drifting(log, found),
         *_wandering(found),
         *_resting(found),
+        *_between_rows(log, found.model),
         *_answering(found, loops),
         *_idle(found),
     ]
@@ -43,9 +48,10 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
         tried, family = len(chosen.candidates), taken.orders.family
         better = max(one.validation for one in chosen.candidates) - taken.validation
         name = signal_name("y", i, found.model.outputs)
+        beside = f"the best explains {better:.2g} % more" if better > _MORE else "none explains more"
         fact = (
             f"for {name}, {family} ({orders}), delay in samples {delays}; chosen of {tried} structures, of "
-            f"which the best explains {better:.2g} % more"
+            f"which {beside}"
         )
         said.append(kind.found(fact, where=name, family=family, structures=tried, better_percent=better))
     return said
@@ -66,6 +72,14 @@ def _wandering(kind: FindingKind, found: Found) -> list[Finding]:
     """An output wanders as a random walk does. The gain is that of steps, not of distant levels."""
     names = [signal_name("y", i, found.model.outputs) for i, wanders in enumerate(found.wanders) if wanders]
     return [kind.found(name, where=name) for name in names]
+
+
+@finding(NOTE, "dead-time-between-rows", "Nothing, if the input moves at rows only.")
+def _between_rows(kind: FindingKind, log: Record, model: Model) -> list[Finding]:
+    """A dead time counts from the row in which the input has moved. A move between two rows was earlier."""
+    fact = f"it is longer by up to {log.step:.4g} {log.time_unit} if the input moved between two rows"
+    jitter = any(one.code == JITTER_EVENED.code for one in log.findings)
+    return kind.when(jitter and bool(model.dead_times.any()), fact, longer=log.step)
 
 
 @finding(

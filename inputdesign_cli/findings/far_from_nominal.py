@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, doubt
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.levels import level
 from inputdesign_cli.outcome import Nominal
@@ -38,6 +38,11 @@ FAR = doubt(
     "five standard deviations. The plant, the units or the values of the spec may be wrong.",
     "The verdict holds for the estimate: r_u and r_adm are at its parameters. Put it into the spec.",
 )
+OUTSIDE = note(
+    "outside-uncertainty",
+    "The estimate lies outside the uncertainty of the spec. The design was made for the plants within it.",
+    "The verdict holds for the estimate. Before another design, state an uncertainty that holds it.",
+)
 
 
 @dataclass(frozen=True)
@@ -47,12 +52,14 @@ class Distance:
     Attributes:
         listed: the parameters that are farthest, with their values and deviations.
         share, place: how much G differs at most, of the larger one, and where; zero if no error of G has r_u.
+        outside: the parameters beyond the uncertainty of the spec, with their values.
     """
 
     nominal: Nominal
     listed: tuple[str, ...]
     share: float
     place: str
+    outside: tuple[str, ...] = ()
 
 
 def from_nominal(
@@ -123,10 +130,10 @@ def _nearest_order(nominal: Model, theta: Array, of_plant: Sequence[int]) -> NDA
 
 
 def far_from_nominal(distance: Distance) -> list[Finding]:
-    """Return a finding where the two are different plants, or parameters lie far apart."""
+    """Return a finding where the two are different plants, or parameters lie far apart or outside."""
     found, another = distance.nominal, distance.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
-        return []
+        return OUTSIDE.when(distance.outside, ", ".join(distance.outside), where="uncertainty")
     kind = ANOTHER if another else FAR
     sign = ", with the opposite sign at low frequency" if found.opposite_sign else ""
     apart = f"{found.deviations:.3g} standard deviations apart{sign}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -23,7 +22,7 @@ from inputdesign_cli.plant.model import SampledPlant
 # SPEC and options of the command that was typed are filled in where they are known, on the command line.
 _ASSESS = "idesign assess SPEC "
 _AGAIN = _ASSESS + "{logs} "
-_ALONE = _ASSESS + "{last} --output {alone}"  # where the run of all records does not stand
+_ALONE = _ASSESS + "{last}"
 _EXPLORE = "idesign explore {columns}{logs}"
 _NEXT = {
     # Samples that are wrong or of another system upset every test.
@@ -104,7 +103,6 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
         "columns": data.columns_option,
         "logs": shlex.join(files),
         "last": shlex.quote(files[-1]),
-        "alone": shlex.quote(f"runs/{Path(files[-1]).stem}_alone"),
         "rows": option,
         "half": f"{float(data.time[0]):g}:{middle:g}",
     }

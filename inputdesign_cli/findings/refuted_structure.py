@@ -45,6 +45,7 @@ NONLINEAR = refuted(
 )
 # Drift makes other tests fail; an error of G makes tests of the noise fail.
 _OF_MANY = {"drift": DRIFT, "plant": PLANT, "noise": NOISE}
+_MOST = {"plant": "most on inputs {} earlier", "noise": "residuals {} apart are correlated most"}
 OF_ONE = {"plant": MISSING, "noise": MISSING, "change": CHANGED, "nonlinear": NONLINEAR}
 
 
@@ -57,7 +58,7 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
         test = next((test for test in failing if test.fault == fault and test not in directed), None)
         if test is not None:
             p = test.probability
-            fact = f"{_where(model, test)}with a right model the probability of that is {chance(p)}"
+            fact = f"{_where(model, test)}; with a right model the probability of that is {chance(p)}"
             found.append(kind.found(fact, where=test.name, probability=p, lag=test.lag))
     for test in failing:
         if test in directed:
@@ -70,7 +71,8 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
 
 def _where(model: Model, test: ScoreTest) -> str:
     """Return the lag and the channels in which a test fails most; empty for a trend of a single output."""
-    lag = "" if test.lag is None else f"most {test.lag} sample{'s' * (test.lag != 1)} later"
+    samples = f"{test.lag} sample{'s' * (test.lag != 1)}"
+    lag = "" if test.lag is None else _MOST.get(test.fault, "").format(samples)
     source = f"of {'u' if test.fault == 'plant' else 'y'}{test.source + 1} " * (test.fault != "drift")
     channels = f"{source}in y{test.output + 1}" * (model.outputs + model.inputs > 2)
-    return "".join(f"{part}, " for part in (lag, channels) if part)
+    return ", ".join(filter(None, (lag, channels))) or "they follow a trend"

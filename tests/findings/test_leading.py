@@ -195,7 +195,7 @@ def test_every_kind_that_leaves_a_verdict_open_names_a_command():
     for code in open_ - {"campaign-refuted"}:
         first = leading([Finding(code, REFUTED, "x", "", {"rows": []})], None, DATA)
         assert first.command.startswith(
-            ("idesign assess SPEC DATA ", "idesign explore DATA", "idesign solve SPEC ")
+            ("idesign assess SPEC DATA", "idesign explore DATA", "idesign solve SPEC ")
         )
         assert "{" not in first.command.replace("{numerator", "")
 

@@ -16,12 +16,13 @@ from inputdesign_cli.findings import (
 )
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Objective
-from inputdesign_cli.outcome.design import Coverage
+from inputdesign_cli.outcome.design import Coverage, Loop
 from inputdesign_cli.outcome.robust import FloorUse, LostPlant
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, Searched, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.signal.selection import Record
+from inputdesign_cli.signal.settings import Quantiser
 from tests.support.wording import long_sentences
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
@@ -95,6 +96,7 @@ FOUND = {
     "record-too-few-values": records.too_short(6, 16),
     "bound-of-power-only": records.short_windows(12, 1000.0, 0.6),
     "noise-moves-input": records.noise_moves_input(np.array([0.2]), [3.0]),
+    "level-rounded": records.level_rounded([Quantiser(5, 24.0, 10.0)], 5.0),
     "record-less-accurate": records.less_accurate(1.2, 1.0),
     "start-from-rest": [records.start_matters(2.0), records.start_matters(np.inf)],
     "other-signal": [records.other_signal("a multisine"), records.other_signal("a multisine", 2.0)],
@@ -107,6 +109,7 @@ FOUND = {
     "initial-estimate-off": runs.initial_estimate_off(UNITS, {"design": ELSEWHERE}),
     "runs-see-one-minimum": runs.one_minimum(Searched(10, 3, 7)),
     "unstable-runs": runs.unstable_runs({"design": 3, "white": 0}, 100),
+    "loop-near-its-limit": designs.near_its_limit([None, Loop(1.9, 2.0), Loop(1.5, 2.0)]),
     "met-within-table": [designs.met_within_table(1e-5)],
 }
 

@@ -19,6 +19,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import NOTE, Finding, reasons
 from inputdesign_cli.findings.designed_records import level_notes
+from inputdesign_cli.findings.designs import near_its_limit
 from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal
 from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
@@ -115,6 +116,8 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
     verdict: Verdict = "undecided" if against else "met" if met else "missed"
     if verdict == "met":
         more += unseen(units, without)
+    elif verdict == "missed":
+        more += near_its_limit(one.loop for one in listed)
     entries = [(one.directed.of_structure, one.entry(units)) for one in without]
     assessment = Judged(
         verdict=verdict,
@@ -158,8 +161,13 @@ def _compared(
         asked=bool(question.asked),
         nominal_covariance=task.nominal_covariance,
     )
-    if task.foreseen is not None and task.foreseen.admits(estimate.theta, estimate.covariance):
-        distance = replace(distance, nominal=replace(distance.nominal, within_uncertainty=True))
+    if task.foreseen is not None:
+        missed = task.foreseen.missed(estimate.theta, estimate.covariance)
+        if missed is None:
+            distance = replace(distance, nominal=replace(distance.nominal, within_uncertainty=True))
+        else:
+            outside = tuple(f"{estimate.names[k]} {estimate.theta[k]:.4g}" for k in missed)
+            distance = replace(distance, outside=outside)
     return listed, without, distance
 
 

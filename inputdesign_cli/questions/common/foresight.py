@@ -76,15 +76,20 @@ class Foreseen:
     region: Knowledge
     of_plant: NDArray[np.int64]
 
-    def admits(self, theta: Array, covariance: Array) -> bool:
-        """Return whether an estimate (k,) with its covariance (k, k) is one of these plants."""
+    def missed(self, theta: Array, covariance: Array) -> NDArray[np.int64] | None:
+        """Return the parameters (indices) of an estimate (k,) for whose values the design was not made.
+
+        They lie beyond their intervals by more than their own covariance (k, k) explains. None: the estimate
+        is one of the plants; all of the plant's parameters together lie beyond an ellipsoid.
+        """
         of_plant, centre = self.of_plant, self.region.centre
         away = (theta[: centre.size] - centre)[of_plant]
         own = _OFF**2 * covariance[np.ix_(of_plant, of_plant)]
         wide = self.region.columns[of_plant]
         if self.region.box:
-            return bool(np.all(np.abs(away) <= np.abs(wide).sum(axis=1) + np.sqrt(np.diag(own))))
-        return bool(away @ np.linalg.solve(wide @ wide.T + own, away) <= 1.0)
+            beyond = np.abs(away) > np.abs(wide).sum(axis=1) + np.sqrt(np.diag(own))
+            return of_plant[beyond] if np.any(beyond) else None
+        return None if away @ np.linalg.solve(wide @ wide.T + own, away) <= 1.0 else of_plant
 
 
 def that_agrees(

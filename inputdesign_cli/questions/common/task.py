@@ -14,7 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.designed_records import noise_moves_input, start_matters
+from inputdesign_cli.findings.designed_records import level_rounded, noise_moves_input, start_matters
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.outcome import Signal
@@ -82,8 +82,8 @@ class SpectrumTask(ABC):
 
         A design is of spectra, which have no start; the record may live on its start from rest.
         """
-        samples = record.samples
-        found = [*findings]
+        samples, quantisers = record.samples, self.record.bounds.quantisers
+        found = [*findings, *level_rounded(quantisers, float(np.abs(samples).max()))]
         peaks = signal.input_peak if "amplitude.input" in (signal.of_limits or {}) else None
         if experiment.loop is not None and peaks is not None:
             within = min(len(samples), _LONG)
