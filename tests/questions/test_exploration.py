@@ -149,7 +149,7 @@ def test_signals_beyond_arithmetic_are_refused_by_their_row(scale, samples, tmp_
         assert told.location.line >= 2
 
 
-@pytest.mark.parametrize("times", [[3, 2, 1, 0], [0, 0, 1, 2], [0, 1, 1, 2], [1e17] * 4, [0, 2, 1, 3]])
+@pytest.mark.parametrize("times", [[3, 2, 1, 0], [0, 0, 1, 2], [0, 1, 1, 2], [0, 2, 1, 3]])
 def test_times_that_do_not_increase_are_named_by_every_command(times, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,u,y\n" + "".join(f"{t!r},{i % 2},{i}\n" for i, t in enumerate(times)))

@@ -119,8 +119,8 @@ def test_columns_of_other_names_or_units_are_asked_for(header, log):
 
 def test_the_reference_of_a_loop_is_the_column_that_is_called_so(tmp_path):
     rows = "\n".join(f"{2 * k},{u},{y},{u + y}" for k, (u, y) in enumerate(zip(U, Y, strict=True)))
-    (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],reference r [%]\n{rows}\n")
-    channels = {"u1": ("inlet valve", "%"), "y1": ("", "cm")}
+    (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],r\n{rows}\n")
+    channels = {"u1": ("inlet valve", "%"), "y1": ("level", "cm")}
     loop = replace(UNITS, closed_loop=True, channels=channels)
     np.testing.assert_allclose(read(tmp_path / "d.csv", loop).r[:, 0], U + Y)
     # The set point of a controller is in the unit of the output: it is not what is added to the input.

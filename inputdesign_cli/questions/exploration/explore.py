@@ -42,7 +42,7 @@ from inputdesign_cli.questions.assessment.outcome import fit_of, fit_to_log, res
 from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.exploration.build import Asked, build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import exploration_of, structure_curves, validation_of
-from inputdesign_cli.records import Preparation, Record, read_data, read_logs, read_sheet, with_channels
+from inputdesign_cli.records import Preparation, Record, read_data, read_logs
 
 # Where more shifts appear, once these are left out so often, the plant is none of the models tried.
 _MOST_SHIFTS = 2
@@ -200,14 +200,6 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         DataError: the data cannot be used, or an output never changes.
     """
     started = time.perf_counter()
-    counts = {"u": header.units.inputs, "y": header.units.outputs}
-    sheet = read_sheet(paths[0], preparation=preparation)
-    own = {
-        name: column
-        for name, column in with_channels(sheet, preparation.columns).items()
-        if name in preparation.columns or int(name[1:]) <= counts[name[0]]
-    }
-    preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
     with blaming_columns(paths[0], data):
         check_varying((), data.u[:, :0], data.y)
