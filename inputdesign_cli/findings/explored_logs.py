@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.explore import (
-    Found,
-    Parts,
-    by_chance,
-    exact_multiple,
+from inputdesign_cli.explore.fits import Parts, by_chance
+from inputdesign_cli.explore.joint import Found
+from inputdesign_cli.explore.relation import (
     left_of_inputs,
     like_answers,
     only_answers,
@@ -54,17 +52,10 @@ def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
 @finding(DOUBT, "input-only-answers", "Move the reference of the loop, or add dither to the input.")
 def undriven(kind: FindingKind, parts: Parts) -> list[Finding]:
     """An input follows from the outputs alone. The inverse of the controller explains the data as well."""
-    inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
-    found = []
+    inputs, found = parts[0][0].shape[1], []
     for j in only_answers(parts):
         name = signal_name("u", j, inputs)
         fact = f"{name}, and the plant is not identifiable"
-        if same := exact_multiple(parts, j):
-            output, factor = signal_name("y", same[0], outputs), same[1]
-            fact = (
-                f"{name} is {factor:.4g} {output} in every row, but for a level. A proportional controller "
-                "has a reference at rest, or one column was computed from the other"
-            )
         found.append(kind.found(fact, where=name))
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from inputdesign_cli.explore import Found
+from inputdesign_cli.explore.joint import Found
 from inputdesign_cli.finding import NOTE, Finding, FindingKind, finding
 from inputdesign_cli.findings.explored_logs import open_parameters
 from inputdesign_cli.findings.places import Record
@@ -16,11 +16,7 @@ from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
-_IN_WORDS = {
-    "FOPDT": "a lag with dead time",
-    "SOPDT": "second order of damping zeta, with dead time",
-    "TOPDT": "third order with dead time",
-}
+_IN_WORDS = {"FOPDT": "a lag with dead time", "SOPDT": "second order of damping zeta, with dead time"}
 _DIRECT = "The direct method is used; the noise model must then be right"
 _LOOP = (
     f"It is taken for a loop; or the input was logged late, or the columns are swapped. {_DIRECT}. Without a "
@@ -55,15 +51,15 @@ def explored_structures(log: Record, found: Found, loops: Sequence[tuple[int, fl
 def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
     """A structure was chosen. Of structures that explain unseen data as well, the simplest wins."""
     said = []
-    for i, (chosen, taken, ranges) in enumerate(zip(found.outputs, found.taken, found.ranges, strict=True)):
+    for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
         family, known = taken.orders.family, _IN_WORDS.get(taken.orders.family)
         times = f"times in {log.time_unit}" if taken.orders.physical else ""
         orders = "; ".join(filter(None, (family if known else "", orders, times)))
         delays = " and ".join(
             f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: "
-            f"{f'{low} at least' if high is None else low if low == high else f'{low} to {high}'})"
-            for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
+            f"{low if low == high else f'{low} to {high}'})"
+            for j, delay, (low, high) in zip(found.moving, taken.orders.delays, taken.ranges, strict=True)
         )
         judge = "the record" if found.split == "none" else "the part that judges"
         better, tried = max(c.validation for c in chosen.candidates), len(chosen.candidates)

@@ -20,8 +20,6 @@ _CHANNELS = {
     "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
     "y": re.compile(r"(y|output)[ _]?(\d*)(?![a-z0-9]).*"),
 }
-# What separates entries of the option, or quotes it.
-_SEPARATORS = frozenset(',="')
 TIME_UNITS = tuple(SECONDS)
 _SPELLINGS = {
     "s": "sec secs second seconds",
@@ -280,28 +278,16 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
     taken = {at for column in found.values() for at in named_columns(sheet, column.strip().lower())}
     free = [i for i, column in enumerate(sheet.columns) if i not in taken and column.fault is None]
     timed = time_columns(sheet)
-    for at in [i for i in free if sheet.name_of(i).lower() in timed or i in rising(sheet)][:1]:
-        found.setdefault("time", called(sheet, at))
-        free.remove(at)
+    rising = [i for i in free if sheet.columns[i].mostly(rises=True) or sheet.name_of(i).lower() in timed]
+    if rising and "time" not in found:
+        found["time"] = str(rising[0] + 1)
+        free.remove(rising[0])
     words = [set(re.split(r"[\W_\d]+", sheet.name_of(i).lower())) for i in range(len(sheet.columns))]
     for role in sorted(set(wanted) - found.keys()):
         own, other = (set(_WORDS[letter].split()) for letter in (role[0], "y" if role[0] == "u" else "u"))
         strange = [(not words[i] & own, bool(words[i] & other), i) for i in free]
         likely = [i for *_, i in sorted(strange)]
-        found[role] = called(sheet, likely[0]) if likely else "NAME"
+        found[role] = str(likely[0] + 1) if likely else "NAME"
         free = [i for i in free if i not in likely[:1]]
     in_order = sorted(found, key=lambda role: (role != "time", role))
     return f'--columns "{",".join(f"{role}={found[role]}" for role in in_order)}"'
-
-
-def called(sheet: Sheet, at: int) -> str:
-    """Return a column's name for options: its own if it names no other column, else its number."""
-    name = sheet.names[at].strip() if at < len(sheet.names) else ""
-    plain = bool(name) and not _SEPARATORS & set(name) and named_columns(sheet, name.lower()) == [at]
-    return name if plain else str(at + 1)
-
-
-def rising(sheet: Sheet) -> list[int]:
-    """Return the columns whose numbers rise from row to row, as times do."""
-    numbers = [column.numbers[~np.isnan(column.numbers)] for column in sheet.columns]
-    return [i for i, x in enumerate(numbers) if x.size > 1 and np.all(np.diff(x) > 0.0)]

@@ -12,9 +12,8 @@ from typer.testing import CliRunner
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.finding import REFUTED, Finding, Severity
+from inputdesign_cli.finding import Severity
 from inputdesign_cli.questions import explore, identify, solve
-from inputdesign_cli.questions.exploration import explore as exploring
 from inputdesign_cli.questions.exploration.build import Asked, spec_text
 from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
@@ -200,19 +199,6 @@ def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_pa
     assert np.mean(inside) > 0.85
     np.testing.assert_array_equal(read_log(plain, Preparation()).r, rows[:, 2:])
     assert read_log(named, Preparation()).r is None
-
-
-@pytest.mark.slow
-def test_an_input_behind_a_reference_is_not_taken_for_late(rows, tmp_path, monkeypatch):
-    """It answers the output, whose noise it therefore seems to follow."""
-    late = [Finding("input-logged-late", REFUTED, "early")]
-    monkeypatch.setattr(exploring, "late_inputs", lambda parts: late)
-    found = {}
-    for header in ("u,y,r", "u,y,other"):
-        log = saved(tmp_path / f"{header[-1]}.csv", rows, header)
-        found[header] = explore([log], Preparation(columns={"u1": "u", "y1": "y"})).reasons
-    assert "early" not in found["u,y,r"]
-    assert "early" in found["u,y,other"]
 
 
 def test_a_column_called_r_that_holds_no_reference_is_left_alone(rows, tmp_path):

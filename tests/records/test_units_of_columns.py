@@ -77,14 +77,10 @@ def test_columns_go_by_the_names_of_channels_and_other_units_are_found(header, u
 
 @pytest.mark.parametrize(
     ("header", "u", "y"),
-    [
-        ("time,Heater 1,Temp 1", "Heater 1", "Temp 1"),
-        ("time,TIC.OP,TIC.PV", "TIC.OP", "TIC.PV"),
-        ("time,steam.PV,temp.OP (%)", "temp.OP (%)", "steam.PV"),
-    ],
+    [("time,Heater 1,Temp 1", 2, 3), ("time,TIC.OP,TIC.PV", 2, 3), ("time,steam.PV,temp.OP (%)", 3, 2)],
 )
 def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
-    """The words of control systems decide: OP is the input, PV the output."""
+    """By their words: OP is the input, PV the output."""
     path = log(header, EVEN)
     with pytest.raises(DataError, match=re.escape(header.replace(",", ", "))) as raised:
         read(path)
