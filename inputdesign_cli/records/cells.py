@@ -1,14 +1,13 @@
-"""What the cells of a table say: numbers, or that there is no value."""
+"""What the cells of a table say: numbers, dates and times of day, or that there is no value."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from inputdesign_cli.records.moments import is_moment, moments_column
 from inputdesign_cli.records.sheet import Column
 
 # What says that there is no value, with what sheets write in place of a number that they do not have.
@@ -25,6 +24,23 @@ _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
 _THOUSAND = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _SAY = "say which with --decimal , or --decimal .; or write decimal points and nothing between thousands"
 
+# The year first, or points behind a day; with slashes and hyphens the dates must show what is the month.
+_DAYS = (
+    *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y"),
+    *("%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y", "%d-%b-%Y", "%d %b %Y"),
+)
+_MOMENT = re.compile(
+    r"(?P<day>\d{4}([-./])\d\d?\2\d\d?|\d\d?([-./])\d\d?\3(?:\d{4}|\d\d)|\d\d?[- ][A-Za-z]{3}[- ]\d{4})?[T ]?"
+    r"(?P<clock>(?P<hour>[01]?\d|2[0-3]):(?P<minute>[0-5]\d)(?::(?P<second>[0-5]\d(?:[.,]\d{1,9})?))?"
+    r"(?:\s?(?P<half>[AaPp])[Mm])?)?\s*(?P<zone>Z|[+-]\d\d:?\d\d)?",
+    re.ASCII,
+)
+_A_DAY = 86_400.0
+SAY_TIME = (
+    "say how they are written, as in --time-format '%d.%m.%Y %H:%M:%S', or write the year first: 2024-03-12 "
+    "10:15:00"
+)
+
 
 def is_missing(cell: str) -> bool:
     """Return whether a cell says that there is no value, or holds an error of a spreadsheet."""
@@ -34,7 +50,7 @@ def is_missing(cell: str) -> bool:
 def is_plain(cell: str) -> bool:
     """Return whether a cell is a number, with a decimal point or comma, or a date."""
     bare = cell.strip()
-    return _is_number(bare) or _COMMA.fullmatch(bare) is not None or is_moment(bare)
+    return _is_number(bare) or _COMMA.fullmatch(bare) is not None or _parts(bare) is not None
 
 
 def is_value(cell: str) -> bool:
@@ -95,3 +111,85 @@ def _like_thousands(texts: Sequence[str]) -> list[bool]:
     hundreds = any("." not in text and len(text.lstrip("+-")) == 3 for text in there)
     whole = hundreds and all(map(_WHOLE.fullmatch, there))
     return [whole and "." in text for text in texts]
+
+
+def _parts(cell: str) -> dict[str, str] | None:
+    """Return the parts of a date or time: `day`, `hour` and so on, empty where there is none."""
+    found = _MOMENT.fullmatch(cell)
+    parts = found.groupdict("") if found else {}
+    return parts if parts.get("day") or parts.get("clock") else None
+
+
+def joined_clocks(cells: Sequence[Sequence[str]]) -> tuple[list[Sequence[str]], list[int]]:
+    """Return columns of cells where the only one of dates and the only one of times of day hold both.
+
+    The numbers are those of these two columns; there are none if nothing was joined.
+    """
+    first = [_parts(next((cell.strip() for cell in column if cell.strip()), "")) or {} for column in cells]
+    days = [i for i, parts in enumerate(first) if parts.get("day") and not parts["clock"]]
+    clocks = [i for i, parts in enumerate(first) if parts.get("clock") and not parts["day"]]
+    if len(days) != 1 or len(clocks) != 1:
+        return list(cells), []
+    pair = zip(cells[days[0]], cells[clocks[0]], strict=True)
+    both = [f"{day.strip()} {clock.strip()}" if day.strip() and clock.strip() else "" for day, clock in pair]
+    found = sorted([*days, *clocks])
+    return [both if i in found else column for i, column in enumerate(cells)], found
+
+
+def moments_column(cells: Sequence[str], form: str | None = None) -> Column | None:
+    """Return the column of times that cells hold, NaN in empty ones; None if they are no dates or times.
+
+    Args:
+        form: how they are written; None: ISO 8601, or day, month and year in an order that is clear.
+    """
+    import pandas
+
+    there, numbers = [i for i, cell in enumerate(cells) if cell], np.full(len(cells), np.nan)
+    texts = [cells[i] for i in there]
+    if form is not None:
+        read = pandas.to_datetime(pandas.Series(texts, dtype=object), format=form, errors="coerce", utc=True)
+        if not there or read.isna().any():
+            return None
+        numbers[there] = (read - read[0]).dt.total_seconds()
+        return Column(numbers, dated=True)
+    parts = [_parts(text) or {} for text in texts]
+    if not parts or not parts[0]:
+        return None
+    kinds = [[bool(one.get(key)) for key in ("day", "zone")] for one in parts]
+    fits = np.array([bool(one) and kind == kinds[0] for one, kind in zip(parts, kinds, strict=True)])
+    seconds, done = np.array([_seconds(one) if one else np.nan for one in parts]), tuple[str, ...]()
+    if kinds[0][0]:
+        days = pandas.Series([one.get("day") for one in parts], dtype=object)
+        known = [
+            one for one in _DAYS if pandas.notna(pandas.to_datetime(days[0], format=one, errors="coerce"))
+        ]
+        read = [pandas.to_datetime(days, format=one, errors="coerce") for one in known or _DAYS[:1]]
+        best = max(read, key=lambda one: one.notna().sum())
+        fits &= best.notna().to_numpy()
+        seconds += (best - best[0]).dt.total_seconds().to_numpy()
+        others = [(one - one[0] - (best - best[0])) for one in read if one.notna().all()]
+        if fits.all() and any(one.abs().max() > pandas.Timedelta(0) for one in others):
+            return _unread(cells, there[0], "may have the day or the month first")
+    else:
+        falls = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _A_DAY)
+        seconds += _A_DAY * falls
+        done = (f"passes midnight {falls[-1]} times: a day was added each time",) * bool(falls[-1])
+    if not fits.all():
+        at = int(np.argmin(fits))
+        return _unread(cells, there[at], f"is no date or time{' as those above are' if at else ''}")
+    numbers[there] = seconds - seconds[0]
+    return Column(numbers, dated=True, done=done)
+
+
+def _seconds(parts: Mapping[str, str]) -> float:
+    """Return the seconds of a time of day since midnight, in UTC if it has a zone."""
+    hour, minute = int(parts["hour"] or 0), int(parts["minute"] or 0)
+    if parts["half"]:
+        hour = hour % 12 + 12 * (parts["half"] in "Pp")
+    zone = parts["zone"].replace(":", "").replace("Z", "+0000") or "+0000"
+    ahead = int(f"{zone[0]}1") * (60 * int(zone[1:3]) + int(zone[3:]))
+    return 3600.0 * hour + 60.0 * (minute - ahead) + float(parts["second"].replace(",", ".") or 0.0)
+
+
+def _unread(cells: Sequence[str], row: int, wrong: str) -> Column:
+    return Column(np.full(len(cells), np.nan), (row, cells[row]), wrong, SAY_TIME, dated=True)

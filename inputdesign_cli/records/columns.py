@@ -11,7 +11,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.prepared_records import name_and_unit, plain_unit
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.records.moments import SAY_TIME
+from inputdesign_cli.records.cells import SAY_TIME
 from inputdesign_cli.records.sheet import Column, Sheet
 from inputdesign_cli.specification.models.units import SECONDS
 
@@ -281,7 +281,7 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
     rising = [i for i in free if sheet.columns[i].mostly(rises=True) or sheet.name_of(i).lower() in timed]
     if rising and "time" not in found:
         found["time"] = str(rising[0] + 1)
-        free.remove(rising[0])
+    free = [i for i in free if i not in rising[:1] and not sheet.columns[i].dated]
     words = [set(re.split(r"[\W_\d]+", sheet.name_of(i).lower())) for i in range(len(sheet.columns))]
     for role in sorted(set(wanted) - found.keys()):
         own, other = (set(_WORDS[letter].split()) for letter in (role[0], "y" if role[0] == "u" else "u"))

@@ -22,11 +22,10 @@ from inputdesign_cli.findings.prepared_records import (
 from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.columns import roles_of
-from inputdesign_cli.records.joined import joined_rows
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
 from inputdesign_cli.records.sheet import Preparation, Sheet
-from inputdesign_cli.records.signals import Signals, is_even, signals_of, typical_step
+from inputdesign_cli.records.signals import Signals, is_even, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
 # The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
@@ -186,8 +185,7 @@ def _record(signals: Signals, step: float, unit: str, preparation: Preparation) 
 def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float | None:
     """Return the sample time by the option, the times or the file; None if nothing states it.
 
-    Raises:
-        DataError: `data-not-uniform`, times advance by something else than the user states.
+    Raises `DataError` (`data-not-uniform`): times advance by something else than the user states.
     """
     apart = typical_step(signals.time) if signals.name else np.nan
     if stated is None:
@@ -204,8 +202,7 @@ def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float
 def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signals:
     """Return the signals with times in the unit of the spec.
 
-    Raises:
-        DataError: `data-wrong-unit`; `data-not-uniform`, the sample time differs.
+    Raises `DataError`: `data-wrong-unit`; `data-not-uniform`, the sample time differs.
     """
     sheet, stated, scale = signals.sheet, preparation.sample_time, 1.0
     if signals.unit and (signals.name or preparation.time_unit):

@@ -11,9 +11,17 @@ from itertools import zip_longest
 
 import numpy as np
 
-from inputdesign_cli.records.cells import ERROR, column_of, decimal_of, is_missing, is_plain, is_value
+from inputdesign_cli.records.cells import (
+    ERROR,
+    column_of,
+    decimal_of,
+    is_missing,
+    is_plain,
+    is_value,
+    joined_clocks,
+    moments_column,
+)
 from inputdesign_cli.records.columns import is_called_time, named_columns
-from inputdesign_cli.records.moments import joined_clocks, moments_column
 from inputdesign_cli.records.sheet import Column, Sheet, Source
 
 Rows = list[tuple[int, list[str]]]
