@@ -13,15 +13,7 @@ from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore.division import busiest, cut, divided
 from inputdesign_cli.explore.drift import levelled, slopes_of
-from inputdesign_cli.explore.fits import (
-    NOT_COMPUTED,
-    Fits,
-    Parts,
-    fits,
-    is_steady,
-    output_error_form,
-    percent,
-)
+from inputdesign_cli.explore.fits import NOT_COMPUTED, Fits, Parts, fits, is_steady, output_error_form
 from inputdesign_cli.explore.relation import moving_in
 from inputdesign_cli.explore.search import Candidate, Chosen, Family, certain, explore_structure
 from inputdesign_cli.explore.structures import process_models
@@ -47,7 +39,6 @@ class Found:
         estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
             stand in all.
         validation: the fits of the same structures, estimated on one part, to the other.
-        helped: (p,), per cent by which the inputs make the prediction errors of that part smaller.
         split: the part that estimates and the part that judges; without one the whole record does both.
         still: inputs (from zero) that never move.
         slopes: (p,), a sample, of the line through all records that was removed from each output.
@@ -60,7 +51,6 @@ class Found:
     used: Parts
     samples: NDArray[np.int64]
     validation: Fits
-    helped: tuple[float, ...]
     split: str
     still: tuple[int, ...]
     slopes: Array
@@ -130,7 +120,6 @@ def explore_records(
     begins = np.cumsum([0, *(len(y) for _, y in parts)])[:-1].tolist()
     taken, estimate, model = _estimated(found, cut(moved, at), feedback, lines)
     of_first = joined(taken, len(moving), range(len(moving)))
-    judged, idle = fits(of_first, second), fits(of_first, [(0.0 * u, y) for u, y in second])
     whole = joined(taken, len(moving) + len(still), moving).at(model.theta, model.covariance)
     return Found(
         tuple(found),
@@ -139,8 +128,7 @@ def explore_records(
         replace(estimate, names=whole.names),
         cut(parts, at),
         np.concatenate([np.arange(b + k.start, b + k.stop) for b, k in zip(begins, at, strict=True)]),
-        judged,
-        percent(judged.errors, idle.errors),
+        fits(of_first, second),
         split,
         still,
         slopes,

@@ -67,16 +67,13 @@ def check_unpredictable(parts: Parts) -> None:
     Raises:
         SpecError: `noise-free-data`.
     """
-    lags = _lags(parts)
-    long = [part for part in _centred(parts, 3 * lags) if np.ptp(part[1])]
-    if sum(len(y) for _, y in parts) < _FEWEST_SAMPLES or not long:
+    signals = _lagged([part for part in parts if np.ptp(part[1])], _lags(parts))
+    if signals is None or sum(len(y) for _, y in parts) < _FEWEST_SAMPLES:
         return
-    lines = [np.column_stack([np.ones(len(y)), np.linspace(-1.0, 1.0, len(y))])[lags:] for _, y in long]
-    pasts = [np.column_stack([past(y, lags), past(u, lags)]) for u, y in long]
-    rows = [np.column_stack(both) for both in zip(pasts, lines, strict=True)]
-    targets = [y[lags:] for _, y in long]
-    errors = np.concatenate(residuals(rows, targets))
-    check_noisy(np.diag(np.mean(errors**2, axis=0)), np.concatenate(targets))
+    _, y, past_u, past_y = signals
+    line = np.column_stack([np.ones(len(y)), np.linspace(-1.0, 1.0, len(y))])
+    (errors,) = residuals([np.column_stack([past_y, past_u, line])], [y])
+    check_noisy(np.diag(np.mean(errors**2, axis=0)), y)
 
 
 def only_answers(parts: Parts) -> list[int]:
@@ -84,19 +81,16 @@ def only_answers(parts: Parts) -> list[int]:
 
     Inputs that follow from past inputs alone are not among them.
     """
-    lags = min(_lags(parts), 5)
-    long = _centred(parts, 3 * lags)
-    if not long:
+    signals = _lagged(parts, min(_lags(parts), 5))
+    if signals is None:
         return []
-    own = np.concatenate([past(u, lags) for u, _ in long])
-    outputs = np.concatenate([np.column_stack([y[lags:], past(y, lags)]) for _, y in long])
-    found = []
-    for j, target in enumerate(np.concatenate([u[lags:] for u, _ in long]).T):
-        power = float(target @ target)
-        alone, together = _left(own, target), _left(np.column_stack([own, outputs]), target)
-        if power > 0.0 and alone > 1e-3 * power and together <= _FOLLOWS * power:
-            found.append(j)
-    return found
+    u, y, own, past_y = signals
+    every, powers = np.column_stack([own, y, past_y]), np.sum(u**2, axis=0)
+    return [
+        j
+        for j, (x, power) in enumerate(zip(u.T, powers.tolist(), strict=True))
+        if power > 0.0 and _left(own, x) > 1e-3 * power and _left(every, x) <= _FOLLOWS * power
+    ]
 
 
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
@@ -175,6 +169,16 @@ def _lags(parts: Parts) -> int:
 def _centred(parts: Parts, shortest: int) -> list[tuple[Array, Array]]:
     """Return the records of more than `shortest` samples, about their means."""
     return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > shortest]
+
+
+def _lagged(parts: Parts, lags: int) -> tuple[Array, Array, Array, Array] | None:
+    """Return inputs and outputs of all records about their means, and their pasts; None for short records."""
+    kept = _centred(parts, 3 * lags)
+    if not kept:
+        return None
+    now = [np.concatenate([part[k][lags:] for part in kept]) for k in (0, 1)]
+    before = [np.concatenate([past(part[k], lags) for part in kept]) for k in (0, 1)]
+    return now[0], now[1], before[0], before[1]
 
 
 def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:

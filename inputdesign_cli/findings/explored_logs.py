@@ -152,17 +152,12 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
         output = signal_name("y", i, found.model.outputs)
         luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
-        # What wanders leaves any simulation; what is new in it from sample to sample does not wander.
-        little = not found.helped[i] > 0.0 if found.wanders[i] else fit < max(LEAST_FIT, luck)
+        # What wanders leaves any simulation: whether inputs help to predict it decides there.
+        little = not found.wanders[i] and fit < max(LEAST_FIT, luck)
         fact = (
             f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone. The inputs "
             f"hardly act, or by more than {chosen.swept.most} samples later"
         )
-        if found.wanders[i]:
-            fact = (
-                f"{output} wanders, and the inputs do not help to predict it from sample to sample. That the "
-                f"simulation explains {fit:.1f} % may be chance"
-            )
         doubtful += kind.when(little, fact, where=output, fit_percent=fit, chance_percent=luck)
     return doubtful
 

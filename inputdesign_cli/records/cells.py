@@ -121,9 +121,9 @@ def _parts(cell: str) -> dict[str, str] | None:
 
 
 def joined_clocks(cells: Sequence[Sequence[str]]) -> tuple[list[Sequence[str]], list[int]]:
-    """Return columns of cells where the only one of dates and the only one of times of day hold both.
+    """Return columns of cells, the only one of dates joined with the only one of times of day.
 
-    The numbers are those of these two columns; there are none if nothing was joined.
+    Both then hold dates and times. The numbers (from zero) say which two columns these are, if any.
     """
     first = [_parts(next((cell.strip() for cell in column if cell.strip()), "")) or {} for column in cells]
     days = [i for i, parts in enumerate(first) if parts.get("day") and not parts["clock"]]

@@ -177,7 +177,8 @@ def _of(letter: str, count: int) -> list[str]:
 
 def _whole_name(sheet: Sheet, role: str, column: str) -> str:
     """Return the whole name of a column that the user names, which states its unit."""
-    at = named_columns(sheet, column.strip().lower())
+    unread = role == "time" and without_times(sheet, {role: column})
+    at = [] if unread else named_columns(sheet, column.strip().lower())
     name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names else ""
     return name if sheet.header.count(name.lower()) == 1 else column
 

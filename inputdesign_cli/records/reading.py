@@ -61,10 +61,7 @@ def _bytes(source: Source, path: Path) -> bytes:
     try:
         return read_regular(path, _MOST_BYTES + 1)
     except FileNotFoundError:
-        what, hint = (
-            "does not exist",
-            "check its name and folder; paths in a spec begin at the folder of the spec",
-        )
+        what, hint = "does not exist", "check its name; paths in a spec begin at the folder of the spec"
         if str(path) == STANDARD_STREAM:
             hint = "data are not read from standard input: write them to a file, and name that"
     except (OSError, ValueError) as error:

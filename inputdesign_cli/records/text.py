@@ -62,19 +62,13 @@ def decoded(source: Source, raw: bytes) -> str:
     if first := _CONTROL.search(text):
         line = len(f"{text[: first.start()]}|".splitlines())
         what = f"is no clean text: line {line} has a character that no text has (code {ord(first[0])})"
-        hint = (
-            "take the line out, or save the file as UTF-8; unpack an archive; arrays have the ending .mat or "
-        )
-        raise source.unreadable(what, f"{hint}.npz, tables .xlsx or .parquet", line)
+        hint = "take the line out, or save the file as UTF-8; files of other kinds have their usual endings"
+        raise source.unreadable(what, hint, line)
     return text
 
 
 def table_in(source: Source, text: str) -> Sheet:
-    """Read the table in a text.
-
-    Raises:
-        DataError: `data-unreadable`, `data-extra-field`.
-    """
+    """Read the table in a text. Raises `DataError`: see `sheet_of`."""
     said = source.given.separator
     separator = _SAID.get(said, said) if said else _separator_of(text)
     rows, passed = _rows_of(source, text, separator)
@@ -103,9 +97,7 @@ def sheet_of(
     width, given = len(names) or max(len(row) for _, row in body), source.given
     if width > _MOST_FIELDS:
         raise source.unreadable(f"has more than {_MOST_FIELDS} columns", "write one sample a line")
-    cells, clocks = joined_clocks(
-        [[*column] for column in zip_longest(*(row for _, row in body), fillvalue="")][:width]
-    )
+    cells, clocks = joined_clocks([*zip_longest(*(row for _, row in body), fillvalue="")][:width])
     every = [cell for column in cells for cell in column if cell.strip()]
     decimal = given.decimal or decimal_of(every, between_commas=separator == ",")
     columns = [column_of(column, decimal, stated=bool(given.decimal)) for column in cells]
