@@ -125,13 +125,13 @@ def joined_clocks(cells: Sequence[Sequence[str]]) -> tuple[list[Sequence[str]], 
 
     Both then hold dates and times. The numbers (from zero) say which two columns these are, if any.
     """
-    first = [_parts(next((cell.strip() for cell in column if cell.strip()), "")) or {} for column in cells]
+    first = [_parts(next((x.strip() for x in column if not is_missing(x)), "")) or {} for column in cells]
     days = [i for i, parts in enumerate(first) if parts.get("day") and not parts["clock"]]
     clocks = [i for i, parts in enumerate(first) if parts.get("clock") and not parts["day"]]
     if len(days) != 1 or len(clocks) != 1:
         return list(cells), []
-    pair = zip(cells[days[0]], cells[clocks[0]], strict=True)
-    both = [f"{day.strip()} {clock.strip()}" if day.strip() and clock.strip() else "" for day, clock in pair]
+    pairs = [*zip(cells[days[0]], cells[clocks[0]], strict=True)]
+    both = ["" if is_missing(x) or is_missing(y) else f"{x.strip()} {y.strip()}" for x, y in pairs]
     found = sorted([*days, *clocks])
     return [both if i in found else column for i, column in enumerate(cells)], found
 

@@ -123,7 +123,7 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
         if column.fault is not None:
             row, text = column.fault
             message = f"{text!r} in column {wanted[role]} {column.wrong}"
-            hint = SAY_TIME if role == "time" else column.hint
+            hint = f"{column.hint}; {SAY_TIME}" if role == "time" and not column.dated else column.hint
             raise sheet.error("data-not-a-number", message, hint, row)
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 

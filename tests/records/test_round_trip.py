@@ -163,6 +163,13 @@ def test_a_date_and_a_time_of_day_are_one_moment(tmp_path):
     names = ("Datum;Uhrzeit", "valve", "level")
     (tmp_path / "log.csv").write_text(text(";", ".", moment, names))
     check(tmp_path / "log.csv", Preparation(columns={"u1": "valve", "y1": "level"}))
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    lines[16] = f"-;{lines[16].partition(';')[2]}"  # a date is missing
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    assert read_log(tmp_path / "log.csv", Preparation(columns=COLUMNS | {"time": "Datum"})).lengths == (
+        15,
+        14,
+    )
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("us", 1e6)])
