@@ -217,8 +217,10 @@ class Process:
             s, gains = (s[1:] if self.rising else s), gains * abs(s[0])
         below = self._below(s) if self.lags else []
         found: list[float] = []
-        for gain, delay in zip(gains, near.delays, strict=True):
-            late = max(delay - 1, _LEAST) * self.step
+        for gain, row, delay in zip(gains, near.B, near.delays, strict=True):
+            # A lag of first order that begins between two samples shares its first two coefficients.
+            shares = self.order == 1 == self.lags and row[0] * row[1] > 0.0
+            late = max(delay - 1 + (row[1] / (row[0] + row[1]) if shares else 0.0), _LEAST) * self.step
             found += [float(gain), *below, *([_ZERO * below[0]] if self.zero else []), late]
         return np.array([*found, *np.zeros(2 * self.noise)])
 
