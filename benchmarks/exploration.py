@@ -22,8 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.explore import fits
 from inputdesign_cli.explore.division import divided
+from inputdesign_cli.explore.fits import fits
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions import explore

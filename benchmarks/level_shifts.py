@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import scipy.signal
 
-from inputdesign_cli.explore import explore_records
+from inputdesign_cli.explore.joint import explore_records
 from inputdesign_cli.questions.exploration.explore import explored_beside_shifts
 from inputdesign_cli.records import Preparation, read_log
 

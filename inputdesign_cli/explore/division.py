@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,32 +23,27 @@ def divided(parts: Parts) -> tuple[Parts, Parts, str]:
     Beginning and end are parted as a rule. Where an input rests in one of the two, blocks take turns. Where
     it rests in any blocks as well, the whole record does both.
     """
-    for first, second, split in _divisions(parts):
-        if _moves(first, parts) and _moves(second, parts):
-            return first, second, split
-    return parts, parts, "none"
-
-
-def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, str]]:
     ends = np.cumsum([len(y) for _, y in parts])
-    total = int(ends[-1])
     for share in _CUTS:
         # Of a record that ends before the cut, all.
         at = [
-            max(share * total // 100 - int(end) + len(y), 0) for end, (_, y) in zip(ends, parts, strict=True)
+            max(share * int(ends[-1]) // 100 - int(end) + len(y), 0)
+            for end, (_, y) in zip(ends, parts, strict=True)
         ]
-        first, second = cut(parts, [slice(k) for k in at]), cut(parts, [slice(k, None) for k in at])
-        first, second = ([part for part in some if len(part[1])] for some in (first, second))
-        yield first, second, f"the first {share} % and the rest"
+        sides = cut(parts, [slice(k) for k in at]), cut(parts, [slice(k, None) for k in at])
+        first, second = ([part for part in side if len(part[1])] for side in sides)
+        if _moves(first, parts) and _moves(second, parts):
+            return first, second, f"the first {share} % and the rest"
     for count in _BLOCKS:
-        length = max(total // count, 1)
+        length = max(int(ends[-1]) // count, 1)
         blocks = [
             (u[begin : begin + length], y[begin : begin + length])
             for u, y in parts
-            for begin in range(0, len(y), length)
-            if len(y) - begin >= length // 2
+            for begin in range(0, len(y) - length // 2, length)
         ]
-        yield blocks[::2], blocks[1::2], "blocks in turn"
+        if _moves(blocks[::2], parts) and _moves(blocks[1::2], parts):
+            return blocks[::2], blocks[1::2], "blocks in turn"
+    return parts, parts, "none"
 
 
 def _moves(some: Parts, whole: Parts) -> bool:

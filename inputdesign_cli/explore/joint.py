@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,17 +13,9 @@ from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore.division import busiest, cut, divided
 from inputdesign_cli.explore.drift import levelled, slopes_of
-from inputdesign_cli.explore.fits import (
-    NOT_COMPUTED,
-    Fits,
-    Parts,
-    fits,
-    is_steady,
-    output_error_form,
-    percent,
-)
+from inputdesign_cli.explore.fits import NOT_COMPUTED, Fits, Parts, fits, is_steady, output_error_form
 from inputdesign_cli.explore.relation import moving_in
-from inputdesign_cli.explore.search import Candidate, Chosen, Family, Ranges, certain, explore_structure
+from inputdesign_cli.explore.search import Candidate, Chosen, Family, certain, explore_structure
 from inputdesign_cli.explore.structures import process_models
 from inputdesign_cli.explore.sweep import lingering
 from inputdesign_cli.identification.checks import signal_name
@@ -42,13 +34,11 @@ class Found:
     """Holds the model that a record supports.
 
     Attributes:
-        outputs: the result for each; `taken` is the candidate that the model is made of, `ranges` has of
-            each input the 95 % interval of the delay.
+        outputs: the result for each; `taken` is the candidate that the model is made of.
         model: of all channels, estimated on the whole record; inputs that never move have no part in it.
         estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
             stand in all.
         validation: the fits of the same structures, estimated on one part, to the other.
-        helped: (p,), per cent by which the inputs make the prediction errors of that part smaller.
         split: the part that estimates and the part that judges; without one the whole record does both.
         still: inputs (from zero) that never move.
         slopes: (p,), a sample, of the line through all records that was removed from each output.
@@ -56,13 +46,11 @@ class Found:
 
     outputs: tuple[Chosen, ...]
     taken: tuple[Candidate, ...]
-    ranges: tuple[Ranges, ...]
     model: Model
     estimate: Estimate
     used: Parts
     samples: NDArray[np.int64]
     validation: Fits
-    helped: tuple[float, ...]
     split: str
     still: tuple[int, ...]
     slopes: Array
@@ -132,18 +120,15 @@ def explore_records(
     begins = np.cumsum([0, *(len(y) for _, y in parts)])[:-1].tolist()
     taken, estimate, model = _estimated(found, cut(moved, at), feedback, lines)
     of_first = joined(taken, len(moving), range(len(moving)))
-    judged, idle = fits(of_first, second), fits(of_first, [(0.0 * u, y) for u, y in second])
     whole = joined(taken, len(moving) + len(still), moving).at(model.theta, model.covariance)
     return Found(
         tuple(found),
         taken,
-        tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
         whole,
         replace(estimate, names=whole.names),
         cut(parts, at),
         np.concatenate([np.arange(b + k.start, b + k.stop) for b, k in zip(begins, at, strict=True)]),
-        judged,
-        percent(judged.errors, idle.errors),
+        fits(of_first, second),
         split,
         still,
         slopes,
@@ -161,10 +146,17 @@ def _estimated(
 
     Where all of them stand on the limit of stability, the first that is stable: it is like an integrator.
     """
-    reason, made = None, list[tuple[tuple[bool, bool], tuple[Candidate, ...], Estimate, Model]]()
-    for taken, good in _combinations(found):
-        if made and not good:
-            break
+    reason = bad_spec(
+        "no-structure",
+        "no stable model explains the record",
+        hint="record it in a loop; remove a drift (--detrend linear); or is it an integrator: --structure "
+        "integrator",
+        key="y",
+    )
+    made = list[tuple[bool, tuple[Candidate, ...], Estimate, Model]]()
+    for taken in _combinations(found):
+        if made and not all(c in one.good for c, one in zip(taken, found, strict=True)):
+            continue
         names = " and ".join(dict.fromkeys(c.orders.family for c in taken))
         report_progress(Counted(f"models of the whole record, now {names}", len(made), len(made) + 1))
         try:
@@ -179,20 +171,16 @@ def _estimated(
                 raise
             break
         steady = _steady(taken, model, used)
-        made.append(((not steady, output_error_form(model).radius > 1.0), taken, estimate, model))
+        made.append((not steady, taken, estimate, model))
         step = max(c.orders.step if c.orders.physical else 0.0 for c in taken)
         plant, deviations = model.in_plant, np.sqrt(np.diag(estimate.covariance))
         if steady and certain(model.theta[plant], deviations[plant], model.dead_times[plant], step):
             return made[-1][1:]
-    if stable := [one for one in made if not one[0][1]]:  # no spec holds an unstable plant without its loop
-        return min(stable, key=lambda one: one[0])[1:]
-    raise reason or bad_spec(
-        "no-structure",
-        "no stable model explains the record",
-        hint="record it in a loop; remove a drift (--detrend linear); or is it an integrator: --structure "
-        "integrator",
-        key="y",
-    )
+    # No spec holds an unstable plant without its loop.
+    stable = [one for one in made if output_error_form(one[3]).radius <= 1.0]
+    if not stable:
+        raise reason
+    return min(stable, key=lambda one: one[0])[1:]
 
 
 def _together(
@@ -216,12 +204,9 @@ def _together(
     return identified(joined(taken, inputs, range(inputs)), used)
 
 
-def _combinations(found: Sequence[Chosen]) -> list[tuple[tuple[Candidate, ...], bool]]:
-    """Return the structures for all outputs together, all in s or all in q^-1, the best first.
-
-    Each comes with whether all its structures explain their part of the record about as well as any.
-    """
-    first, listed = found[0].best.orders.physical, list[tuple[tuple[Candidate, ...], bool]]()
+def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
+    """Yield structures for all outputs together, all in s or all in q^-1, the best first."""
+    first = found[0].best.orders.physical
     for kind in (first, not first):
         every = [[c for c in one.candidates if c.orders.physical == kind] for one in found]
         # What is open on one part seldom is certain on the whole: after the best it is left out.
@@ -230,9 +215,7 @@ def _combinations(found: Sequence[Chosen]) -> list[tuple[tuple[Candidate, ...], 
             for own, one in zip(every, found, strict=True)
         ]
         for rank in range(max(map(len, ranked)) if all(ranked) else 0):
-            taken = tuple(own[min(rank, len(own) - 1)] for own in ranked)
-            listed.append((taken, all(c in one.good for c, one in zip(taken, found, strict=True))))
-    return sorted(listed, key=lambda one: not one[1])
+            yield tuple(own[min(rank, len(own) - 1)] for own in ranked)
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
@@ -245,19 +228,19 @@ def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Mo
         shapes, thetas = zip(*processes, strict=True)
         return process_models(shapes, thetas, np.eye(len(shapes)))
     models = [c.orders.model().at(c.model.theta) for c in taken if c.orders.physical is False]
-    outputs = range(len(models))
-    B = [[np.zeros(1)] * inputs for _ in outputs]
-    F = [[np.ones(1)] * inputs for _ in outputs]
-    delays = [[1] * inputs for _ in outputs]  # of what is absent, the length of B
-    for i, model in enumerate(models):
-        for k, j in enumerate(moving):
-            B[i][j], F[i][j], delays[i][j] = model.B[0][k], model.F[0][k], model.first[0][k]
+    at = {j: k for k, j in enumerate(moving)}
+
+    def spread(entries: Sequence[Array], absent: float) -> tuple[Array, ...]:
+        return tuple(entries[at[j]] if j in at else np.full(1, absent) for j in range(inputs))
+
     return PolynomialModel(
-        tuple(map(tuple, B)),
+        tuple(spread(model.B[0], 0.0) for model in models),
         tuple(model.A[0] for model in models),
-        tuple(map(tuple, F)),
+        tuple(spread(model.F[0], 1.0) for model in models),
         tuple(model.C[0] for model in models),
         tuple(model.D[0] for model in models),
         np.eye(len(models)),
-        delays=tuple(map(tuple, delays)),
+        delays=tuple(
+            tuple(model.first[0][at[j]] if j in at else 1 for j in range(inputs)) for model in models
+        ),
     )

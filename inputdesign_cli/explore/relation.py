@@ -1,14 +1,13 @@
 """Regressions without a model: do inputs excite a plant, move the outputs, answer them; is it unstable?
 
-Past innovations of the outputs help to predict an input in a loop only ([ljung-1999], Section 13.4). Future
-inputs help to predict an output only if the input was logged late. Two signals that wander, drift, or follow
-one cycle agree for long though neither moves the other ([granger-newbold-1974]). What is new in the
-output from sample to sample then answers nothing that the input does.
+Past innovations of the outputs help to predict an input in a loop only ([ljung-1999], Section 13.4). Two
+signals that wander, drift, or follow one cycle agree for long though neither moves the other
+([granger-newbold-1974]). What is new in the output from sample to sample then answers nothing that the input
+does.
 """
 
 from __future__ import annotations
 
-import bisect
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,17 +15,13 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import Parts, output_error_form
-from inputdesign_cli.identification import ScoreTest
 from inputdesign_cli.identification.checks import check_noisy, check_varying
 from inputdesign_cli.plant import Model
 
-_LAGS, _AHEAD, _PER_LAG, _PER_INPUT = 20, 8, 12, 10
-# Of more samples even what lies beyond the lags would show.
-_MOST_SAMPLES = 10_000
-# Levels: an input answers, an output comes before an input, an input helps to predict an output.
-_CERTAIN, _EARLY, _HELPS = 1e-4, 1e-6, 1e-3
+_LAGS, _PER_LAG, _PER_INPUT = 20, 12, 10
+# Levels: an input answers, an input helps to predict an output.
+_CERTAIN, _HELPS = 1e-4, 1e-3
 # An input follows from outputs and its own past if they leave less than this share of its power.
 _FOLLOWS = 1e-9
 # What is new in u and in y goes together beyond this correlation.
@@ -72,18 +67,13 @@ def check_unpredictable(parts: Parts) -> None:
     Raises:
         SpecError: `noise-free-data`.
     """
-    lags = _lags(parts)
-    long = [part for part in _centred(parts, 3 * lags) if np.ptp(part[1])]
-    if sum(len(y) for _, y in parts) < _FEWEST_SAMPLES or not long:
+    signals = _lagged([part for part in parts if np.ptp(part[1])], _lags(parts))
+    if signals is None or sum(len(y) for _, y in parts) < _FEWEST_SAMPLES:
         return
-    targets = [y[lags:] for _, y in long]
-    lines = [np.column_stack([np.ones(len(y)), np.arange(len(y))]) for y in targets]
-    rows = [
-        np.column_stack([past(y, lags), past(u, lags), line])
-        for (u, y), line in zip(long, lines, strict=True)
-    ]
-    errors = np.concatenate(residuals(rows, targets))
-    check_noisy(np.diag(np.mean(errors**2, axis=0)), np.concatenate(targets))
+    _, y, past_u, past_y = signals
+    line = np.column_stack([np.ones(len(y)), np.linspace(-1.0, 1.0, len(y))])
+    (errors,) = residuals([np.column_stack([past_y, past_u, line])], [y])
+    check_noisy(np.diag(np.mean(errors**2, axis=0)), y)
 
 
 def only_answers(parts: Parts) -> list[int]:
@@ -91,31 +81,16 @@ def only_answers(parts: Parts) -> list[int]:
 
     Inputs that follow from past inputs alone are not among them.
     """
-    lags = min(_lags(parts), 5)
-    long = _centred(parts, 3 * lags)
-    if not long:
+    signals = _lagged(parts, min(_lags(parts), 5))
+    if signals is None:
         return []
-    own = np.concatenate([past(u, lags) for u, _ in long])
-    outputs = np.concatenate([np.column_stack([y[lags:], past(y, lags)]) for _, y in long])
-    found = []
-    for j, target in enumerate(np.concatenate([u[lags:] for u, _ in long]).T):
-        power = float(target @ target)
-        alone, together = _left(own, target), _left(np.column_stack([own, outputs]), target)
-        if power > 0.0 and alone > 1e-3 * power and together <= _FOLLOWS * power:
-            found.append(j)
-    return found
-
-
-def exact_multiple(parts: Parts, j: int) -> tuple[int, float] | None:
-    """Return the output i and the factor with which u_j(t) = factor y_i(t) but for a level; None: no such."""
-    long = _centred(parts, 1)
-    u, outputs = (np.concatenate(signals) for signals in zip(*long, strict=True))
-    for i, y in enumerate(outputs.T):
-        factor = float(u[:, j] @ y) / max(float(y @ y), 1e-300)
-        left = u[:, j] - factor * y
-        if float(left @ left) <= _FOLLOWS * float(u[:, j] @ u[:, j]):
-            return i, factor
-    return None
+    u, y, own, past_y = signals
+    every, powers = np.column_stack([own, y, past_y]), np.sum(u**2, axis=0)
+    return [
+        j
+        for j, (x, power) in enumerate(zip(u.T, powers.tolist(), strict=True))
+        if power > 0.0 and _left(own, x) > 1e-3 * power and _left(every, x) <= _FOLLOWS * power
+    ]
 
 
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
@@ -143,31 +118,6 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
     return slope, max(float(np.std(y - slope * x)) / np.sqrt(power), 1e-300)
 
 
-def early_answers(parts: Parts) -> list[ScoreTest]:
-    """Return the outputs of an open loop that innovations of inputs help to predict, up to eight ahead."""
-    lags, parts = _lags(parts), cut(parts, busiest(parts, _MOST_SAMPLES))
-    long = _centred(parts, 4 * (lags + _AHEAD))
-    if not long:
-        return []
-    rows, targets, ahead = list[Array](), list[Array](), list[Array]()
-    news = residuals([past(u, lags) for u, _ in long], [u[lags:] for u, _ in long])
-    for (u, y), new in zip(long, news, strict=True):
-        last = len(y) - _AHEAD
-        rows.append(np.column_stack([past(y, lags), past(u, lags), u[lags:]])[: last - lags])
-        targets.append(y[lags:last])
-        ahead.append(np.stack([new[k : len(new) - _AHEAD + k] for k in range(1, _AHEAD + 1)], axis=1))
-    own, columns = np.concatenate(rows), np.concatenate(ahead)
-    found = list[ScoreTest]()
-    for i, target in enumerate(np.concatenate(targets).T):
-        for j in range(columns.shape[2]):
-            together = _by_chance(own, columns[:, :, j], target, held=False)
-            single = [_by_chance(own, columns[:, [k], j], target, held=False) for k in range(_AHEAD)]
-            if max(together, min(single)) < _EARLY:
-                last = max(k for k, p in enumerate(single) if p < _EARLY)
-                found.append(ScoreTest("future_inputs", "feedback", 0.0, _AHEAD, together, last + 1, i, j))
-    return found
-
-
 def like_answers(parts: Parts, output: int, j: int) -> bool:
     """Return whether u(t) may have been made from y(t): both have innovations at once, and u was not set.
 
@@ -187,24 +137,22 @@ def like_answers(parts: Parts, output: int, j: int) -> bool:
     return abs(float(new_u[:, j] @ new_y[:, output])) > _TOGETHER * max(size, 1e-300) and not (own or white)
 
 
-def _by_chance(own: Array, more: Array, target: Array, *, held: bool = True) -> float:
+def _by_chance(own: Array, more: Array, target: Array) -> float:
     """Return the probability that columns `more` explain as much by chance beside `own` (n, m).
 
-    It follows from the likelihood ratio, or from a smaller score test for a target that may be held and moves
-    at few samples only. The covariance of the score allows for errors of any size at any time ([white-1980]).
+    It follows from the likelihood ratio, or from a smaller score test: a target that is held moves at few
+    samples only. The covariance of the score allows for errors of any size at any time ([white-1980]).
     """
     both = np.column_stack([own, more])
     alone, together = _left(own, target), _left(both, target)
     if alone <= 1e-12 * float(target @ target) or len(target) <= both.shape[1]:
         return 1.0  # the input follows from its own past: a deterministic signal
     ratio = (len(target) - both.shape[1]) * float(np.log(alone / max(together, 1e-300)))
-    if held:
-        (errors,), (rest,) = residuals([own], [target]), residuals([own], [more])
-        weighted = rest * errors[:, None]
-        total = weighted.sum(axis=0)
-        score = float(total @ np.linalg.lstsq(weighted.T @ weighted, total, rcond=1e-10)[0])
-        ratio = min(ratio, score)
-    return float(scipy.special.chdtrc(more.shape[1], ratio))
+    (errors,), (rest,) = residuals([own], [target]), residuals([own], [more])
+    weighted = rest * errors[:, None]
+    total = weighted.sum(axis=0)
+    score = float(total @ np.linalg.lstsq(weighted.T @ weighted, total, rcond=1e-10)[0])
+    return float(scipy.special.chdtrc(more.shape[1], min(ratio, score)))
 
 
 def _left(*regression: Array) -> float:
@@ -221,6 +169,16 @@ def _lags(parts: Parts) -> int:
 def _centred(parts: Parts, shortest: int) -> list[tuple[Array, Array]]:
     """Return the records of more than `shortest` samples, about their means."""
     return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > shortest]
+
+
+def _lagged(parts: Parts, lags: int) -> tuple[Array, Array, Array, Array] | None:
+    """Return inputs and outputs of all records about their means, and their pasts; None for short records."""
+    kept = _centred(parts, 3 * lags)
+    if not kept:
+        return None
+    now = [np.concatenate([part[k][lags:] for part in kept]) for k in (0, 1)]
+    before = [np.concatenate([past(part[k], lags) for part in kept]) for k in (0, 1)]
+    return now[0], now[1], before[0], before[1]
 
 
 def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
@@ -244,30 +202,25 @@ def unhelpful(model: Model, parts: Parts) -> list[int]:
         caused = [form.simulate(u - u.mean(axis=0), np.zeros(y.shape), 1.0)[0] for u, y in long]
     if not all(np.all(np.isfinite(x)) for x in caused):
         return []
-    pairs = [(y, x) for (_, y), x in zip(long, caused, strict=True)]
-    return [i for i in range(model.outputs) if _idle([(y[:, i], x[:, i]) for y, x in pairs], lags)]
+    signals = [(y, x, y - x) for (_, y), x in zip(long, caused, strict=True)]
+    return [i for i in range(model.outputs) if _idle([[x[:, [i]] for x in one] for one in signals], lags)]
 
 
-def _idle(signals: Sequence[tuple[Array, Array]], lags: int) -> bool:
-    """Return whether neither x (n,) nor y - x helps to predict y (n,) beyond its own past."""
-    own, more, left = list[Array](), list[Array](), list[Array]()
-    for y, x in signals:
-        level = np.column_stack([np.ones(len(y)), np.linspace(-1.0, 1.0, len(y))])[lags:]
-        own.append(np.column_stack([level, past(y[:, None], lags)]))
-        more.append(np.column_stack([own[-1], x[lags:], past(x[:, None], lags)]))
-        left.append(np.column_stack([level, past((y - x)[:, None], lags)]))
-    target = np.concatenate([y[lags:] for y, _ in signals])
-    rest = np.concatenate([(y - x)[lags:] for y, x in signals])
+def _idle(signals: Sequence[Sequence[Array]], lags: int) -> bool:
+    """Return whether x (n, 1) does not help to predict y (n, 1), nor y - x itself: records y, x, y - x."""
+    levels = [np.column_stack([np.ones(len(y)), np.linspace(-1.0, 1.0, len(y))])[lags:] for y, *_ in signals]
+    pasts = [np.concatenate([past(one[k], lags) for one in signals]) for k in range(3)]
+    y, x, rest = (np.concatenate([one[k][lags:] for one in signals]) for k in range(3))
+    own = np.column_stack([np.concatenate(levels), pasts[0]])
+    more = np.column_stack([own, x, pasts[1]])
+    errors = np.column_stack([np.concatenate(levels), pasts[2]])
     alone, along, simulated = (
-        max(_left(np.concatenate(rows), wanted), 1e-300)
-        for rows, wanted in ((own, target), (more, target), (left, rest))
+        max(_left(rows, target[:, 0]), 1e-300) for rows, target in ((own, y), (more, y), (errors, rest))
     )
-    free = target.size - more[0].shape[1]
-    if free < 1:
-        return False
-    statistic = (alone - along) / (lags + 1) / (along / free)
-    probability = float(scipy.special.fdtrc(lags + 1, free, max(statistic, 0.0)))
-    return probability > _HELPS and target.size * float(np.log(simulated / alone)) > -_BY_CHOICE
+    free = y.size - more.shape[1]
+    statistic = (alone - along) / (lags + 1) / (along / max(free, 1))
+    unlikely = scipy.special.fdtrc(lags + 1, max(free, 1), max(statistic, 0.0)) > _HELPS
+    return bool(free > 0 and unlikely and y.size * np.log(simulated / alone) > -_BY_CHOICE)
 
 
 def past(signal: Array, lags: int) -> Array:
@@ -318,34 +271,28 @@ def order_of_excitation(parts: Parts, most: int = 50) -> int:
     """
     longest = max((u for u, _ in parts), key=len)
     x = longest - longest.mean(axis=0)
-    most = max(min(most, len(x) // (3 * x.shape[1])), 1)
-
-    def dependent(delays: int) -> bool:
+    for delays in range(max(min(most, len(x) // (3 * x.shape[1])), 1), 1, -1):
         columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
         columns = columns - columns.mean(axis=0)
-        gram = columns.T @ columns
-        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] <= _FAINT * delays)
-
-    # Rows of few delays include all rows of more: a step may stand there.
-    if not dependent(most):
-        return most
-    return bisect.bisect_left(range(1, most), True, key=dependent)
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-150)
+        if np.linalg.svd(columns / scale, compute_uv=False)[-1] ** 2 > _FAINT * delays:
+            return delays
+    return 1
 
 
 def left_of_inputs(parts: Parts) -> list[float]:
     """Return the share of each input's power that the other inputs and their pasts do not explain."""
     inputs, samples = parts[0][0].shape[1], sum(len(u) for u, _ in parts)
     lags = min(_LAGS, samples // (_PER_INPUT * inputs))
-    long = [u - u.mean(axis=0) for u, _ in parts if len(u) > 3 * lags]
-    if inputs < 2 or lags < 1 or not long:
+    kept = [u for u, _ in _centred(parts, 3 * lags)]
+    if inputs < 2 or lags < 1 or not kept:
         return [1.0] * inputs
-    found = []
-    for j in range(inputs):
-        others, own = [np.delete(u, j, axis=1) for u in long], [u[lags:, j] for u in long]
-        left = residuals([np.column_stack([other[lags:], past(other, lags)]) for other in others], own)
-        found.append(sum(float(e @ e) for e in left) / max(sum(float(x @ x) for x in own), 1e-300))
-    return found
+    every = np.concatenate(
+        [np.stack([u[lags - k : len(u) - k] for k in range(lags + 1)]) for u in kept], axis=1
+    )
+    power = np.maximum(np.sum(every[0] ** 2, axis=0), 1e-300)
+    others = [np.concatenate(np.delete(every, j, axis=2), axis=1) for j in range(inputs)]
+    return [_left(other, every[0][:, j]) / power[j] for j, other in enumerate(others)]
 
 
 def unstable_pole(parts: Parts, output: int) -> tuple[complex, float] | None:

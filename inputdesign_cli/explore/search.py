@@ -11,7 +11,7 @@ that deviates by more than half its value comes last.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -58,9 +58,6 @@ _PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
 # A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
 _SETTLES, _RUN_OFF = 5, 2
 
-Ranges = tuple[tuple[int, int | None], ...]
-"""Delays from the one to the other; None: the record sets no upper limit."""
-
 Shape = Orders | Process
 """A structure for one output."""
 
@@ -74,7 +71,7 @@ class Candidate:
 
     Attributes:
         orders: the structure; `model` is it, estimated on the first part.
-        deviations: (k,) of the parameters of the plant.
+        ranges: the 95 % interval of each delay.
         estimation, validation: per cent that the simulation explains of the two parts.
         prediction: per cent one step ahead, on the second part.
         criterion: log of the variance of the prediction errors, and the price of the parameters.
@@ -85,7 +82,7 @@ class Candidate:
 
     orders: Shape
     model: Model
-    deviations: Array
+    ranges: tuple[tuple[int, int], ...]
     estimation: float
     validation: float
     prediction: float
@@ -102,39 +99,19 @@ class Chosen:
 
     Attributes:
         candidates: the best come first; the `good` explain the record about as well as any.
-        estimated: the records of the first part, `swept` its regressions, `least` their shortest delay.
+        swept: the regressions of the first part.
         dropped: families without a structure that could be estimated.
     """
 
     candidates: tuple[Candidate, ...]
     good: tuple[Candidate, ...]
-    estimated: Parts
     swept: Sweep
-    least: int
     dropped: tuple[str, ...]
 
     @property
     def best(self) -> Candidate:
         """Return the best candidate."""
         return self.candidates[0]
-
-    def ranges(self, candidate: Candidate) -> Ranges:
-        """Return the 95 % interval of each delay of a candidate."""
-        orders, model, swept = candidate.orders, candidate.model, self.swept
-        if orders.physical is True:
-            found = orders.ranges(model.theta[model.in_plant], candidate.deviations)
-        else:
-            found = delay_ranges(
-                self.estimated, swept.near(orders.order), least=self.least, most=swept.most, own=orders.delays
-            )
-        # A Gaussian estimate of a dead time may be wider than the record that it is made from.
-        longest = max(len(y) for _, y in self.estimated)
-        return tuple((low, high if high <= longest else None) for low, high in found)
-
-
-def price(unknowns: int, samples: int) -> float:
-    """Return the price of parameters in the log of a variance: the BIC penalty, and a share at least."""
-    return unknowns * max(float(np.log(samples)) / samples, _WORTH)
 
 
 def certain(theta: Array, deviations: Array, dead_times: NDArray[np.bool_], step: float) -> bool:
@@ -198,7 +175,7 @@ class _Records:
 
     def candidate(self, shape: Shape) -> Candidate:
         """Return a structure, estimated and judged; it may raise one of `NOT_COMPUTED`."""
-        parts, near = self.first if shape.shared else self.white, self.swept.near(shape.poles)
+        parts, near = self.first if shape.shared else self.white, self.swept.near(shape.order)
         if not shape.physical and near.delays != shape.delays:
             near = Regressed(parts, near.order).output_error(shape.delays, near.F)
         kind, start = estimator(shape.model(), 1.0), shape.start(near)
@@ -214,17 +191,24 @@ class _Records:
         if max(shape.delays) > _RUN_OFF * self.swept.most:
             raise ArithmeticError("a dead time has run off to where nothing answers")
         model = shape.noisy(theta, self.C, self.D)
-        model, plant = model.at(model.theta, noise), model.in_plant
-        judged = fits(model, self.judging, self.late)
-        unknowns, physical = shape.size + (0 if shape.physical else len(shape.delays)), bool(shape.physical)
+        model = model.at(model.theta, noise)
+        plant, judged, physical = model.in_plant, fits(model, self.judging, self.late), bool(shape.physical)
+        unknowns = shape.size + (0 if physical else len(shape.delays))
+        # What BIC asks for a parameter, and a share at least.
+        price = max(float(np.log(self.samples)) / self.samples, _WORTH)
+        if shape.physical is True:
+            ranges = shape.ranges(model.theta[plant], deviations)
+        else:
+            ranges = delay_ranges(self.first, near, least=int(self.feedback), most=self.swept.most)
+        longest = max(len(y) for _, y in self.first)
         return Candidate(
             shape.coloured(self.C, self.D),
             model,
-            deviations,
+            tuple((low, min(high, longest)) for low, high in ranges),
             fits(model, self.first, self.late).simulation[0],
             judged.simulation[0],
             judged.prediction[0],
-            float(np.log(max(noise[0, 0], 1e-300))) + price(unknowns, self.samples),
+            float(np.log(max(noise[0, 0], 1e-300))) + unknowns * price,
             found.converged or physical,  # kinks at dead times stop a quick search early
             shape.integrates or is_steady(model, self.samples),
             certain(model.theta[plant], deviations, model.dead_times[plant], self.step * physical),
@@ -272,7 +256,7 @@ def explore_structure(
     wanted = dict.fromkeys(shape.coloured(records.C, records.D).family for shape in shapes)
     dropped = tuple(family for family in wanted if family not in estimated)
     chosen = ranked(usable, by_prediction=feedback)
-    return Chosen(*chosen, records.first, records.swept, int(feedback), dropped)
+    return Chosen(*chosen, records.swept, dropped)
 
 
 def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: Family | None) -> _Records:
@@ -291,33 +275,29 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
     return _Records(first, judging, white, swept, late if late < longest // 2 else 0, C, D, feedback, step)
 
 
-def _shapes(records: _Records, physical: bool, only: Family | None) -> Iterator[Shape]:
-    """Yield the structures to try, the simplest first, or the orders of the one family that is asked for."""
+def _shapes(records: _Records, physical: bool, only: Family | None) -> list[Shape]:
+    """Return the structures to try, the simplest first, or the orders of the one family that is asked for."""
     swept, step, near = records.swept, records.step, records.swept.best
-    if only == "arx":
-        yield from (Orders("ARX", near.delays, n, a=n) for n in range(1, _HIGHEST_ARX + 1))
-    elif only == "armax":
-        yield from (Orders("ARMAX", one.delays, n, a=n, c=n) for n, one in swept.by_order.items())
-    elif only in ("oe", "bj"):
-        yield from (Orders("OE", one.delays, n, f=n) for n, one in swept.by_order.items())
-    elif only is not None:
-        order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
-        yield Process(swept.near(order).delays, order, step)
-        if not order:
-            yield Process(swept.near(2).delays, 1, step, rising=True)
+    first, second = (swept.near(n) for n in (1, 2))
+    asked: dict[Family | None, list[Shape]] = {
+        "arx": [Orders("ARX", near.delays, n, a=n) for n in range(1, _HIGHEST_ARX + 1)],
+        "armax": [Orders("ARMAX", one.delays, n, a=n, c=n) for n, one in swept.by_order.items()],
+        "oe": [Orders("OE", one.delays, n, f=n) for n, one in swept.by_order.items()],
+        "bj": [Orders("OE", one.delays, n, f=n) for n, one in swept.by_order.items()],
+        "fopdt": [Process(first.delays, 1, step)],
+        "sopdt": [Process(second.delays, 2, step)],
+        "integrator": [Process(first.delays, 0, step), Process(second.delays, 1, step, rising=True)],
+    }
     if only is not None:
-        return
-    yield Orders("FIR", swept.near(1).delays, 1)
+        return asked[only]
+    found: list[Shape] = [Orders("FIR", first.delays, 1)]
     if physical:
-        yield from (Process(swept.near(n).delays, n, step) for n in range(1, min(max(near.order, 2), 3) + 1))
-    if physical and near.order > 1:
-        yield Process(swept.near(2).delays, 2, step, zero=True)
-    if physical and lingering(swept.near(1).F, records.samples):
-        yield Process(swept.near(1).delays, 0, step)
-    if physical and near.order > 1 and lingering(swept.near(2).F, records.samples):
-        yield Process(swept.near(2).delays, 1, step, rising=True)
-    for n in sorted({1, near.order}):
-        yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
+        found += [*asked["fopdt"], *asked["sopdt"]]
+        found += [Process(second.delays, 2, step, zero=True)] if near.order > 1 else []
+        found += asked["integrator"][:1] if lingering(first.F, records.samples) else []
+        rises = near.order > 1 and lingering(second.F, records.samples)
+        found += asked["integrator"][1:] if rises else []
+    found += [Orders("OE", swept.near(n).delays, max(n, 2), f=n) for n in sorted({1, near.order})]
     if max(swept.by_order) > 1 and not records.feedback:
-        yield Orders("ARMAX", swept.near(2).delays, 2, a=2, c=2)
-    yield from (Orders("ARX", near.delays, n, a=n) for n in (near.order, near.order + 1))
+        found.append(Orders("ARMAX", second.delays, 2, a=2, c=2))
+    return [*found, *(Orders("ARX", near.delays, n, a=n) for n in (near.order, near.order + 1))]

@@ -56,11 +56,6 @@ class Orders:
         return self.a + self.f
 
     @property
-    def poles(self) -> int:
-        """Return the number of poles of the plant of each input."""
-        return self.order
-
-    @property
     def unknowns(self) -> int:
         """Return the number of coefficients of one input."""
         return self.b + self.order
@@ -104,15 +99,10 @@ def _monic(order: int) -> Array:
     return np.eye(1, order + 1)[0]
 
 
-_NAMES = {0: "integrator", 1: "FOPDT", 2: "SOPDT", 3: "TOPDT"}
+_NAMES = {0: "integrator", 1: "FOPDT", 2: "SOPDT"}
 _LAGGING = "integrator with a lag"
 # Numerators and denominators in s by their parameters, descending.
-_BELOW = {
-    0: ("1", "0"),
-    1: ("{T}", "1"),
-    2: ("{T}**2", "2*{zeta}*{T}", "1"),
-    3: ("{T}**2*{T3}", "{T}**2 + 2*{zeta}*{T}*{T3}", "2*{zeta}*{T} + {T3}", "1"),
-}
+_BELOW = {0: ("1", "0"), 1: ("{T}", "1"), 2: ("{T}**2", "2*{zeta}*{T}", "1")}
 # Poles in z of the starts.
 _FASTEST, _SLOWEST = 1e-3, 1.0 - 1e-4
 _LEAST = 0.05  # of a sample, the shortest dead time of a start
@@ -125,11 +115,11 @@ _LONGEST = 1e6
 
 @dataclass(frozen=True)
 class Process:
-    """A process model of one output: of each input a gain K, a dead time L, and poles by T and zeta (and T3).
+    """A process model of one output: of each input a gain K, a dead time L, and poles by T and zeta.
 
     Attributes:
         delays: the lag of the first sample that each input moves.
-        order: the number of poles with a time constant, none to three; none: K / s.
+        lags: the number of poles with a time constant, none to two; none: K / s.
         rising: whether the output integrates what a lag of order one gives.
         step: the sample time.
         zero: whether the numerator is K (Tz s + 1).
@@ -137,7 +127,7 @@ class Process:
     """
 
     delays: tuple[int, ...]
-    order: int
+    lags: int
     step: float
     zero: bool = False
     noise: int = 0
@@ -150,28 +140,28 @@ class Process:
     @property
     def family(self) -> str:
         """Return the usual name: first, second, third order plus dead time, or integrator."""
-        return _LAGGING if self.rising else _NAMES[self.order]
+        return _LAGGING if self.rising else _NAMES[self.lags]
 
     @property
     def numbers(self) -> dict[str, int]:
         """Return the numbers of poles and zeros, and the orders of the noise."""
-        every = {"poles": self.order, "zeros": int(self.zero), "C": self.noise, "D": self.noise}
+        every = {"poles": self.lags, "zeros": int(self.zero), "C": self.noise, "D": self.noise}
         return {word: number for word, number in every.items() if number}
 
     @property
     def integrates(self) -> bool:
         """Return whether the structure is an integrator."""
-        return self.rising or not self.order
+        return self.rising or not self.lags
 
     @property
-    def poles(self) -> int:
-        """Return the number of poles, also of integrators."""
-        return self.order + self.rising
+    def order(self) -> int:
+        """Return the number of poles, also of an integrator behind a lag."""
+        return self.lags + self.rising
 
     @property
     def letters(self) -> tuple[str, ...]:
         """Return the letters of the parameters of an input."""
-        return (*("K", "T", "zeta", "T3")[: self.order + 1], *(("Tz",) if self.zero else ()), "L")
+        return (*("K", "T", "zeta")[: self.lags + 1], *(("Tz",) if self.zero else ()), "L")
 
     @property
     def size(self) -> int:
@@ -221,30 +211,27 @@ class Process:
         poles = np.roots(near.F)
         size = np.clip(np.abs(poles), _FASTEST, _SLOWEST)
         angle = np.where(poles.real > 0.0, np.angle(poles), 0.0)
-        s = np.resize(np.sort_complex(-(np.log(size) + 1j * angle)), max(self.poles, 1)) / self.step
+        s = np.resize(np.sort_complex(-(np.log(size) + 1j * angle)), max(self.order, 1)) / self.step
         gains = near.B.sum(axis=1) / max(float(np.sum(near.F)), 1e-300)
         if self.integrates:  # the slowest pole is that of the integrator
             s, gains = (s[1:] if self.rising else s), gains * abs(s[0])
-        below = self._below(s) if self.order else []
+        below = self._below(s) if self.lags else []
         found: list[float] = []
         for gain, row, delay in zip(gains, near.B, near.delays, strict=True):
             # A lag of first order that begins between two samples shares its first two coefficients.
-            share = (
-                row[1] / (row[0] + row[1]) if self.poles == 1 == self.order and row[0] * row[1] > 0.0 else 0.0
-            )
-            late = max(delay - 1 + share, _LEAST) * self.step
+            shares = self.order == 1 == self.lags and row[0] * row[1] > 0.0
+            late = max(delay - 1 + (row[1] / (row[0] + row[1]) if shares else 0.0), _LEAST) * self.step
             found += [float(gain), *below, *([_ZERO * below[0]] if self.zero else []), late]
         return np.array([*found, *np.zeros(2 * self.noise)])
 
     def _below(self, s: NDArray) -> list[float]:
-        """Return T, zeta and T3 of poles -s: the two slowest, or a complex pair, make T and zeta."""
-        if self.order == 1:
+        """Return T and zeta of poles -s: the two slowest, or a complex pair, make them."""
+        if self.lags == 1:
             return [1.0 / max(float(np.abs(s[0])), 1e-300)]
         rings = np.abs(s.imag) >= 1e-9 * np.abs(s)
         pair = s[rings][:2] if np.sum(rings) > 1 else s[:2]
         T = abs(float(np.real(pair[0] * pair[1]))) ** -0.5
-        rest = s[~rings] if np.any(~rings) else s
-        return [T, max(0.5 * float(np.real(pair.sum())) * T, 0.02), 1.0 / abs(rest[-1])][: self.order]
+        return [T, max(0.5 * float(np.real(pair.sum())) * T, 0.02)]
 
 
 def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance: Array) -> Reparametrised:
@@ -260,7 +247,7 @@ def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance:
         values |= dict(zip(every, theta.tolist(), strict=False))  # those of the noise follow
         top = ("{K}*{Tz}", "{K}") if row.zero else ("{K}",)
         above.append([[text.format(**names) for text in top] for names in own])
-        texts = (*_BELOW[row.order], *(("0",) if row.rising else ()))
+        texts = (*_BELOW[row.lags], *(("0",) if row.rising else ()))
         below.append([[text.format(**names) for text in texts] for names in own])
         late.append([names["L"] for names in own])
     names, at = tuple(values), np.array(list(values.values()))

@@ -136,7 +136,9 @@ class Regressed:
         for _ in range(_WIDE if way else 0):
             most, skipped = way or (0, 0)
             for j in range(len(delays)):
-                delays = self._best_delay(F, delays, j, (least, max(most, least + 1)), skipped)
+                losses = self.losses(F, delays, j, (least, max(most, least + 1)), skipped)
+                best_delay = least + int(np.argmin(losses)) if np.any(losses) else delays[j]
+                delays = (*delays[:j], best_delay, *delays[j + 1 :])
             F = self._denominator(F, delays)
         best = self.output_error(delays, F)
         for j, step in itertools.product(range(len(delays)), (1, -1)):
@@ -232,18 +234,19 @@ class Regressed:
         B = solution[int(self.line) :].reshape(len(delays), self.n + 1)
         return Regression(F, B, tuple(delays), loss, slope)
 
-    def _best_delay(
-        self, F: Array, delays: tuple[int, ...], j: int, reach: tuple[int, int], skipped: int
-    ) -> tuple[int, ...]:
-        """Return the delays with the best one of input j within reach: one factor for all."""
+    def losses(
+        self, F: Array, delays: Sequence[int], j: int, reach: tuple[int, int], skipped: int = 0
+    ) -> Array:
+        """Return the squares left (high - low + 1,) by each delay of input j in reach: one factor for all.
+
+        The other delays stay as they are, and `skipped` samples are left out. Zero: it cannot be computed.
+        """
         b, (low, high), ranges = self.n + 1, reach, self._near(delays)
         ranges[j] = (low, high + b)
         long = [part for part in self.parts if len(part[1]) > skipped + 4 * b]
-        if not long:
-            return delays
         gram = replace(self, parts=long)._products(F, ranges, through=True, skipped=skipped)
-        if not np.all(np.isfinite(gram)):
-            return delays
+        if not long or not np.all(np.isfinite(gram)):
+            return np.zeros(high - low + 1)
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         gram = gram / np.outer(scale, scale)
         begin = self.n + self.line + sum(last - first for first, last in ranges[:j])
@@ -253,11 +256,11 @@ class Regressed:
         across = gram[np.ix_(fixed, rest)]
         known = gram[np.ix_(fixed, fixed)] + _RIDGE * np.eye(len(fixed))
         left = gram[np.ix_(rest, rest)] - across.T @ np.linalg.solve(known, across)
-        at = np.arange(len(wide) - b + 1)[:, None] + np.arange(b)
+        at = np.arange(high - low + 1)[:, None] + np.arange(b)
         squares = left[at[:, :, None], at[:, None, :]] + _RIDGE * np.eye(b)
         moments = left[at, -1]
         gains = np.sum(moments * np.linalg.solve(squares, moments[:, :, None])[:, :, 0], axis=1)
-        return (*delays[:j], low + int(np.argmax(gains)), *delays[j + 1 :])
+        return np.asarray(left[-1, -1] - gains)
 
 
 def _solved(gram: Array) -> tuple[Array, float]:
@@ -272,21 +275,16 @@ def _solved(gram: Array) -> tuple[Array, float]:
     return solution, max(float(left), 0.0)
 
 
-def delay_ranges(
-    parts: Parts, model: Regression, *, least: int, most: int, own: Sequence[int] = ()
-) -> tuple[tuple[int, int], ...]:
-    """Return the delays of each input within 95 % confidence by the likelihood ratio, and `own` ones."""
+def delay_ranges(parts: Parts, model: Regression, *, least: int, most: int) -> tuple[tuple[int, int], ...]:
+    """Return the delays of each input within 95 % confidence by the likelihood ratio, and its own."""
     samples, found = sum(len(y) for _, y in parts), []
     limit = scipy.special.chdtri(1, 1.0 - _CONFIDENCE)
-    for j, (chosen, other) in enumerate(zip(model.delays, own or model.delays, strict=True)):
-        losses = {}
-        for delay in range(max(chosen - _BESIDE, least), min(chosen + _BESIDE, most) + 1):
-            delays = (*model.delays[:j], delay, *model.delays[j + 1 :])
-            left = Regressed(parts, model.order).output_error(delays, model.F, _POLISH).loss
-            losses[delay] = max(left, 1e-300)
-        smallest = min(losses.values(), default=1.0)
-        kept = [d for d, loss in losses.items() if samples * np.log(loss / smallest) <= limit]
-        found.append((min(*kept, chosen, other), max(*kept, chosen, other)))
+    for j, own in enumerate(model.delays):
+        low, high = max(own - _BESIDE, least), max(min(own + _BESIDE, most), least)
+        losses = Regressed(parts, model.order).losses(model.F, model.delays, j, (low, high))
+        losses = np.maximum(losses, 1e-300)
+        within = low + np.flatnonzero(samples * np.log(losses / losses.min()) <= limit)
+        found.append((min(int(within[0]), own), max(int(within[-1]), own)))
     return tuple(found)
 
 

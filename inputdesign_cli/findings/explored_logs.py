@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.explore import (
-    Found,
-    Parts,
-    by_chance,
-    exact_multiple,
+from inputdesign_cli.explore.fits import Parts, by_chance
+from inputdesign_cli.explore.joint import Found
+from inputdesign_cli.explore.relation import (
     left_of_inputs,
     like_answers,
     only_answers,
@@ -58,11 +56,10 @@ def undriven(kind: FindingKind, parts: Parts) -> list[Finding]:
 
     A controller has a reference at rest, or one column was computed from the other.
     """
-    found = []
+    inputs, found = parts[0][0].shape[1], []
     for j in only_answers(parts):
-        name, same = signal_name("u", j, parts[0][0].shape[1]), exact_multiple(parts, j)
+        name = signal_name("u", j, inputs)
         fact = f"{name}, and the plant is not identifiable"
-        fact += f": it is {same[1]:.4g} y{same[0] + 1} in every row, but for a level" if same else ""
         found.append(kind.found(fact, where=name))
     return found
 
@@ -145,16 +142,13 @@ def _unjudged(kind: FindingKind, found: Found) -> list[Finding]:
 
 @finding(DOUBT, "simulation-explains-little", "Move the inputs more, or record for longer.")
 def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
-    """The simulation explains next to nothing. Chance would explain as much of the validation part.
-
-    Of an output that wanders, the inputs do not help to predict what is new from sample to sample.
-    """
+    """The simulation explains next to nothing. Chance would explain as much of the validation part."""
     unseen, doubtful = int(np.sum(found.validation.counted)), []
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
         output = signal_name("y", i, found.model.outputs)
         luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
-        # What wanders leaves any simulation; what is new in it from sample to sample does not wander.
-        little = not found.helped[i] > 0.0 if found.wanders[i] else fit < max(LEAST_FIT, luck)
+        # What wanders leaves any simulation: whether inputs help to predict it decides there.
+        little = not found.wanders[i] and fit < max(LEAST_FIT, luck)
         fact = f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone"
         doubtful += kind.when(little, fact, where=output, fit_percent=fit, chance_percent=luck)
     return doubtful

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from inputdesign_cli.explore import Found
+from inputdesign_cli.explore.joint import Found
 from inputdesign_cli.finding import NOTE, Finding, FindingKind, finding
 from inputdesign_cli.findings.places import Record
 from inputdesign_cli.findings.prepared_records import JITTER_EVENED
@@ -37,13 +37,12 @@ def explored_structures(log: Record, found: Found, loops: Sequence[tuple[int, fl
 def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
     """A structure was chosen. Of structures that explain unseen data as well, the simplest wins."""
     said = []
-    for i, (chosen, taken, ranges) in enumerate(zip(found.outputs, found.taken, found.ranges, strict=True)):
+    for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
         orders += f"; times in {log.time_unit}" * taken.orders.physical
         delays = " and ".join(
-            f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {low} to {most or 'more'})"
-            for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
-            for most in ("" if high is None else f"{high}",)
+            f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {low} to {high})"
+            for j, delay, (low, high) in zip(found.moving, taken.orders.delays, taken.ranges, strict=True)
         )
         tried, family = len(chosen.candidates), taken.orders.family
         better = max(one.validation for one in chosen.candidates) - taken.validation

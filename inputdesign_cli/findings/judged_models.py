@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.explore import Fits
+from inputdesign_cli.explore.fits import Fits
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.explored_logs import HALF, LEAST_FIT
 from inputdesign_cli.findings.places import Record

@@ -10,7 +10,7 @@ from inputdesign_cli.finding import NOTE, Finding, FindingKind, doubt, finding, 
 TIMES_READ = note(
     "times-read",
     "Times were computed from columns of the file. Columns of dates and of times of day are joined. A "
-    "decreasing time of day begins the next day. Counts since 1970 are recognised by their size.",
+    "decreasing time of day begins the next day.",
     "Nothing, if the times are right. Otherwise name their column: `--columns time=NAME`.",
 )
 TIMES_ASSUMED = note(
@@ -34,7 +34,7 @@ INPUTS_MOVE_BETWEEN = doubt(
 COLUMNS_JOINED = note(
     "columns-joined",
     "Columns were written at different times. The times of the most frequent output are used. Inputs are "
-    "held until written again and then averaged. Other outputs are interpolated.",
+    "held until written again. Other outputs are interpolated.",
     "Log all channels in one row, if the logger can.",
 )
 RECORD_CUT = note(

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.explore import early_answers
 from inputdesign_cli.finding import DOUBT, REFUTED, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.identification.checks import signal_name
@@ -62,10 +61,9 @@ def _late(kind: FindingKind, inputs: int, outputs: int, test: ScoreTest) -> Find
     return kind.found(fact, where=name, samples=test.lag, probability=p)
 
 
-def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
-    """Return a finding for each input before which an output moves: u (n, r), y (n, p) without a model."""
-    inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
-    return [_late(inputs, outputs, test) for test in early_answers(parts)]
+def late_inputs(units: Units, estimate: Estimate) -> list[Finding]:
+    """Return a finding for each input whose future explains prediction errors, in open loop."""
+    return [_late(units.inputs, units.outputs, test) for test in estimate.tests.answering]
 
 
 @finding(DOUBT, "columns-perhaps-swapped", "Exchange u and y in `--columns`.")

@@ -29,7 +29,7 @@ from inputdesign_cli.specification import Spec, load_spec, parse_spec
 if TYPE_CHECKING:
     import control
 
-    from inputdesign_cli.explore import Family
+    from inputdesign_cli.explore.search import Family
     from inputdesign_cli.outcome.golden import Golden, GoldenRun
     from inputdesign_cli.questions.assessment.assess import Assessment
     from inputdesign_cli.questions.campaign.directory import Rounds
@@ -208,7 +208,7 @@ def explore(
         InaccurateError: the numbers of the log leave the range of double precision.
     """
     from inputdesign_cli.questions.building.header import build_header
-    from inputdesign_cli.questions.exploration.build import Asked, model_to_judge, naming_model
+    from inputdesign_cli.questions.exploration.build import Asked, model_to_judge
     from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
     from inputdesign_cli.records import Preparation
 
@@ -217,7 +217,7 @@ def explore(
         with sound_arithmetic(most_extreme({})):
             found = explore_log(_paths(data), prepared, structure, Asked.of(asked) if asked else None)
             return replace(found, results=with_added(found.results))
-    with _placed(model), naming_model(model):
+    with _placed(model):
         found = judge(model_to_judge(model), build_header(model), _paths(data), prepared)
         return replace(found, results=with_added(found.results))
 

@@ -1,6 +1,5 @@
 """Files of data become records: tables, times, columns, segments, and what was done to them."""
 
-from inputdesign_cli.records.columns import with_channels as with_channels
 from inputdesign_cli.records.reading import read_sheet as read_sheet
 from inputdesign_cli.records.record import (
     Record as Record,

@@ -86,69 +86,48 @@ def columns_of_arrays(
     """
     if named and named not in values:
         raise source.unreadable("has no such variable", f"it holds {', '.join(values)}")
-    arrays: dict[str, tuple[str, NDArray]] = {}
-    left_out, steps, units = list[str](), set[float](), list[str]()
+    arrays, owners, left_out = dict[str, NDArray](), dict[str, str](), list[str]()
+    step, unit = None, None
     for owner, value in values.items():
         for name, array in _flat(owner, value) if named in ("", owner) else ():
-            wrong = _wrong(array)
-            if wrong == "text" and array.size == 1 and name.lower() in _TIME_UNITS:
-                units.append(str(array.item()))
+            numbers = array.dtype.kind in "fiubmM" and array.ndim in (1, 2) and array.size > 1
+            if array.size == 1 and name.lower() in _TIME_UNITS:
+                unit = str(array.item())
             elif array.size == 1 and name.lower() in _SAMPLE_TIMES:
-                steps.add(float(array.item()) if array.dtype.kind in "fiu" else np.nan)
-            elif wrong or array.size == 1:
-                left_out.append(f"{name} holds {wrong or 'a single number'}")
-            elif name in arrays and not np.array_equal(arrays[name][1], array):
-                what = f"holds {arrays[name][0]} and {owner}, each with a {name} of its own"
+                step = float(array.item()) if array.dtype.kind in "fiu" else np.nan
+                if not 0.0 < step < np.inf:
+                    what = f"states the sample time {array.item()}"
+                    raise source.unreadable(what, "make it a positive number")
+            elif not numbers:
+                left_out.append(f"{name}: {'text' if array.dtype.kind in 'SU' else array.dtype}")
+            elif name in arrays:
+                what = f"holds {owners[name]} and {owner}, each with a {name} of its own"
                 file = source.path.name.partition("#")[0]
-                raise source.unreadable(what, f"name one: '{file}#{arrays[name][0]}' or '{file}#{owner}'")
+                raise source.unreadable(what, f"name one: '{file}#{owners[name]}' or '{file}#{owner}'")
             else:
-                arrays[name] = owner, array
-    if len(steps) > 1 or not all(0.0 < step < np.inf for step in steps):
-        stated = " and ".join(f"{step:g}" for step in steps)
-        raise source.unreadable(f"states the sample time {stated}", "keep one, a positive number")
+                arrays[name], owners[name] = array if array.ndim == 2 else array[:, None], owner
     if not arrays:
-        held = f" ({'; '.join(left_out[:5])})" if left_out else ""
+        held = f" ({', '.join(left_out[:5])})" if left_out else ""
         raise source.unreadable(f"holds no arrays of numbers{held}", _MATLAB)
-    names: list[str] = []
-    columns: list[NDArray] = []
-    for name, (_, array) in arrays.items():
-        rows = array[:, None] if array.ndim == 1 else array.T if array.shape[0] == 1 else array
-        names += [name if rows.shape[1] == 1 else f"{name}{i + 1}" for i in range(rows.shape[1])]
-        columns += list(rows.T)
-    if len({*map(len, columns)}) > 1:
-        shapes = ", ".join(f"{name} {' x '.join(map(str, one.shape))}" for name, (_, one) in arrays.items())
+    rows = {name: array.T if array.shape[0] == 1 else array for name, array in arrays.items()}
+    if len({*map(len, rows.values())}) > 1:
+        shapes = ", ".join(f"{name} {' x '.join(map(str, one.shape))}" for name, one in rows.items())
         more = "keep the signals of one experiment in a file, all of one length, a sample in each row"
         raise source.unreadable(f"holds arrays of different lengths ({shapes})", more)
-    return names, columns, next(iter(steps), None), next(iter(units), None)
+    names = [
+        name if one.shape[1] == 1 else f"{name}{i + 1}"
+        for name, one in rows.items()
+        for i in range(one.shape[1])
+    ]
+    return names, [column for one in rows.values() for column in one.T], step, unit
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, NDArray]]:
     """Yield the arrays in a value by name; a struct gives the arrays of its fields by their names."""
-    if not isinstance(value, Mapping):
-        array = np.asarray(value) if not isinstance(value, list) else np.empty(len(value), dtype=object)
-        if isinstance(value, list):
-            array[:] = value
-        if not array.dtype.names:
-            while array.ndim > 2 and array.shape[-1] == 1:
-                array = array[..., 0]
-            yield name, array.real if array.dtype.kind == "c" and not np.any(array.imag) else array
-            return
-        value = {own: array[own] for own in array.dtype.names}
-    for own, inner in value.items():
-        if own not in _IDDATA or np.size(inner):
-            yield from _flat(_IDDATA.get(own, own), inner)
-
-
-def _wrong(array: NDArray) -> str:
-    """Return the name of the content of an array that is no column of numbers; empty where it is one."""
-    kind = array.dtype.kind
-    if array.size == 0:
-        return "nothing"
-    if kind in "SU" or (kind == "O" and any(isinstance(item, str) for item in array.ravel())):
-        return "text"
-    if kind == "O":
-        several = any(np.size(item) > 1 for item in array.ravel())
-        return f"cells, as of several experiments, or an object ({_MATLAB})" if several else "objects"
-    if kind not in "fiubmM":
-        return "complex numbers" if kind == "c" else f"numbers of the kind {array.dtype}"
-    return f"an array of {array.ndim} dimensions" if array.ndim > 2 else ""
+    if isinstance(value, Mapping):
+        for own, inner in value.items():
+            if np.size(inner):
+                yield from _flat(_IDDATA.get(str(own), str(own)), inner)
+        return
+    array = np.array(value, dtype=object) if isinstance(value, list) else np.asarray(value)
+    yield name, array.real if array.dtype.kind == "c" and not np.any(array.imag) else array

@@ -2,69 +2,40 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inputdesign_cli.arrays import Array
-from inputdesign_cli.records.sheet import Column, Sheet
+from inputdesign_cli.records.sheet import Column
 
 # What says that there is no value, with what sheets write in place of a number that they do not have.
 ERROR = re.compile(
     r"\s*#(N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)\s*", re.IGNORECASE
 )
 _MISSING = re.compile(rf"|nan|na|n/a|null|none|-|\?|{ERROR.pattern}", re.IGNORECASE)
-_UNIT = re.compile(
-    r"\W*([munk]?(s|v|a|w|hz|m|g|l|n|pa|bar)|sec|min|h|d|c|f|deg[cfk]?|celsius|kelvin|percent|pct|mpa|psi|cm|rpm|"
-    r"rad|samples?)?\W*|.*[%°/²³^℃℉].*",
-    re.IGNORECASE,
-)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
 # Numbers with marks between thousands, or with a unit in the same cell.
-_MARKED = re.compile(
-    r"[-+\u2212]?\d([\d.,'\u2019_ \u00a0\u202f]*\d)?\.?[ \u00a0\u202f]?[^\W\d]{0,5}[ \u00a0\u202f]?[%°]?"
-)
-# Whole numbers below a million, where a point may stand between thousands.
+_MARKED = re.compile(r"[-+\u2212]?([\d.,'\u2019_ \u00a0\u202f]*\d)\.?\s?[^\W\d]{0,5}\s?[%°]?")
+# Whole numbers below a million, where a mark may stand between thousands.
 _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
 _THOUSAND = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _SAY = "say which with --decimal , or --decimal .; or write decimal points and nothing between thousands"
 
-# Points stand after a day; with slashes and hyphens the dates themselves must show what is the month.
+# The year first, or points behind a day; with slashes and hyphens the dates must show what is the month.
 _DAYS = (
-    *("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%d/%m/%y", "%d-%m-%Y", "%m/%d/%Y", "%m/%d/%y", "%m-%d-%Y"),
-    *("%Y/%m/%d", "%Y.%m.%d", "%d-%b-%Y", "%d %b %Y"),
+    *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y"),
+    *("%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y", "%d-%b-%Y", "%d %b %Y"),
 )
-_CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
-_ISO = "ISO8601"
-# Forms of one order of day, month and year, or of times of day: seconds and their parts may be left out.
-_FORMS: dict[str, tuple[str, ...]] = {
-    _ISO: (_ISO,),
-    "": _CLOCKS,
-    **{day: (*(f"{day} {clock}" for clock in _CLOCKS), day) for day in _DAYS},
-}
-_DATE = (
-    r"\d{4}-\d\d-\d\d|\d{4}[./]\d\d?[./]\d\d?|\d\d?\.\d\d?\.(\d{4}|\d\d)|\d\d?/\d\d?/(\d{4}|\d\d)|"
-    r"\d\d?-\d\d?-\d{4}|\d\d?[- ][A-Za-z]{3}[- ]\d{4}"
+_MOMENT = re.compile(
+    r"(?P<day>\d{4}([-./])\d\d?\2\d\d?|\d\d?([-./])\d\d?\3(?:\d{4}|\d\d)|\d\d?[- ][A-Za-z]{3}[- ]\d{4})?[T ]?"
+    r"(?P<clock>(?P<hour>[01]?\d|2[0-3]):(?P<minute>[0-5]\d)(?::(?P<second>[0-5]\d(?:[.,]\d{1,9})?))?"
+    r"(?:\s?(?P<half>[AaPp])[Mm])?)?\s*(?P<zone>Z|[+-]\d\d:?\d\d)?",
+    re.ASCII,
 )
-_CLOCK = r"\d\d?:\d\d(:\d\d([.,]\d{1,9})?)?(\s?[AaPp][Mm])?"
-_MOMENT = re.compile(rf"({_CLOCK}|({_DATE})([T ]{_CLOCK})?)\s*(Z|[+-]\d\d:?\d\d)?")
-_ZONE = re.compile(r"\d\s*(Z|[+-]\d\d:?\d\d)$")
-_COMMA_SECONDS = re.compile(r"(:\d\d),(\d+)$")
-# What dates and times of any language and order have in them.
-_LIKE = re.compile(
-    r".*\d:\d\d.*|(?=.*(?<!\d)(19|20)\d\d(?!\d))(?=.*(?<!\d)\d{1,2}(?!\d))(?=.*[^\W\d_]{3}|(\D*\d+){3}).*"
-    r"|\d{1,2}[./-]\s?[^\W\d_]{3,}\.?[./-]\s?\d\d(?!\d).*|\d{1,4}[./-]\d{1,2}[./-]\d.*"
-)
-# YYYYMMDD alone or before HHMM, HHMMSS or milliseconds more.
-_DIGITS = re.compile(r"(19[7-9]|20\d)\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])(\d{4}|\d{6}|\d{9})?")
-_A_DAY, _HALF_A_DAY = 86_400.0, 43_200.0
-_MOSTLY, _DIFFERENT = 0.9, 3
+_A_DAY = 86_400.0
 SAY_TIME = (
     "say how they are written, as in --time-format '%d.%m.%Y %H:%M:%S', or write the year first: 2024-03-12 "
     "10:15:00"
@@ -76,14 +47,10 @@ def is_missing(cell: str) -> bool:
     return _MISSING.fullmatch(cell.strip()) is not None
 
 
-def is_unit(cell: str) -> bool:
-    """Return whether a cell is a unit, or says that there is none."""
-    return is_missing(cell) or _UNIT.fullmatch(cell.strip()) is not None
-
-
 def is_plain(cell: str) -> bool:
     """Return whether a cell is a number, with a decimal point or comma, or a date."""
-    return _is_number(cell.strip()) or _is_comma(cell) or _MOMENT.fullmatch(cell.strip()) is not None
+    bare = cell.strip()
+    return _is_number(bare) or _COMMA.fullmatch(bare) is not None or _parts(bare) is not None
 
 
 def is_value(cell: str) -> bool:
@@ -95,17 +62,13 @@ def _is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None and math.isfinite(float(cell))
 
 
-def _is_comma(cell: str) -> bool:
-    return _COMMA.fullmatch(cell.strip("% ")) is not None
-
-
 def decimal_of(cells: Sequence[str], *, between_commas: bool) -> str:
     """Return the decimal mark of numbers in cells: a comma where some have one, and none has a point.
 
     Args:
         between_commas: whether fields are separated by commas, and 1,234 in quotes may be a thousand.
     """
-    bare = [cell.strip("% ") for cell in cells]
+    bare = [cell.strip() for cell in cells]
     commas = [cell for cell in bare if _COMMA.fullmatch(cell)]
     if not commas or (between_commas and all(map(_THOUSAND.fullmatch, commas))):
         return "."
@@ -121,37 +84,56 @@ def column_of(cells: Sequence[str], decimal: str = ".", *, stated: bool = False)
     import pandas
 
     texts = [cell.strip().replace("\u2212", "-") for cell in cells]
-    if all(text.endswith("%") or is_missing(text) for text in texts):
-        texts = [text.rstrip("% ") for text in texts]
-    plain = [text.replace(",", ".") if decimal == "," and _is_comma(text) else text for text in texts]
+    commas = [_COMMA.fullmatch(text) is not None for text in texts]
+    points = ["." in text and _is_number(text) for text in texts]
+    plain = texts
+    if decimal == ",":
+        plain = [text.replace(",", ".") if own else text for text, own in zip(texts, commas, strict=True)]
     numbers = np.array(pandas.to_numeric(pandas.Series(plain, dtype=object), errors="coerce"), dtype=float)
     numbers[~np.isfinite(numbers)] = np.nan
-    row = next((int(i) for i in np.flatnonzero(np.isnan(numbers)) if not is_missing(plain[i])), None)
-    pointed = [i for i, text in enumerate(texts) if "." in text and _is_number(text)]
-    say = _SAY
-    if decimal == "," and stated and pointed:
-        wrong, row = "has a point, and --decimal says that commas are the decimal marks", pointed[0]
-    elif row is None and not stated and (decimal == "," or pointed) and _like_thousands(plain):
-        wrong = "may have a mark between thousands, or three decimals"
-        row = next(i for i, text in enumerate(plain) if "." in text)
-    elif row is None:
+    others, wrong = commas if decimal == "." else points, "has another decimal mark than --decimal says"
+    if not stated:
+        wrong = "may have a decimal mark, or a mark between thousands"
+        others = _like_thousands(plain) if not any(others) else others
+    if any(others):
+        row = others.index(True)
+        return Column(numbers, (row, texts[row]), wrong, _SAY)
+    odd = [i for i in np.flatnonzero(np.isnan(numbers)).tolist() if not is_missing(texts[i])]
+    if not odd:
         return Column(numbers)
-    elif _is_comma(texts[row]) and stated:
-        wrong = "has a comma, and --decimal says that points are the decimal marks"
-        say = "write nothing between thousands; or are the commas decimal marks (--decimal ,)?"
-    elif _is_comma(texts[row]):
-        wrong = "has a comma, which may be a decimal mark or stand between thousands"
-    else:
-        dates = moments_column(["" if is_missing(text) else text for text in texts])
-        return dates or Column(numbers, (row, texts[row]))
-    return Column(numbers, (row, texts[row]), wrong, say)
+    dates = moments_column(["" if is_missing(text) else text for text in texts])
+    return dates or Column(numbers, (odd[0], texts[odd[0]]))
 
 
-def _like_thousands(texts: Sequence[str]) -> bool:
-    """Return whether points may stand between thousands, as in 1.250: others, like 808, have no decimals."""
+def _like_thousands(texts: Sequence[str]) -> list[bool]:
+    """Return which numbers may be thousands, as 1.250 beside 808; none if some number has other decimals."""
     there = [text for text in texts if not is_missing(text)]
     hundreds = any("." not in text and len(text.lstrip("+-")) == 3 for text in there)
-    return hundreds and any("." in text for text in there) and all(map(_WHOLE.fullmatch, there))
+    whole = hundreds and all(map(_WHOLE.fullmatch, there))
+    return [whole and "." in text for text in texts]
+
+
+def _parts(cell: str) -> dict[str, str] | None:
+    """Return the parts of a date or time: `day`, `hour` and so on, empty where there is none."""
+    found = _MOMENT.fullmatch(cell)
+    parts = found.groupdict("") if found else {}
+    return parts if parts.get("day") or parts.get("clock") else None
+
+
+def joined_clocks(cells: Sequence[Sequence[str]]) -> tuple[list[Sequence[str]], list[int]]:
+    """Return columns of cells, the only one of dates joined with the only one of times of day.
+
+    Both then hold dates and times. The numbers (from zero) say which two columns these are, if any.
+    """
+    first = [_parts(next((x.strip() for x in column if not is_missing(x)), "")) or {} for column in cells]
+    days = [i for i, parts in enumerate(first) if parts.get("day") and not parts["clock"]]
+    clocks = [i for i, parts in enumerate(first) if parts.get("clock") and not parts["day"]]
+    if len(days) != 1 or len(clocks) != 1:
+        return list(cells), []
+    pairs = [*zip(cells[days[0]], cells[clocks[0]], strict=True)]
+    both = ["" if is_missing(x) or is_missing(y) else f"{x.strip()} {y.strip()}" for x, y in pairs]
+    found = sorted([*days, *clocks])
+    return [both if i in found else column for i, column in enumerate(cells)], found
 
 
 def moments_column(cells: Sequence[str], form: str | None = None) -> Column | None:
@@ -160,86 +142,54 @@ def moments_column(cells: Sequence[str], form: str | None = None) -> Column | No
     Args:
         form: how they are written; None: ISO 8601, or day, month and year in an order that is clear.
     """
-    there = [i for i, cell in enumerate(cells) if cell]
-    if not there:
+    import pandas
+
+    there, numbers = [i for i, cell in enumerate(cells) if cell], np.full(len(cells), np.nan)
+    texts = [cells[i] for i in there]
+    if form is not None:
+        read = pandas.to_datetime(pandas.Series(texts, dtype=object), format=form, errors="coerce", utc=True)
+        if not there or read.isna().any():
+            return None
+        numbers[there] = (read - read[0]).dt.total_seconds()
+        return Column(numbers, dated=True)
+    parts = [_parts(text) or {} for text in texts]
+    if not parts or not parts[0]:
         return None
-    texts = np.array([_COMMA_SECONDS.sub(r"\1.\2", cells[i]) for i in there], dtype=object)
-    known = _FORMS if form is None and _MOMENT.fullmatch(texts[0]) else {}
-    orders: dict[str, tuple[str, ...]] = {form: (form,)} if form else {}
-    for order, forms in known.items():
-        if not np.isnat(_read(texts[:1], forms)[0]):
-            orders[order] = forms
-    every = {order: _read(texts, forms) for order, forms in orders.items()}
-    whole = {one: found for one, found in every.items() if not np.isnat(found).any()}
-    if whole:
-        (order, moments), *others = whole.items()
-        if any(not np.array_equal(moments - moments[0], found - found[0]) for _, found in others):
+    kinds = [[bool(one.get(key)) for key in ("day", "zone")] for one in parts]
+    fits = np.array([bool(one) and kind == kinds[0] for one, kind in zip(parts, kinds, strict=True)])
+    seconds, done = np.array([_seconds(one) if one else np.nan for one in parts]), tuple[str, ...]()
+    if kinds[0][0]:
+        days = pandas.Series([one.get("day") for one in parts], dtype=object)
+        known = [
+            one for one in _DAYS if pandas.notna(pandas.to_datetime(days[0], format=one, errors="coerce"))
+        ]
+        read = [pandas.to_datetime(days, format=one, errors="coerce") for one in known or _DAYS[:1]]
+        best = max(read, key=lambda one: one.notna().sum())
+        fits &= best.notna().to_numpy()
+        seconds += (best - best[0]).dt.total_seconds().to_numpy()
+        others = [(one - one[0] - (best - best[0])) for one in read if one.notna().all()]
+        if fits.all() and any(one.abs().max() > pandas.Timedelta(0) for one in others):
             return _unread(cells, there[0], "may have the day or the month first")
-        numbers = np.full(len(cells), np.nan)
-        numbers[there] = (moments - moments[0]) / np.timedelta64(1, "s")
-        of_day = order != _ISO and not re.search("%[djDFxcyYGUWu]", order)
-        since = moments[0].astype("datetime64[D]") if of_day else np.datetime64(0, "s")
-        began = float((moments[0] - since) / np.timedelta64(1, "s"))
-        return Column(numbers, dated=True, began=began, of_day=of_day)
-    alike = {text for text in texts if _LIKE.fullmatch(text)}
-    many = len(alike) >= _DIFFERENT and sum(text in alike for text in texts) > _MOSTLY * len(texts)
-    if not many and (form is not None or not orders):
-        return None
-    at = int(np.argmax(np.all([np.isnat(found) for found in every.values()], axis=0))) if every else 0
-    wrong = "is no date or time as those above are" if at else "is no date or time that can be read"
-    return _unread(cells, there[at], wrong)
+    else:
+        falls = np.cumsum(np.diff(seconds, prepend=seconds[0]) < -0.5 * _A_DAY)
+        seconds += _A_DAY * falls
+        done = (f"passes midnight {falls[-1]} times: a day was added each time",) * bool(falls[-1])
+    if not fits.all():
+        at = int(np.argmin(fits))
+        return _unread(cells, there[at], f"is no date or time{' as those above are' if at else ''}")
+    numbers[there] = seconds - seconds[0]
+    return Column(numbers, dated=True, done=done)
+
+
+def _seconds(parts: Mapping[str, str]) -> float:
+    """Return the seconds of a time of day since midnight, in UTC if it has a zone."""
+    hour, minute = int(parts["hour"] or 0), int(parts["minute"] or 0)
+    if parts["half"]:
+        hour = hour % 12 + 12 * (parts["half"] in "Pp")
+    zone = parts["zone"].replace(":", "").replace("Z", "+0000") or "+0000"
+    ahead = int(f"{zone[0]}1") * (60 * int(zone[1:3]) + int(zone[3:]))
+    return 3600.0 * hour + 60.0 * (minute - ahead) + float(parts["second"].replace(",", ".") or 0.0)
 
 
 def _unread(cells: Sequence[str], row: int, wrong: str) -> Column:
-    return Column(np.full(len(cells), np.nan), (row, cells[row]), wrong, SAY_TIME, undated=True)
-
-
-def _read(texts: NDArray[np.object_], forms: Sequence[str]) -> NDArray[np.datetime64]:
-    """Return moments (n,), in UTC if all have a zone, by the first form that fits; NaT where none does."""
-    import pandas
-
-    zoned = np.array([_ZONE.search(text[10:]) is not None for text in texts])
-    found = np.full(len(texts), np.datetime64("NaT", "ns"))
-    for form in forms:
-        left = np.isnat(found)
-        if left.any():
-            with contextlib.suppress(ValueError, TypeError, OverflowError):
-                read = pandas.to_datetime(pandas.Series(texts[left]), format=form, utc=True, errors="coerce")
-                found[left] = read.dt.tz_localize(None).to_numpy()
-    return np.where(zoned == zoned[0], found, np.datetime64("NaT"))
-
-
-def with_days(sheet: Sheet) -> Sheet:
-    """Return the sheet with days to its times of day.
-
-    A column of dates and one of times of day become one moment. Where there are no dates, times of day that
-    fall by more than half a day belong to the next day.
-    """
-    columns = list(sheet.columns)
-    days = [column.numbers[~np.isnan(column.numbers)] / _A_DAY for column in columns]
-    whole = [bool(np.all(np.abs(each - np.round(each)) < 1e-6)) for each in days]
-    dates = [i for i, one in enumerate(columns) if one.dated and not one.of_day and whole[i]]
-    clocks = [i for i, column in enumerate(columns) if column.of_day]
-    for i in clocks:
-        clock = columns[i]
-        if len(dates) == len(clocks) == 1:
-            moments = columns[dates[0]].numbers + (clock.numbers + clock.began) % _A_DAY
-            first = float(next(iter(moments[~np.isnan(moments)]), 0.0))
-            done = f"{' and '.join(sheet.name_of(j) for j in sorted((dates[0], i)))} were joined"
-            began = columns[dates[0]].began + first
-            columns[dates[0]] = columns[i] = Column(moments - first, dated=True, began=began, done=(done,))
-            continue
-        there = np.flatnonzero(~np.isnan(clock.numbers))
-        falls = np.diff(clock.numbers[there]) < -_HALF_A_DAY
-        numbers = clock.numbers.copy()
-        numbers[there[1:]] += _A_DAY * np.cumsum(falls)
-        done = f"{sheet.name_of(i)} passes midnight {int(falls.sum())} times: a day was added each time"
-        columns[i] = replace(clock, numbers=numbers, done=(done,) if np.any(falls) else ())
-    return replace(sheet, columns=tuple(columns))
-
-
-def is_date_in_digits(x: Array) -> bool:
-    """Return whether most numbers (n,) are dates in digits, as 20240312 or 20240312105959."""
-    near = x[(x >= 1.97e7) & (x < 2.1e16)]
-    found = [_DIGITS.fullmatch(f"{value:.0f}") for value in np.floor(near)]
-    return sum(one is not None for one in found) > _MOSTLY * x.size
+    return Column(np.full(len(cells), np.nan), (row, cells[row]), wrong, SAY_TIME, dated=True)

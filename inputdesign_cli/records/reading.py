@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError
 from inputdesign_cli.records.arrays import MOST_UNPACKED, arrays_of_mat, columns_of_arrays
-from inputdesign_cli.records.cells import with_days
 from inputdesign_cli.records.sheet import Preparation, Sheet, Source
 from inputdesign_cli.records.text import decoded, sheet_of, table_in
 from inputdesign_cli.regular_file import read_regular
@@ -28,7 +27,7 @@ _OF_VARIABLES = (".mat", ".npz")
 
 
 def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = None) -> Sheet:
-    """Return the columns of a data file, with clock times completed by dates.
+    """Return the columns of a data file; its ending says the kind.
 
     Args:
         key: the key of the spec that names the file, for diagnostics.
@@ -37,11 +36,7 @@ def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = N
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    return with_days(_read(Source(path, key, preparation or Preparation())))
-
-
-def _read(source: Source) -> Sheet:
-    path = source.path
+    source = Source(path, key, preparation or Preparation())
     file, _, named = path.name.partition("#")
     kind = Path(file).suffix.lower()
     if kind not in (*_EXCEL, *_OF_VARIABLES):  # only their sheets and variables have names
@@ -66,14 +61,9 @@ def _bytes(source: Source, path: Path) -> bytes:
     try:
         return read_regular(path, _MOST_BYTES + 1)
     except FileNotFoundError:
-        what, hint = "does not exist", "check the name and the folder"
+        what, hint = "does not exist", "check its name; paths in a spec begin at the folder of the spec"
         if str(path) == STANDARD_STREAM:
-            what += ": data are not read from standard input"
-            hint = "write them to a file, whose ending shows its kind, and name that"
-        elif source.key:
-            hint = "paths are relative to the folder of the spec"
-    except IsADirectoryError:
-        what, hint = "is a folder", "name a CSV file"
+            hint = "data are not read from standard input: write them to a file, and name that"
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         what, hint = f"cannot be read: {reason}", "name a CSV file"
@@ -92,18 +82,12 @@ def _check_unpacked(source: Source, raw: bytes) -> None:
 
 
 def _arrays_of_npz(source: Source, raw: bytes) -> dict[str, Any]:
-    arrays: dict[str, Any] = {}
     try:
         with np.load(io.BytesIO(raw), allow_pickle=False) as found:
-            for name in found.files:
-                try:
-                    arrays[name] = found[name]
-                except ValueError:  # objects of Python are never unpickled
-                    arrays[name] = np.array([None])
-    except Exception:  # a broken archive makes its reader raise anything
+            return {name: found[name] for name in found.files}
+    except Exception:  # a broken archive makes its reader raise anything; objects are never unpickled
         hint = "write it with numpy.savez(file, u=.., y=..)"
         raise source.unreadable("is no .npz file of numbers", hint) from None
-    return arrays
 
 
 def _workbook(source: Source, raw: bytes, named: str) -> Sheet:
@@ -114,14 +98,9 @@ def _workbook(source: Source, raw: bytes, named: str) -> Sheet:
         raise source.unreadable("has no such sheet", f"the sheets are {', '.join(frames)}")
     first, *others = frames
     rows = map(_written, frames[named or first].to_numpy(dtype=object))
-    stated = replace(source, given=replace(source.given, separator="\t", decimal="."))
-    try:
-        sheet = table_in(stated, "\n".join(map("\t".join, rows)))
-    except DataError as error:
-        name = f"{source.path.name}#{others[0]}" if others else ""
-        also = f"; its sheets are {', '.join(frames)}: name one as '{name}'" if others else ""
-        raise DataError([replace(one, hint=f"{one.hint}{also}") for one in error.diagnostics]) from None
-    return replace(sheet, others=() if named else tuple(others))
+    given = replace(source.given, separator="\t", decimal=".")
+    stated = replace(source, given=given, others=() if named else tuple(others))
+    return table_in(stated, "\n".join(map("\t".join, rows)))
 
 
 def _frame(pandas: Any, source: Source, raw: bytes) -> Any:
@@ -130,11 +109,8 @@ def _frame(pandas: Any, source: Source, raw: bytes) -> Any:
     if 8 * parquet.metadata.num_rows * len(parquet.schema_arrow.names) > MOST_UNPACKED:
         raise source.unreadable("unpacks to more than 1 GiB", "keep the rows that are needed")
     frame = pandas.read_parquet(io.BytesIO(raw))
-    if isinstance(frame.index, pandas.RangeIndex) and frame.index.name is None:
-        return frame
-    if frame.index.nlevels == 1 and frame.index.name is None:
-        frame.index.name = "time" if pandas.api.types.is_datetime64_any_dtype(frame.index.dtype) else "index"
-    return frame.reset_index()
+    plain = isinstance(frame.index, pandas.RangeIndex) and frame.index.name is None
+    return frame if plain else frame.reset_index()
 
 
 def _loaded(source: Source, kind: str, load: Callable[[Any], Any]) -> Any:

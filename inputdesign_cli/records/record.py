@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,10 +21,10 @@ from inputdesign_cli.findings.prepared_records import (
 )
 from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.records.columns import called, rising, roles_of, without_times
+from inputdesign_cli.records.columns import roles_of
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
-from inputdesign_cli.records.sheet import Preparation
+from inputdesign_cli.records.sheet import Preparation, Sheet
 from inputdesign_cli.records.signals import Signals, is_even, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
@@ -40,13 +40,7 @@ def read_log(path: Path, preparation: Preparation) -> Record:
     Raises:
         DataError: the file cannot be read, or does not show its inputs and outputs.
     """
-    sheet = read_sheet(path, preparation=preparation)
-    roles = roles_of(sheet, preparation.columns)
-    signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
-    step = _step_of(signals, preparation.sample_time, resample=preparation.resample)
-    found = [_assumed(signals, preparation)] if step is None else []
-    record = _record(signals, step or 1.0, signals.unit or "s", preparation, roles, found)
-    return replace(record, names=roles)
+    return _read(path, preparation)
 
 
 def read_logs(paths: Sequence[Path], preparation: Preparation) -> Record:
@@ -88,15 +82,32 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
                 message = f"the {what} {name}, but the plant has no such channel"
                 hint = f"its channels are {', '.join(channels)}: write {option}"
                 raise bad_spec("unknown-channel", message, hint=hint)
-    return _together(paths, [_read(path, units, preparation) for path in paths])
+    return _together(paths, [_read(path, preparation, units) for path in paths])
 
 
-def _read(path: Path, units: Units, preparation: Preparation) -> Record:
-    """Read one file for a plant."""
+def _read(path: Path, preparation: Preparation, units: Units | None = None) -> Record:
+    """Read one file, for a plant if its units are given."""
     sheet = read_sheet(path, preparation=preparation)
     roles = roles_of(sheet, preparation.columns, units)
     signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
-    found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
+    if units is not None:
+        found = [*_against_spec(sheet, roles, preparation, units)]
+        signals, step, unit = _in_step(signals, units, preparation), units.sample_time, units.time_unit
+    else:
+        known = _step_of(signals, preparation.sample_time, resample=preparation.resample)
+        if known is None and signals.name:
+            hint = "give the sample time: --sample-time 0.5"
+            raise sheet.error("data-not-uniform", f"{sheet.path.name} has one time only", hint, 0)
+        step, unit, found = known or 1.0, signals.unit or "s", TIMES_ASSUMED.when(known is None)
+    record = _record(signals, step, unit, preparation)
+    return replace(record, names=roles, findings=(*record.findings, *found))
+
+
+def _against_spec(
+    sheet: Sheet, roles: Mapping[str, str], preparation: Preparation, units: Units
+) -> Iterator[Finding]:
+    """Yield findings for columns that the plant lacks, of other units, or taken by their unit alone."""
+    yield from columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
     taken = {
         channel: name
         for channel, name in roles.items()
@@ -104,10 +115,7 @@ def _read(path: Path, units: Units, preparation: Preparation) -> Record:
         and not is_called(channel, name.lower())
         and name_and_unit(name)[0].lower() != units.channels.get(channel, ("", ""))[0].lower()
     }
-    found = [*found, *columns_by_unit(taken)]
-    in_step = _in_step(signals, units, preparation)
-    record = _record(in_step, units.sample_time, units.time_unit, preparation, roles, found)
-    return replace(record, names=roles)
+    yield from columns_by_unit(taken)
 
 
 def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
@@ -143,16 +151,9 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
     )
 
 
-def _record(
-    signals: Signals,
-    step: float,
-    unit: str,
-    preparation: Preparation,
-    roles: Mapping[str, str],
-    found: Iterable[Finding],
-) -> Record:
+def _record(signals: Signals, step: float, unit: str, preparation: Preparation) -> Record:
     """Build the record from the signals of one file, whose references follow the inputs."""
-    r = sum(role.startswith("u") for role in roles)
+    r = sum(name.startswith("u") for name in signals.names)
     segments, done = segments_of(signals, step, unit, preparation)
     times, u, y = (np.concatenate(part) for part in zip(*segments, strict=True))
     lengths = tuple(len(part.y) for part in segments)
@@ -161,8 +162,9 @@ def _record(
     stamps = signals.time[stamped] * (1.0 if signals.name else step)
     at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
     logged = signals.y[at]
-    held = np.concatenate([np.zeros_like(logged[:1], dtype=bool), logged[1:] == logged[:-1]])
+    held = np.diff(logged, axis=0, prepend=np.nan) == 0.0
     held[np.cumsum([0, *lengths])[:-1]] = False
+    values, rows = np.column_stack([signals.u[at, :r], logged]), signals.sheet.lines[at]
     return Record(
         u[:, :r],
         y,
@@ -170,15 +172,10 @@ def _record(
         times,
         lengths,
         ((signals.sheet.path.name, len(u)),),
-        Recorded(
-            np.column_stack([signals.u[at, :r], logged]),
-            signals.sheet.lines[at],
-            held,
-            resolution_of(signals.y),
-        ),
+        Recorded(values, rows, held, resolution_of(signals.y)),
         step=step,
         time_unit=unit,
-        findings=(*signals.findings, *done, *found),
+        findings=(*signals.findings, *done),
         header=tuple(signals.sheet.header),
         means=np.nanmean(signals.u[:, :r], axis=0),
         lined=any(one.where.startswith("y") and one.figures.get("line") for one in done),
@@ -188,8 +185,7 @@ def _record(
 def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float | None:
     """Return the sample time by the option, the times or the file; None if nothing states it.
 
-    Raises:
-        DataError: `data-not-uniform`, times advance by something else than the user states.
+    Raises `DataError` (`data-not-uniform`): times advance by something else than the user states.
     """
     apart = typical_step(signals.time) if signals.name else np.nan
     if stated is None:
@@ -203,29 +199,10 @@ def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float
     return stated
 
 
-def _assumed(signals: Signals, preparation: Preparation) -> Finding:
-    """Return the finding that the sample time is taken for 1, and which columns may hold times.
-
-    Raises:
-        DataError: `data-not-uniform`, there is one time only.
-    """
-    sheet = signals.sheet
-    if signals.name:
-        hint = "give the sample time: --sample-time 0.5"
-        raise sheet.error("data-not-uniform", f"{sheet.path.name} has one time only", hint, 0)
-    taken = {column.strip().lower() for column in preparation.columns.values()}
-    likely = [i for i, one in enumerate(sheet.columns) if one.dated or i in rising(sheet)]
-    names = [called(sheet, i) for i in likely if taken.isdisjoint((sheet.name_of(i).lower(), str(i + 1)))]
-    listed = [] if without_times(sheet, preparation.columns) else names
-    fact = f"perhaps times stand in {', '.join(listed)}" if listed else ""
-    return TIMES_ASSUMED.found(fact, columns=listed)
-
-
 def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signals:
     """Return the signals with times in the unit of the spec.
 
-    Raises:
-        DataError: `data-wrong-unit`; `data-not-uniform`, the sample time differs.
+    Raises `DataError`: `data-wrong-unit`; `data-not-uniform`, the sample time differs.
     """
     sheet, stated, scale = signals.sheet, preparation.sample_time, 1.0
     if signals.unit and (signals.name or preparation.time_unit):

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
@@ -29,6 +30,8 @@ EVEN = 1e-3
 MOST_JITTER = 0.25
 # A longer step is a gap; with `resample` it may be longer before it is one.
 _GAP, _LONG_GAP = 1.5, 3.0
+# Gaps after a larger share of the rows come from times that are rounded, or from another sample time.
+_OFTEN = 0.1
 
 
 class Segment(NamedTuple):
@@ -90,6 +93,11 @@ def _cut(
     cut = (np.diff(kept) > 1) | apart[kept[1:]]
     long = np.diff(time[kept]) > (_LONG_GAP if resample else _GAP) * step
     parts = np.split(kept, np.flatnonzero(cut | long) + 1)
+    if np.sum(long & ~cut) > _OFTEN * len(kept):
+        row = int(kept[1:][long & ~cut][0])
+        message = f"times of {signals.sheet.path.name} often advance by more than {_GAP} times {step:.6g}"
+        hint = "if they are rounded, --columns time=none and --sample-time; if rows are missing, --resample"
+        raise signals.sheet.error("data-not-uniform", message, hint, row)
     longer = [part for part in parts if len(part) >= SHORTEST] or [max(parts, key=len)]
     short, gaps = np.setdiff1d(kept, np.concatenate(longer)), lines[kept[1:]][long & ~cut]
     for rows, why in (
@@ -147,9 +155,6 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, bool]:
 
     `auto` takes a line if it explains half the power about the mean, else the mean.
     """
-    level = np.full(x.shape, x.mean())
-    if kind in ("linear", "auto"):
-        line = np.polynomial.Polynomial.fit(np.arange(len(x)), x, 1)(np.arange(len(x)))
-        if kind == "linear" or np.sum((x - line) ** 2) < 0.5 * np.sum((x - level) ** 2):
-            return line, True
-    return level, False
+    level, line = (x - scipy.signal.detrend(x, type=shape) for shape in ("constant", "linear"))
+    explains = np.sum((x - line) ** 2) < 0.5 * np.sum((x - level) ** 2)
+    return (line, True) if kind == "linear" or (kind == "auto" and explains) else (level, False)

@@ -59,16 +59,27 @@ class Preparation:
 
 @dataclass(frozen=True)
 class Source:
-    """Names a data file, the key of the spec that refers to it, and the format that the user states."""
+    """Names a data file, the key of the spec that refers to it, and the format that the user states.
+
+    `others` are sheets of the workbook that were not read, where none was named.
+    """
 
     path: Path
     key: str = ""
     given: Preparation = field(default_factory=Preparation)
+    others: tuple[str, ...] = ()
+
+    @property
+    def or_sheet(self) -> str:
+        """Return what a hint adds where a workbook has further sheets."""
+        example = f"'{self.path.name}#{self.others[0]}'" if self.others else ""
+        return f"; only the first sheet was read: name one as {example}" if self.others else ""
 
     def unreadable(self, what: str, hint: str, line: int | None = None) -> DataError:
         """Return the error about a file that cannot be read at all, or not from some line on."""
         location = None if line is None else Location(str(self.path), line, 1)
-        return DataError.because("data-unreadable", f"the file {self.path} {what}", hint, self.key, location)
+        message = f"the file {self.path} {what}"
+        return DataError.because("data-unreadable", message, hint + self.or_sheet, self.key, location)
 
 
 @dataclass(frozen=True)
@@ -77,10 +88,7 @@ class Column:
 
     Attributes:
         fault: the first row that holds something else, and its text; `wrong` and `hint` are for the message.
-        dated: whether the numbers are seconds since the first of some dates or times.
-        began: what that first counts, in seconds, since 1970 or, of times of day, since midnight.
-        of_day: whether the cells hold times of day without a date.
-        undated: whether the cells look like dates and cannot be read.
+        dated: whether the cells hold dates or times; the numbers are seconds since the first.
         done: what was done to make times of the cells.
     """
 
@@ -89,9 +97,6 @@ class Column:
     wrong: str = "is not a finite number"
     hint: str = _PLAIN
     dated: bool = False
-    began: float = 0.0
-    of_day: bool = False
-    undated: bool = False
     done: tuple[str, ...] = ()
 
     def mostly(self, *, rises: bool) -> bool:
@@ -111,7 +116,6 @@ class Sheet:
         shown: whether messages may show what the file holds: most of it is numbers.
         passed: blank lines and rows that are commented out, between rows of numbers.
         sample_time, time_unit: what the file itself states.
-        others: sheets of the workbook that were not read, where none was named.
     """
 
     source: Source
@@ -124,7 +128,6 @@ class Sheet:
     passed: tuple[int, ...] = ()
     sample_time: float | None = None
     time_unit: str | None = None
-    others: tuple[str, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -142,8 +145,7 @@ class Sheet:
 
     def error(self, code: str, message: str, hint: str, row: int | None = None) -> DataError:
         """Return the error that points at a row, or at the header."""
-        if self.others and code == "data-missing-column":
-            hint += f"; only the first sheet was read: name one as '{self.path.name}#{self.others[0]}'"
+        hint += self.source.or_sheet if code == "data-missing-column" else ""
         line, text = self.head
         if row is not None:
             line, text = int(self.lines[row]), self.texts[row] if self.texts else ""

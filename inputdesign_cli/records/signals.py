@@ -14,24 +14,20 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.outlying_values import beyond_precision
 from inputdesign_cli.findings.places import SHORTEST
 from inputdesign_cli.findings.prepared_records import COLUMNS_JOINED, SHEETS_UNREAD, TIMES_READ
-from inputdesign_cli.records.cells import SAY_TIME, is_date_in_digits
-from inputdesign_cli.records.columns import TIME_UNITS, called, column_named, columns_of, rising, time_unit_in
+from inputdesign_cli.records.cells import SAY_TIME
+from inputdesign_cli.records.columns import TIME_UNITS, column_named, columns_of, time_unit_in
 from inputdesign_cli.records.sheet import Preparation, Run, Sheet
 
-# Steps of time differ from a round number by less than this share of it by rounding alone.
-_EVEN_STEPS = 0.01  # the share by which even steps differ as times are rounded
-_ROUND = 1e-4
-# Steps of two lengths, which differ by this share at least, come from rounding where no time is farther
-# from a line than this share of their difference. Fewer steps of one length are gaps.
-_COARSE, _ROUNDED_OFF, _BOTH = 0.1, 0.75, 3
-_SINCE_1970 = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
-# Counts of these years: a count in one unit is out of range in any other, and as seconds lies millennia away.
+# Steps of time differ from a round number, and from each other, by less than these shares by rounding alone.
+_ROUND, _EVEN_STEPS = 1e-4, 0.01
+# The first date in digits, and seconds since 1970 of the years 2000 to 2100.
+_A_DATE = 1.97e7
 _FIRST, _LAST = (datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (2000, 2100))
-# Rows count unchanged where this share of the whole ones stands in long stretches, or, of short records,
-# where this share is whole.
+# Rows stay as they are where this share of the whole ones stands in long stretches; in short records, where
+# this share is whole.
 _KEPT, _FEW, _SHORT = 0.25, 0.5, 2 * SHORTEST
-# Steps of an output that are longer, in its own, are gaps.
-_OWN_GAP, _NEARLY, _MOSTLY = 3.0, 1.1, 0.95
+# Steps of an output that are longer, in its own, are gaps. Those of all rows may be shorter by the second.
+_OWN_GAP, _NEARLY = 3.0, 1.1
 
 
 @dataclass(frozen=True)
@@ -72,19 +68,28 @@ def signals_of(sheet: Sheet, roles: Mapping[str, str], preparation: Preparation)
         DataError: a column is missing, holds text or nothing, or leaves the range of arithmetic; the times
             do not increase, or cannot be read.
     """
-    name = roles.get("time", "")
-    found = columns_of(sheet, roles)
+    name, found = roles.get("time", ""), columns_of(sheet, roles)
     for role, numbers in found.items():
         if np.isnan(numbers).all():
             message = f"the column {roles[role]} holds no number"
             hint = "is it another column? A workbook holds values of formulas once a spreadsheet saved it"
             raise sheet.error("data-not-a-number", message, hint, 0)
-    time, unit, dated, findings = _times(sheet, found.get("time"), name, preparation)
+    time, dated = np.arange(len(sheet.lines), dtype=float), False
+    findings = list[Finding]()
+    if name:
+        dated = column_named(sheet, name).dated
+        findings += [TIMES_READ.found(done, where=name) for done in column_named(sheet, name).done]
+    unit = _unit(sheet, name, preparation.time_unit, dated=dated)
+    if name:
+        time = found["time"]
+        if not unit:
+            _check_counting(sheet, time, name)
     own = {letter: [role for role in roles if role[0] == letter] for letter in "ury"}
     ordered = [*own["u"], *own["r"], *own["y"]]
     single = {f"{letter}1": letter for letter in "uy" if len(own[letter]) == 1}
-    others = f"read {sheet.path.name}#NAME for one of {', '.join(sheet.others)}"
-    kept = Signals(
+    others = sheet.source.others
+    fact = f"read {sheet.path.name}#NAME for one of {', '.join(others)}"
+    every = Signals(
         sheet,
         time,
         name,
@@ -94,44 +99,30 @@ def signals_of(sheet: Sheet, roles: Mapping[str, str], preparation: Preparation)
         np.column_stack([found[role] for role in own["y"]]),
         tuple(single.get(role, role) for role in ordered),
         _left_out(sheet, preparation.without),
-        (*findings, *SHEETS_UNREAD.when(sheet.others, others, sheets=list(sheet.others))),
-    ).at(_rows(sheet, time, preparation, timed=bool(name)))
+        (*findings, *SHEETS_UNREAD.when(others, fact, sheets=list(others))),
+    )
+    kept = every.at(_rows(sheet, time, preparation, timed=bool(name)))
     for role, x in zip(ordered, (*kept.u.T, *kept.y.T), strict=True):
         values = np.where(kept.without, np.nan, x)
         if not np.isnan(values).all():
             check_range(kept.sheet, roles[role], values)
     if name:
         _check_rising(kept.sheet, kept.time)
-        kept = _at_even_times(kept)
     return kept
 
 
-def _times(
-    sheet: Sheet, time: Array | None, name: str, preparation: Preparation
-) -> tuple[Array, str | None, bool, list[Finding]]:
-    """Return times (n,), their unit, whether they are dates, and what was done to read them."""
-    if time is None:
-        unit = _unit(sheet, "", preparation.time_unit, dated=False)
-        return np.arange(len(sheet.lines), dtype=float), unit, False, []
-    column = column_named(sheet, name)
-    findings = [TIMES_READ.found(done, where=name) for done in column.done]
-    unit = _unit(sheet, name, preparation.time_unit, dated=column.dated)
-    if column.dated or unit:
-        return time, unit, column.dated, findings
-    there = time[~np.isnan(time)]
-    if is_date_in_digits(there):
-        message = f"{there[0]:.17g} in column {name} looks like a date in digits"
-        hint = (
-            f"{SAY_TIME}; here perhaps --time-format %Y%m%d%H%M%S; if it counts, say in what: --time-unit s"
-        )
-        raise sheet.error("data-not-a-number", message, hint, int(np.flatnonzero(~np.isnan(time))[0]))
-    for what, a_second in _SINCE_1970.items():
-        if a_second * _FIRST <= there.min() and there.max() <= a_second * _LAST:
-            begun = datetime.fromtimestamp(there[0] / a_second, UTC)
-            fact = f"{name} counts {what} since 1970, from {begun:%Y-%m-%d %H:%M:%S} UTC on"
-            read = TIMES_READ.found(fact, where=name, begun=begun.isoformat())
-            return (time - there[0]) / a_second, "s", True, [*findings, read]
-    return time, None, False, findings
+def _check_counting(sheet: Sheet, time: Array, name: str) -> None:
+    """Raise `DataError` (`data-not-a-number`) for times (n,) that may be dates in digits, as 20240312.
+
+    They may count parts of seconds since 1970 as well. Seconds since 1970 are times as others.
+    """
+    there = np.flatnonzero(~np.isnan(time))
+    first, last = float(time[there].min()), float(time[there].max())
+    if last < _A_DATE or (first >= _FIRST and last <= _LAST):
+        return
+    message = f"{time[there[0]]:.17g} in column {name} may be a date in digits, or count since 1970"
+    hint = f"if it counts, say in what: --time-unit ms; else {SAY_TIME}, or --time-format %Y%m%d%H%M%S"
+    raise sheet.error("data-not-a-number", message, hint, int(there[0]))
 
 
 def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | None:
@@ -151,17 +142,14 @@ def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | No
 def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -> NDArray[np.int64]:
     """Return the rows that --skip and --range keep."""
     scaled = time if timed else time * (preparation.sample_time or sheet.sample_time or 1.0)
-    kept = np.arange(len(time)) >= preparation.skip
-    if preparation.span is not None:
-        begin, end = preparation.span
-        kept &= (scaled >= begin) & (scaled <= end)
-    if not np.any(kept):
+    begin, end = preparation.span or (-np.inf, np.inf)
+    inside = ~((scaled < begin) | (scaled > end))
+    kept = np.flatnonzero(inside & (np.arange(len(time)) >= preparation.skip))
+    if not kept.size:
         message = f"nothing is left of the {len(time)} rows of {sheet.path.name}"
-        hint = f"--skip {preparation.skip} leaves them all out"
-        if preparation.skip < len(time):
-            hint = f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}: mind --range"
-        raise sheet.error("data-unreadable", message, hint)
-    return np.flatnonzero(kept)
+        times = f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}"
+        raise sheet.error("data-unreadable", message, f"{times}: mind --skip and --range")
+    return kept
 
 
 def _left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
@@ -186,44 +174,23 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
     before, row = there[wrong[0]], there[wrong[0] + 1]
     hint = (
         "sort the rows, keep one row of each time, or write times with more digits; if the rows are even, "
-        "add time=none to --columns, and --sample-time"
+        "add time=none to --columns, and --sample-time; if they stand in another column, --columns time=NAME"
     )
-    other = [called(sheet, at) for at in rising(sheet)]
-    hint += f"; or is the time in column {other[0]}? Then --columns time={other[0]}" if other else ""
     message = f"the times of {sheet.path.name} do not increase: {time[before]:.10g} is followed by "
     raise sheet.error("data-not-uniform", f"{message}{time[row]:.10g}", hint, int(row))
 
 
-def _at_even_times(signals: Signals) -> Signals:
-    """Return the signals at even times, where the times of the file differ from a line by rounding alone.
-
-    Times in days with five decimals take two lengths of steps at a sample time of a second.
-    """
-    time, rows = signals.time, np.arange(len(signals.time))
-    if len(time) < SHORTEST or np.isnan(time).any():
-        return signals
-    steps = np.diff(time)
-    digit = float(np.ptp(steps))
-    longer = steps > 0.5 * float(steps.min() + steps.max())
-    alike = _EVEN_STEPS * min(digit, float(steps.min()))
-    two = all(own.size >= _BOTH and float(np.ptp(own)) <= alike for own in (steps[longer], steps[~longer]))
-    if not two or digit <= _COARSE * float(steps.max()):
-        return signals
-    line = np.polynomial.Polynomial.fit(rows, time, 1)
-    even = np.asarray(line(rows), dtype=float)
-    if float(np.abs(time - even).max()) > _ROUNDED_OFF * digit:
-        return signals
-    fact = f"{signals.name} is rounded to {digit:.3g}, and its rows are {line.deriv()(0.0):.6g} apart"
-    read = TIMES_READ.found(fact, where=signals.name, rounded=digit)
-    return replace(signals, time=even, findings=(*signals.findings, read))
+def steps_without_gaps(time: Array) -> Array:
+    """Return the steps of times (n,) that are within a half of their median; none if that is no step."""
+    steps = np.diff(time[~np.isnan(time)])
+    middle = float(np.median(steps)) if steps.size else 0.0
+    return steps[np.abs(steps - middle) < 0.5 * middle]
 
 
 def typical_step(time: Array) -> float:
     """Return the mean step of time without gaps, rounded where the difference may be rounding."""
-    steps = np.diff(time[~np.isnan(time)])
-    middle = float(np.median(steps)) if steps.size else 0.0
-    near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
-    if middle <= 0.0 or not near.size:
+    near = steps_without_gaps(time)
+    if not near.size:
         return np.nan
     mean = float(near.mean())
     rounded = (float(f"{mean:.{digits}e}") for digits in range(6))
@@ -232,10 +199,8 @@ def typical_step(time: Array) -> float:
 
 def is_even(time: Array) -> bool:
     """Return whether the steps of time without gaps are all alike, to rounding of the times."""
-    steps = np.diff(time[~np.isnan(time)])
-    middle = float(np.median(steps)) if steps.size else 0.0
-    near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
-    return bool(near.size) and float(np.abs(near - middle).max()) <= _EVEN_STEPS * middle
+    near = steps_without_gaps(time)
+    return bool(near.size) and bool(np.ptp(near) <= _EVEN_STEPS * near.min())
 
 
 def check_range(sheet: Sheet, name: str, x: Array) -> None:
@@ -253,17 +218,13 @@ def check_range(sheet: Sheet, name: str, x: Array) -> None:
 
 
 def joined_rows(signals: Signals, *, resample: bool) -> Signals:
-    """Return the signals at the times of the output that was written most often; or, if few miss, all rows.
+    """Return the signals at the times of the output that was written most often, if hardly a row is whole.
 
-    Inputs are held until they are written again, and are their means until the next row; outputs are
-    interpolated linearly. Rows stay unchanged if enough of them are whole.
-
-    Args:
-        resample: whether that is asked for.
-
-    Raises:
-        DataError: `data-not-a-number`, rows would have to be joined, and that is not asked for or cannot be.
+    Inputs are held until they are written again, and move at the nearest of these times. Outputs are
+    interpolated linearly. Raises `DataError` (`data-not-a-number`) unless `resample` asks for it.
     """
+    import pandas
+
     there = ~np.isnan(np.column_stack([signals.u, signals.y]))
     whole = np.asarray(there.all(axis=1))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], whole.astype(int), [0]])))
@@ -278,55 +239,30 @@ def joined_rows(signals: Signals, *, resample: bool) -> Signals:
     if not (resample and possible):
         message = f"hardly a row of {signals.sheet.path.name} has numbers in all columns ({listed} of "
         message += f"{len(whole)} rows): they were written at different times"
-        hint = "join the rows of each sample, or log the time with them"
-        if possible:
-            hint = "add --resample (inputs are held until written again, outputs interpolated), or join the "
-            hint += "rows"
+        option = "add --resample (inputs are held until written again, outputs interpolated), or "
+        hint = f"{option * possible}join the rows of each sample, or log the time with them"
         raise signals.sheet.error("data-not-a-number", message, hint, 0)
-    written = ~np.isnan(signals.y) & timed[:, None]
+    signals = signals.at(np.flatnonzero(timed))
+    written = ~np.isnan(signals.y)
     rows = np.flatnonzero(written[:, int(np.argmax(written.sum(axis=0)))])
-    every = np.diff(signals.time[timed])
-    even = np.mean(np.abs(every - np.median(every)) <= (_NEARLY - 1.0) * np.median(every)) >= _MOSTLY
-    if even and rows.size > 1 and np.median(np.diff(signals.time[rows])) <= _NEARLY * np.median(every):
-        rows = np.flatnonzero(timed)  # it misses some only
-    time = signals.time[rows]
-    inputs = [_until_next(signals.time, x, time) for x in signals.u.T]
-    outputs = [_between(signals.time[at], x[at], time) for x, at in zip(signals.y.T, written.T, strict=True)]
-    moved = int(np.any([moves for _, moves in inputs], axis=0).sum())
-    found = COLUMNS_JOINED.found(
-        f"{listed} of {len(whole)} rows, joined at {len(rows)} times, between {moved} of which inputs move",
-        counts=counts,
-        rows=len(whole),
-        moved=moved,
-        kept=len(rows),
+    own, every = (float(np.median(np.diff(t, append=t[-1]))) for t in (signals.time[rows], signals.time))
+    if not np.isnan(signals.u).any() and own <= _NEARLY * every:
+        rows = np.arange(len(written))  # it misses some rows only
+    instants, held = signals.time[rows], pandas.DataFrame(signals.u).ffill().to_numpy()
+    u = held[np.searchsorted(signals.time, instants + 0.5 * own) - 1]
+    moved = sum(int(k * np.any(np.diff(x, axis=0) != 0.0, axis=1).sum()) for k, x in ((1, held), (-1, u)))
+    y = np.column_stack([_between(signals.time, x, instants) for x in signals.y.T])
+    fact = (
+        f"{listed} of {len(whole)} rows, joined at {len(rows)} times, between which inputs move {moved} times"
     )
-    u, y = (np.column_stack(columns) for columns in ([means for means, _ in inputs], outputs))
+    found = COLUMNS_JOINED.found(fact, counts=counts, rows=len(whole), moved=moved, kept=len(rows))
     return replace(signals.at(rows), u=u, y=y, findings=(*signals.findings, found))
 
 
-def _until_next(time: Array, x: Array, instants: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return means of x (n,), held until written again, between instants, and whether x changes there.
-
-    The mean is NaN before x was written first; the last value is returned as it is.
-    """
-    at = np.flatnonzero(~np.isnan(x) & ~np.isnan(time))
-    began, values = time[at], x[at]
-    here = np.searchsorted(began, instants, side="right") - 1
-    held = values[np.maximum(here, 0)]
-    # The integral of x is linear between the times at which it is written, and goes on behind the last.
-    ends = np.append(began, max(instants[-1], began[-1]) + 1.0)
-    area = np.concatenate([[0.0], np.cumsum(values * np.diff(ends))])
-    means = np.append(np.diff(np.interp(instants, ends, area)) / np.diff(instants), held[-1])
-    moves = (np.abs(means - held) > 1e-9 * np.abs(values).max()) & (here >= 0)
-    return np.where(here >= 0, np.where(moves, means, held), np.nan), moves
-
-
 def _between(time: Array, y: Array, instants: Array) -> Array:
-    """Interpolate y (n,) linearly at some instants; NaN outside and in gaps."""
-    found = np.interp(instants, time, y, left=np.nan, right=np.nan)
-    steps = np.diff(time)
-    if not steps.size:
-        return found
-    after = np.clip(np.searchsorted(time, instants, side="left"), 1, len(time) - 1)
-    gap = steps[after - 1] > _OWN_GAP * np.median(steps)
-    return np.where(gap & ~np.isin(instants, time), np.nan, found)
+    """Interpolate y (n,) linearly between the times at which it was written; NaN outside and in gaps."""
+    own = time[~np.isnan(y)]
+    found = np.interp(instants, own, y[~np.isnan(y)], left=np.nan, right=np.nan)
+    steps = np.diff(own, prepend=own[0], append=own[-1])
+    gap = steps[np.searchsorted(own, instants)] > _OWN_GAP * np.median(steps[1:-1] if own.size > 1 else 0.0)
+    return np.where(gap & ~np.isin(instants, own), np.nan, found)

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -16,22 +17,18 @@ from inputdesign_cli.records.cells import (
     decimal_of,
     is_missing,
     is_plain,
-    is_unit,
     is_value,
+    joined_clocks,
     moments_column,
 )
 from inputdesign_cli.records.columns import is_called_time, named_columns
-from inputdesign_cli.records.sheet import Sheet, Source
+from inputdesign_cli.records.sheet import Column, Sheet, Source
 
 Rows = list[tuple[int, list[str]]]
 _COMMENTS = ("#", "%", "//")
 # Asked of charset-normalizer where a text is neither UTF-8 nor, by its bytes, Windows-1252.
 _OTHERS = ["utf_16", "utf_32", "utf_16_le", "utf_16_be", "cp932", "gb18030", "big5", "euc_kr", "cp1251"]
-# How archives, workbooks and arrays begin.
-_BINARY = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x93NUMPY")
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1b\ufffd]")
-# Fewer bytes that are no ASCII are faults of a logger.
-_HIGH, _FEW = bytes(range(128, 256)), 3
 _LOOKED_AT = 200
 # As many as a sheet of a workbook can have: a longer line is no row of a table.
 _MOST_FIELDS = 16_384
@@ -60,32 +57,24 @@ def decoded(source: Source, raw: bytes) -> str:
     else:
         from charset_normalizer import from_bytes
 
-        foreign = zeros or len(raw) - len(raw.translate(None, _HIGH)) > _FEW
-        found = from_bytes(raw[: 2**20], cp_isolation=_OTHERS).best() if foreign else None
+        found = from_bytes(raw[: 2**20], cp_isolation=_OTHERS).best()
         text = raw.decode(found.encoding if found else "utf-8", errors="replace")
-    first = _CONTROL.search(text)
-    if first is None:
-        return text
-    if raw.startswith(_BINARY) or len(_CONTROL.findall(text)) > max(_FEW, 0.01 * len(text)):
-        hint = "unpack it, or save it as CSV; arrays have the ending .mat or .npz, tables .xlsx or .parquet"
-        raise source.unreadable("is no text", hint)
-    line = len(f"{text[: first.start()]}|".splitlines())
-    what = f"is no clean text: line {line} has a character that no text has (code {ord(first[0])})"
-    raise source.unreadable(what, "take the line out, or save the file as UTF-8", line)
+    if first := _CONTROL.search(text):
+        line = len(f"{text[: first.start()]}|".splitlines())
+        what = f"is no clean text: line {line} has a character that no text has (code {ord(first[0])})"
+        hint = "take the line out, or save the file as UTF-8; files of other kinds have their usual endings"
+        raise source.unreadable(what, hint, line)
+    return text
 
 
 def table_in(source: Source, text: str) -> Sheet:
-    """Read the table in a text.
-
-    Raises:
-        DataError: `data-unreadable`, `data-extra-field`.
-    """
+    """Read the table in a text. Raises `DataError`: see `sheet_of`."""
     said = source.given.separator
     separator = _SAID.get(said, said) if said else _separator_of(text)
-    rows, passed, comment = _rows_of(source, text, separator)
+    rows, passed = _rows_of(source, text, separator)
     filled = [i for i, (_, row) in enumerate(rows) if any(map(str.strip, row))]
     rows = rows[filled[0] : filled[-1] + 1] if filled else []
-    head, names, body = _headed(rows, comment, separator)
+    head, names, body = _headed(rows, separator)
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
     sheet = sheet_of(source, head, names, body, separator)
@@ -106,14 +95,15 @@ def sheet_of(
     if not body:
         raise source.unreadable("holds no rows of numbers", "write a header line and rows below it")
     width, given = len(names) or max(len(row) for _, row in body), source.given
-    cells = [[row[i] if i < len(row) else "" for _, row in body] for i in range(width)]
+    if width > _MOST_FIELDS:
+        raise source.unreadable(f"has more than {_MOST_FIELDS} columns", "write one sample a line")
+    cells, clocks = joined_clocks([*zip_longest(*(row for _, row in body), fillvalue="")][:width])
     every = [cell for column in cells for cell in column if cell.strip()]
     decimal = given.decimal or decimal_of(every, between_commas=separator == ",")
     columns = [column_of(column, decimal, stated=bool(given.decimal)) for column in cells]
     # Messages may show what is a table of numbers, and no secret.
     some = every[:: max(len(every) // 10**4, 1)]
-    dates = sum(one.dated for one in columns) / width
-    shown = not every or sum(map(is_value, some)) / len(some) + dates >= 0.5
+    shown = not every or 2 * sum(map(is_value, some)) >= len(some)
     lines = np.array([line for line, _ in body])
     texts = [(separator or " ").join(row) for _, row in body]
     sheet = Sheet(source, tuple(names), tuple(columns), lines, head, texts, shown)
@@ -121,28 +111,29 @@ def sheet_of(
     if long is not None:
         message = f"line {body[long][0]} has {len(body[long][1])} fields, and the header {width}"
         raise sheet.error("data-extra-field", message, _EXTRA, long)
-    return sheet if given.time_format is None else _in_form(sheet, cells, given.time_format)
+    if given.time_format is not None:
+        _read_times(sheet, columns, cells, given.time_format)
+    if clocks:
+        done = f"{' and '.join(map(sheet.name_of, clocks))} were joined"
+        columns[clocks[0]] = columns[clocks[1]] = replace(columns[clocks[0]], done=(done,))
+    return replace(sheet, columns=tuple(columns))
 
 
-def _in_form(sheet: Sheet, cells: Sequence[Sequence[str]], form: str) -> Sheet:
-    """Return the sheet with times read in the form that the user states: of the named column, or of any."""
+def _read_times(sheet: Sheet, columns: list[Column], cells: Sequence[Sequence[str]], form: str) -> None:
+    """Replace columns by times in the form that the user states: the named column, or any that has it."""
     own = sheet.source.given.columns.get("time", "").strip().lower()
-    columns, found = list(sheet.columns), False
     likely = [
-        i
-        for i, one in enumerate(columns)
-        if one.fault is not None or one.dated or is_called_time(sheet.name_of(i))
+        i for i, one in enumerate(columns) if one.fault or one.dated or is_called_time(sheet.name_of(i))
     ]
+    found = False
     for i in (named_columns(sheet, own) if own else []) or likely:
         texts = ["" if is_missing(cell) else cell.strip().removesuffix(".0") for cell in cells[i]]
         read = moments_column(texts, form)
-        if read is not None and read.dated:
-            columns[i], found = read, True
-    if found:
-        return replace(sheet, columns=tuple(columns))
-    message = f"no column of {sheet.path.name} holds times in the form {form}"
-    hint = "mind its marks and digits, name the column (--columns time=NAME), or leave --time-format out"
-    raise sheet.error("data-not-a-number", message, hint, 0)
+        columns[i], found = read or columns[i], found or read is not None
+    if not found:
+        message = f"no column of {sheet.path.name} holds times in the form {form}"
+        hint = "mind its marks and digits, name the column (--columns time=NAME), or leave --time-format out"
+        raise sheet.error("data-not-a-number", message, hint, 0)
 
 
 def _separator_of(text: str) -> str | None:
@@ -165,24 +156,16 @@ def _separator_of(text: str) -> str | None:
         return ","
 
 
-def _rows_of(source: Source, text: str, separator: str | None) -> tuple[Rows, list[int], str]:
-    """Return rows with their lines, the lines passed over (blank or commented) and the last comment above."""
-    rows, passed, comment = Rows(), list[int](), ""
+def _rows_of(source: Source, text: str, separator: str | None) -> tuple[Rows, list[int]]:
+    """Return rows with their lines, and the lines passed over: blank ones and comments."""
+    rows, passed = Rows(), list[int]()
     for line, row in _split(source, text, separator):
-        if len(row) > _MOST_FIELDS:
-            what = f"has a line of {len(row)} fields (line {line}), and at most {_MOST_FIELDS} are taken"
-            raise source.unreadable(what, "write one sample a line", line)
-        if len(row) < 2 and not any(map(str.strip, row)):
+        blank = len(row) < 2 and not any(map(str.strip, row))
+        if blank or (row[0].lstrip().startswith(_COMMENTS) and not ERROR.fullmatch(row[0])):
             passed.append(line)
-        elif row[0].lstrip().startswith(_COMMENTS) and not (len(row) > 1 and ERROR.fullmatch(row[0])):
-            bare = (separator or " ").join(row).lstrip("#%/ \t")
-            cells = re.split(r"[;,\t ]+", bare) if len(row) == 1 else bare.split(separator)
-            if len(cells) > 1 and all(map(is_plain, filter(str.strip, cells))):
-                passed.append(line)
-            comment = comment if rows else bare
         else:
             rows.append((line, row))
-    return rows, passed, comment
+    return rows, passed
 
 
 def _split(source: Source, text: str, separator: str | None) -> Rows:
@@ -203,7 +186,7 @@ def _split(source: Source, text: str, separator: str | None) -> Rows:
     return rows
 
 
-def _headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
+def _headed(rows: Rows, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
     """Return line and text of the header, the names (empty if there are none), and the rows below.
 
     Loggers write other lines above the table. A row of units below the names joins them: `valve` over `%` is
@@ -215,8 +198,7 @@ def _headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int,
     line, first = rows[begin]
     head, cells = (line, (separator or " ").join(first)), [" ".join(cell.split()) for cell in first]
     if any(map(is_plain, cells)) and all(is_plain(cell) or is_missing(cell) for cell in cells):
-        named = [part.strip() for part in (comment.split(separator) if comment else [])]
-        return head, named if len(named) == len(first) else [], rows[begin:]
+        return head, [], rows[begin:]
     if units:
         row = [cell.strip() for cell in rows[begin + 1][1]]
         cells = [f"{name} ({unit})" if unit else name for name, unit in zip(cells, row, strict=True)]
@@ -241,9 +223,7 @@ def _table_begins(rows: Rows) -> tuple[int, bool]:
     first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and of_values(row))
     if not of_words(first - 1):  # nothing above, or a header of another width
         return (first if first > 1 and any(len(row) != width for _, row in rows[:first]) else 0), False
-    # Sheets fill every row up to the width of the table with nothing: names are there for all columns.
-    above, below = (all(map(str.strip, rows[at][1])) for at in (first - 2, first - 1))
-    two = of_words(first - 2) and above
-    two = two and (first == 2 or not below or all(map(is_unit, rows[first - 1][1])))
+    # Names stand above all columns; sheets fill other lines above a table with empty cells.
     plain = all(is_missing(cell) or is_plain(cell) for cell in rows[first][1])
-    return first - 1 - two, two and plain and any(map(str.strip, rows[first - 1][1]))
+    two = of_words(first - 2) and all(map(str.strip, rows[first - 2][1]))
+    return first - 1 - two, two and plain

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.explore import explore_records, explore_structure
 from inputdesign_cli.explore.division import divided
-from inputdesign_cli.explore.search import ranked
+from inputdesign_cli.explore.joint import explore_records
+from inputdesign_cli.explore.search import explore_structure, ranked
 from inputdesign_cli.plant import SampledModel
 from tests.explore.plants import column, held, with_noise
 from tests.explore.test_sweep import drifting
@@ -43,9 +43,9 @@ def test_delays_lie_within_their_ranges(found):
     """The first sample that the input moves is the fourth."""
     (chosen,) = found.outputs
     for candidate in chosen.candidates:
-        ((low, high),) = chosen.ranges(candidate)
+        ((low, high),) = candidate.ranges
         assert low <= candidate.orders.delays[0] <= high
-    ((low, high),) = found.ranges[0]
+    ((low, high),) = found.taken[0].ranges
     assert low <= 4 <= high
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.explore import answers_output, early_answers, like_answers, only_answers
+from inputdesign_cli.explore.relation import answers_output, like_answers, only_answers
 from tests.explore.plants import column
 from tests.support.loops import LAWS, SAMPLES, loop
 
@@ -112,7 +112,6 @@ def test_an_input_that_is_held_is_no_answer(hold, pole):
     e = scipy.signal.lfilter([1.0], [1.0, -0.8], 0.3 * rng.standard_normal(u.size))
     y = scipy.signal.lfilter([0.0, 0.0, 1.0 - pole], [1.0, -pole], u) + e
     assert answers_output([column(u, y)]) == []
-    assert early_answers([column(u, y)]) == []
 
 
 @pytest.mark.parametrize("dither", [0.0, 0.1])
@@ -152,24 +151,3 @@ def test_inputs_that_somebody_sets_are_no_answers(make):
 def test_the_answers_of_a_controller_look_like_answers(law):
     for steps, reported in ((0.0, 0.02), (0.3, 0.02), (0.3, 0.0)):
         assert like_answers([loop(3, law, steps=steps, reported=reported)], 0, 0)
-
-
-def levels(rng, n, low, high):
-    """Return an input at any level, held for `low` to `high` samples."""
-    return np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(low, high + 1, n))[:n]
-
-
-@pytest.mark.parametrize("late", [3, 4])
-@pytest.mark.parametrize("gain", [2.0, -2.0])
-def test_an_input_that_is_logged_late_is_found(late, gain):
-    """The plant answers after one sample, so that the output moves late - 1 samples before the log does."""
-    seen = []
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        u = levels(rng, 600, 7, 29)
-        y = gain * scipy.signal.lfilter([0.0, 0.1], [1.0, -0.9], u) + 0.1 * rng.standard_normal(600)
-        assert early_answers([column(u, y)]) == []
-        logged = np.concatenate([np.full(late, u[0]), u[:-late]])
-        seen += early_answers([column(logged, y)])
-    assert len(seen) >= 5
-    assert max(found.lag for found in seen) <= late - 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.explore import left_of_inputs, order_of_excitation, unhelpful, unstable_pole
+from inputdesign_cli.explore.relation import left_of_inputs, order_of_excitation, unhelpful, unstable_pole
 from inputdesign_cli.plant import PolynomialModel
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.explore import explore_records
 from inputdesign_cli.explore.drift import levelled, slopes_of
+from inputdesign_cli.explore.joint import explore_records
 from inputdesign_cli.explore.sweep import Regressed, delay_ranges, noise_model, sweep, whitened, whitening
 from tests.explore.plants import column, held, with_noise
 

@@ -12,9 +12,8 @@ from typer.testing import CliRunner
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.finding import REFUTED, Finding, Severity
+from inputdesign_cli.finding import Severity
 from inputdesign_cli.questions import explore, identify, solve
-from inputdesign_cli.questions.exploration import explore as exploring
 from inputdesign_cli.questions.exploration.build import Asked, spec_text
 from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
@@ -138,7 +137,7 @@ def test_signals_beyond_arithmetic_are_refused_by_their_row(scale, samples, tmp_
         assert told.location.line >= 2
 
 
-@pytest.mark.parametrize("times", [[3, 2, 1, 0], [0, 0, 1, 2], [0, 1, 1, 2], [1e17] * 4, [0, 2, 1, 3]])
+@pytest.mark.parametrize("times", [[3, 2, 1, 0], [0, 0, 1, 2], [0, 1, 1, 2], [0, 2, 1, 3]])
 def test_times_that_do_not_increase_are_named_by_every_command(times, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,u,y\n" + "".join(f"{t!r},{i % 2},{i}\n" for i, t in enumerate(times)))
@@ -189,19 +188,6 @@ def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_pa
     assert np.mean(inside) > 0.85
     np.testing.assert_array_equal(read_log(plain, Preparation()).r, rows[:, 2:])
     assert read_log(named, Preparation()).r is None
-
-
-@pytest.mark.slow
-def test_an_input_behind_a_reference_is_not_taken_for_late(rows, tmp_path, monkeypatch):
-    """It answers the output, whose noise it therefore seems to follow."""
-    late = [Finding("input-logged-late", REFUTED, "early")]
-    monkeypatch.setattr(exploring, "late_inputs", lambda parts: late)
-    found = {}
-    for header in ("u,y,r", "u,y,other"):
-        log = saved(tmp_path / f"{header[-1]}.csv", rows, header)
-        found[header] = explore([log], Preparation(columns={"u1": "u", "y1": "y"})).reasons
-    assert "early" not in found["u,y,r"]
-    assert "early" in found["u,y,other"]
 
 
 def test_a_column_called_r_that_holds_no_reference_is_left_alone(rows, tmp_path):

@@ -8,7 +8,9 @@ import pytest
 import scipy.io
 from hypothesis import HealthCheck, given, settings, strategies as st
 
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.records import Preparation, read_log, read_sheet
+from tests.support.refusals import refused
 
 N = 30
 RNG = np.random.default_rng(1)
@@ -81,7 +83,7 @@ def test_blanks_separate_columns_of_numbers(tmp_path):
         f"{2.5 * k!r}   {u!r} {y!r}" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
     )
     (tmp_path / "log.dat").write_text(f"# Zeit valve level\n{rows}\n")
-    check(tmp_path / "log.dat")
+    check(tmp_path / "log.dat", Preparation(columns={"time": "1", "u1": "2", "y1": "3"}))
 
 
 @pytest.mark.parametrize(
@@ -161,13 +163,22 @@ def test_a_date_and_a_time_of_day_are_one_moment(tmp_path):
     names = ("Datum;Uhrzeit", "valve", "level")
     (tmp_path / "log.csv").write_text(text(";", ".", moment, names))
     check(tmp_path / "log.csv", Preparation(columns={"u1": "valve", "y1": "level"}))
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    lines[16] = f"-;{lines[16].partition(';')[2]}"  # a date is missing
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    assert read_log(tmp_path / "log.csv", Preparation(columns=COLUMNS | {"time": "Datum"})).lengths == (
+        15,
+        14,
+    )
 
 
-@pytest.mark.parametrize(
-    ("unit", "scale"), [("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)]
-)
-def test_counts_since_1970(unit, scale, tmp_path):
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("us", 1e6)])
+def test_parts_of_seconds_since_1970_are_asked_about_and_seconds_are_times(unit, scale, tmp_path):
     np.savez(tmp_path / "log.npz", time=[round(scale * t.timestamp()) for t in TIMES], u=U, y=Y)
+    (found,) = refused(read_log, tmp_path / "log.npz", Preparation(), kind=DataError)
+    assert (found.code, "--time-unit ms" in found.hint) == ("data-not-a-number", True)
+    assert read_log(tmp_path / "log.npz", Preparation(time_unit=unit)).step == pytest.approx(2.5 * scale)
+    np.savez(tmp_path / "log.npz", time=[t.timestamp() for t in TIMES], u=U, y=Y)
     check(tmp_path / "log.npz", Preparation())
 
 

@@ -77,14 +77,10 @@ def test_columns_go_by_the_names_of_channels_and_other_units_are_found(header, u
 
 @pytest.mark.parametrize(
     ("header", "u", "y"),
-    [
-        ("time,Heater 1,Temp 1", "Heater 1", "Temp 1"),
-        ("time,TIC.OP,TIC.PV", "TIC.OP", "TIC.PV"),
-        ("time,steam.PV,temp.OP (%)", "temp.OP (%)", "steam.PV"),
-    ],
+    [("time,Heater 1,Temp 1", 2, 3), ("time,TIC.OP,TIC.PV", 2, 3), ("time,steam.PV,temp.OP (%)", 3, 2)],
 )
 def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
-    """The words of control systems decide: OP is the input, PV the output."""
+    """By their words: OP is the input, PV the output."""
     path = log(header, EVEN)
     with pytest.raises(DataError, match=re.escape(header.replace(",", ", "))) as raised:
         read(path)
@@ -119,8 +115,8 @@ def test_columns_of_other_names_or_units_are_asked_for(header, log):
 
 def test_the_reference_of_a_loop_is_the_column_that_is_called_so(tmp_path):
     rows = "\n".join(f"{2 * k},{u},{y},{u + y}" for k, (u, y) in enumerate(zip(U, Y, strict=True)))
-    (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],reference r [%]\n{rows}\n")
-    channels = {"u1": ("inlet valve", "%"), "y1": ("", "cm")}
+    (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],r\n{rows}\n")
+    channels = {"u1": ("inlet valve", "%"), "y1": ("level", "cm")}
     loop = replace(UNITS, closed_loop=True, channels=channels)
     np.testing.assert_allclose(read(tmp_path / "d.csv", loop).r[:, 0], U + Y)
     # The set point of a controller is in the unit of the output: it is not what is added to the input.

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, SpecError, bad_spec
-from inputdesign_cli.explore import Found, output_error_form
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.explore.fits import output_error_form
+from inputdesign_cli.explore.joint import Found
 from inputdesign_cli.findings.prepared_records import name_and_unit
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.model_words import blocks_of
@@ -213,26 +214,6 @@ def _inside(noise: Mapping[str, Any], samples: int) -> tuple[dict[str, Any], lis
 def build_explored(text: str) -> Identification:
     """Return the identification task of a spec that was written for a log."""
     return build_identification(parse_spec(text, "spec.yaml"))
-
-
-@contextmanager
-def naming_model(model: Spec) -> Iterator[None]:
-    """Let errors about time name the file of the model, whose time differs from that of the data."""
-    try:
-        yield
-    except DataError as error:
-        place = model.locate("")
-        name, named = Path(place.file).name if place else "the model", []
-        for one in error.diagnostics:
-            step = one.details.get("data_sample_time")
-            if step is not None:
-                hint = f"if {name} is of data sampled like these, write sample_time: {step:.6g} in it; a "
-                hint += "model of another sample time cannot be judged by them"
-                one = replace(one, message=f"{one.message} in {name}", hint=hint)
-            elif one.code == "data-wrong-unit":
-                one = replace(one, message=f"{one.message}: {name} does")
-            named.append(one)
-        raise DataError(named) from error
 
 
 def model_to_judge(spec: Spec) -> Model:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -12,16 +11,11 @@ from typing import cast
 import numpy as np
 
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.explore import (
-    Family,
-    Found,
-    answers_output,
-    check_enough,
-    check_unpredictable,
-    explore_records,
-    fits,
-    levelled,
-)
+from inputdesign_cli.explore.drift import levelled
+from inputdesign_cli.explore.fits import fits
+from inputdesign_cli.explore.joint import Found, explore_records
+from inputdesign_cli.explore.relation import answers_output, check_enough, check_unpredictable
+from inputdesign_cli.explore.search import Family
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.explored_logs import DRIVE, doubtful_inputs, doubtful_model, undriven
 from inputdesign_cli.findings.explored_structures import explored_structures
@@ -42,7 +36,7 @@ from inputdesign_cli.questions.assessment.outcome import fit_of, fit_to_log, res
 from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.exploration.build import Asked, build_explored, spec_text
 from inputdesign_cli.questions.exploration.outcome import exploration_of, structure_curves, validation_of
-from inputdesign_cli.records import Preparation, Record, read_data, read_logs, read_sheet, with_channels
+from inputdesign_cli.records import Preparation, Record, read_data, read_logs
 
 # Where more shifts appear, once these are left out so often, the plant is none of the models tried.
 _MOST_SHIFTS = 2
@@ -138,8 +132,7 @@ def _doubts(
     return [
         *doubtful_model(found, log.parts, log.step, log.time_unit, integrates=integrates),
         *doubtful_inputs(found, log.parts, loop=loop),
-        # Behind a reference the input answers the noise of the output, and seems to be late.
-        *(() if loop and log.r is not None else late_inputs(log.parts)),
+        *late_inputs(units, found.estimate),
         *faulty,
     ]
 
@@ -157,12 +150,6 @@ def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = Non
     check_unpredictable(log.parts)
     whole = rest = log
     first = found = found_in(log)
-    if only is None and found.estimate.tests.shifted and len(found.integrates) == found.model.outputs:
-        # An integrator that leaks seems to shift. Half a record may not show the leak, and the whole does.
-        with suppress(SpecError):
-            leaking = found_in(log, "fopdt")
-            if leaking.steady and not leaking.estimate.tests.shifted:
-                return log, leaking
     for _ in range(_MOST_SHIFTS):
         shifts = found.estimate.tests.shifted
         if not shifts:
@@ -199,14 +186,6 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         DataError: the data cannot be used, or an output never changes.
     """
     started = time.perf_counter()
-    counts = {"u": header.units.inputs, "y": header.units.outputs}
-    sheet = read_sheet(paths[0], preparation=preparation)
-    own = {
-        name: column
-        for name, column in with_channels(sheet, preparation.columns).items()
-        if name in preparation.columns or int(name[1:]) <= counts[name[0]]
-    }
-    preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
     with blaming_columns(paths[0], data):
         check_varying((), data.u[:, :0], data.y)

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.explore import Candidate, Fits, Found
+from inputdesign_cli.explore.fits import Fits
+from inputdesign_cli.explore.joint import Found
+from inputdesign_cli.explore.search import Candidate
 from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import Curves, OrderCurves
@@ -56,7 +58,7 @@ def exploration_of(
                 output=f"y{i + 1}",
                 structure=_structure(taken),
                 delay=taken.orders.delays,
-                delay_range=ranges,
+                delay_range=taken.ranges,
                 output_error_by_order={
                     str(n): float(np.sqrt(one.loss)) for n, one in chosen.swept.by_order.items()
                 },
@@ -64,8 +66,8 @@ def exploration_of(
                 not_estimated=chosen.dropped,
                 noise_integrates=wanders,
             )
-            for i, (chosen, taken, ranges, wanders) in enumerate(
-                zip(found.outputs, found.taken, found.ranges, found.wanders, strict=True)
+            for i, (chosen, taken, wanders) in enumerate(
+                zip(found.outputs, found.taken, found.wanders, strict=True)
             )
         ),
         trusted=not reasons,
