@@ -174,7 +174,7 @@ def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
     """Return why the sample time is as it is; raise `bad-answer` if the time holds too few samples."""
     step, unit, why = short(plant.sample_time), plant.time_unit, plant.why_sampling
     if plant.sampling is None:
-        why = f"a twentieth of the time constant of {short(plant.slow)} {unit}, or a little less"
+        why = f"a twentieth of the time constant of {short(plant.slow)} {unit}, rounded down"
     if there < LEAST * plant.sample_time:
         few = f"{short(there)} {unit} are less than {LEAST} samples, one every {step} {unit}"
         least = short(LEAST * plant.sample_time)
@@ -209,7 +209,7 @@ def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> 
     """Return a remark on a record that does not take all the time there is, since it has `most` samples."""
     whole = f"{short(duration)} of the {short(there)} {plant.time_unit} that there are"
     shorter = there > most * plant.sample_time and duration < there
-    return [f"the record takes {whole}: {most} samples at most, to begin with"] * shorter
+    return [f"the record takes {whole}: a first one has {most} samples at most"] * shorter
 
 
 def _duration(there: float, most: float, step: float, hold: int, *, nonparametric: bool) -> float:

@@ -294,7 +294,7 @@ def system_of(path: Path) -> PlantAnswer:
         float(1.0 / decays.min()) if decays.size else late,
         values=values,
         sampling=None if decays.size else _round_step(late / 2.0),
-        why_sampling="half the dead time, or a little less, for it has no time constant",
+        why_sampling="half the dead time, rounded down, for it has no time constant",
         tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
         integrates=bool(integrates),
         undelayed=len(den) == 2 and not integrates and not late,

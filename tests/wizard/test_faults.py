@@ -310,7 +310,7 @@ def test_a_pure_integrator_is_sampled_by_its_dead_time(tmp_path):
     """As the template `tank`: 0.05 exp(-5 s)/s."""
     (tmp_path / "p.json").write_text(json.dumps({"num": [0.05], "den": [1, 0], "delay": 5}))
     draft = compose(GOOD | {"plant": "p.json", "loop": "PI Kp 0.8, Ti 60"}, "s", tmp_path)
-    assert "sample_time: 2  # half the dead time, or a little less" in draft.text
+    assert "sample_time: 2  # half the dead time, rounded down" in draft.text
     plant = draft.spec().plant
     assert {one.label for one in plant.named_parameters} == {"b0", "L"}
 
