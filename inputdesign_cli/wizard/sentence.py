@@ -75,7 +75,9 @@ _LESS = re.compile(
     r"|\bless$",
     re.I,
 )
-_OTHER_LAWS = re.compile(r"\b(?:PD|P|I|LQG?|MPC)(?:[- ]only)?[- ](?:loop|controller|control|regulator)\b")
+_OTHER_LAWS = re.compile(
+    r"\b(?!I control\b(?! loop))(?:PD|P|I|LQG?|MPC)(?:[- ]only)?[- ](?:loop|controller|control|regulator)\b"
+)
 _JOINS = r"(?:for|of|in|with|after|within|a|an|the|my|our|i|we|have|is|and|to)"
 _BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.I)
 
