@@ -239,7 +239,7 @@ class Regressed:
     ) -> Array:
         """Return the squares left (high - low + 1,) by each delay of input j in reach: one factor for all.
 
-        The other delays stay as they are, and `skipped` samples are left out. Zero: it cannot be computed.
+        The other delays stay fixed, and `skipped` samples are left out. Zero: it cannot be computed.
         """
         b, (low, high), ranges = self.n + 1, reach, self._near(delays)
         ranges[j] = (low, high + b)

@@ -210,7 +210,7 @@ def _phases(axes: Axes, panels: Sequence[of.ResponsePanel]) -> None:
 
 
 def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
-    """Draw a line for every plant, in colour those that decide the design; one is the limit."""
+    """Draw a line for every plant, with the plants that decide the design in colour; one is the limit."""
     axes = page.add_subplot()
     style.plain_decades(axes, "y")
     w, rows, number = curves.frequency, curves.ratios[:_MOST_LINES], len(curves.ratios)

@@ -84,7 +84,7 @@ def _templates(package: str) -> Environment:
 
 
 def of_plant(parameters: Mapping[str, float], digits: int = 4) -> list[str]:
-    """Return the parameters of a plant as words, without those of its noise: `gain 2`."""
+    """Return the parameters of a plant in words, without its noise: `gain 2`."""
     return [
         f"{name} {value:.{digits}g}" for name, value in parameters.items() if not _OF_NOISE.fullmatch(name)
     ]

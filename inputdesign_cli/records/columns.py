@@ -195,8 +195,8 @@ def _numbered(sheet: Sheet, letter: str) -> dict[str, list[str]]:
 def _likely(sheet: Sheet, role: str, taken: Sequence[str], units: Units | None, *, single: bool) -> str:
     """Return the column that is called as a role, has the name of its channel, or alone its unit.
 
-    A column with the unit of a channel that has a name must have a word of that name. Without such a column
-    it is the role.
+    Where the channel has a name, a column of its unit must have a word of that name. If no column fits, it
+    is the role itself.
     """
     called_so = _numbered(sheet, role[0]).get(role, [])
     exact = [name for name in called_so if name in ((role, role[0]) if single else (role,))] or called_so
