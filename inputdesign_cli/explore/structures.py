@@ -139,7 +139,7 @@ class Process:
 
     @property
     def family(self) -> str:
-        """Return the usual name: first, second, third order plus dead time, or integrator."""
+        """Return the usual name: first or second order plus dead time, or integrator."""
         return _LAGGING if self.rising else _NAMES[self.lags]
 
     @property
