@@ -50,8 +50,8 @@ def instructions(results: Results, spec: str, joint: str = "") -> list[str]:
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-        means = f"REST: the mean of {' and '.join(outputs)} at rest, before signal.csv begins"
-        judge += f" --operating-point {point}   ({means}, or else of the first rows)"
+        means = f"in place of REST, the mean of {' and '.join(outputs)} at rest, before signal.csv begins"
+        judge += f" --operating-point {point}   ({means})"
     if any(" " in name for name in (*tables["signal"].columns, *tables["predicted_output"].columns)):
         columns = ",".join(f"{name}=NAME" for name in ("time", *inputs, *outputs))
         said.append(f"Where the log has other names of columns, add --columns {columns}.")

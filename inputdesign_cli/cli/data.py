@@ -153,7 +153,7 @@ def assess(
         "idesign explore": [*explores, *typed(rows)],
         "idesign solve SPEC": ["idesign", "solve", str(spec), *typed(changes)],
     }
-    results = _with_typed(assessment.results, begins, explored=_explored(spec, data))
+    results = _with_typed(assessment.results, begins, explored=_explored(spec, data, assessment.results))
     keep(results, place, shown)
     if not (shown.quiet or shown.json_output or into.no_output):
         more = ["idesign", "assess", str(spec), *map(str, data), "MORE.csv", *again]
@@ -182,13 +182,21 @@ def _with_typed(results: Results, begins: Mapping[str, Sequence[str]], *, explor
     )
 
 
-def _explored(spec: Path, data: Sequence[Path]) -> bool:
-    """Return whether `idesign explore` has written this spec from the same data."""
+def _explored(spec: Path, data: Sequence[Path], results: Results) -> bool:
+    """Return whether `idesign explore` has found the structure of this estimate in the same data."""
     from inputdesign_cli.outcome.run_files import SPEC, known_result
+    from inputdesign_cli.outcome.sentences import parameter
 
     made = known_result(spec.parent) if spec.name == SPEC else {}
     known = {(spec.parent / str(name)).resolve() for name in made.get("made_from", ())}
-    return "exploration" in made and known >= {one.resolve() for one in data}
+    if "exploration" not in made or not known >= {one.resolve() for one in data}:
+        return False
+    found = results.result.get("identification", {}).get("theta", {})
+    of_plant = (
+        {name for name in theta if parameter(name) == name}
+        for theta in (found, made.get("identification", {}).get("theta", {}))
+    )
+    return len({frozenset(names) for names in of_plant}) == 1
 
 
 def campaign(

@@ -136,7 +136,8 @@ def levels(text: str) -> dict[str, float]:
         try:
             found[name] = plain_number(value)
         except ValueError:
-            refuse(f"{value!r} is not a number, as in {example}", option)
+            rest = ": in its place goes the mean at rest, before the experiment" * (value.upper() == "REST")
+            refuse(f"{value!r} is not a number, as in {example}{rest}", option)
     return found
 
 

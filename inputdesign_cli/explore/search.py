@@ -185,7 +185,7 @@ class _Records:
         point, theta, noise = found.point, found.point.theta, noise_of(records, found.point)
         factor = factor_at(records, point, noise)
         half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
-        tests = score_tests(records, theta, White.of(records, point), feedback=self.feedback)
+        tests = score_tests(records, theta, White.of(records, point), feedback=self.feedback, robust=None)
         deviations = np.linalg.norm(half, axis=0)[shape.model().in_plant]
         shape = shape.at(theta) if shape.physical is True else shape
         if max(shape.delays) > _RUN_OFF * self.swept.most:

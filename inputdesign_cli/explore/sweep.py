@@ -19,7 +19,7 @@ from inputdesign_cli.explore.fits import Parts
 from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.stability import reflected
-from inputdesign_cli.identification.white import autoregression
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.plant.filtering import filtered
 
 _WIDE, _ROUNDS, _POLISH, _BESIDE = 3, 8, 3, 5
@@ -301,8 +301,10 @@ def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
 
 def whitening(errors: Sequence[Array]) -> Array:
     """Return the autoregression (m,) that makes errors (n,) of records white."""
-    whole = np.concatenate(errors)
-    return autoregression(whole, tuple(map(len, errors))) if np.all(np.isfinite(whole)) else np.ones(1)
+    whole = np.concatenate(errors)[:, None]
+    if not np.all(np.isfinite(whole)):
+        return np.ones(1)
+    return Whitening.of(whole, tuple(map(len, errors))).filters[0]
 
 
 def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:

@@ -78,14 +78,21 @@ def scattered(kind: FindingKind, factor: float, of_noise: float, runs: int) -> l
     "If the plant was at rest before, `identify` and `assess` are more accurate with its exact levels as "
     "--operating-point.",
 )
-def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
-    """The initial state of a record was estimated too. To estimate it, and the levels, costs accuracy."""
+def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Finding]:
+    """The initial state of a record was estimated too. To estimate it, and the levels, costs accuracy.
+
+    Args:
+        levels: whether the user gave the level of an output.
+    """
+    remedy = ""
+    if levels:
+        remedy = "The record does not begin at rest, or levels of --operating-point are not exact."
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
     fact = f"from rest the first residual would be {first:.3g}, and the noise {noise:.3g}"
     where = f"y{output + 1}"
-    return kind.when(estimate.start.free, fact, where=where, first_residual=first, noise=noise)
+    return kind.when(estimate.start.free, fact, where=where, remedy=remedy, first_residual=first, noise=noise)
 
 
 @finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")

@@ -16,7 +16,6 @@ from inputdesign_cli.explore.relation import (
 )
 from inputdesign_cli.finding import DOUBT, Finding, FindingKind, finding
 from inputdesign_cli.findings.rivals import most_apart
-from inputdesign_cli.identification.adequacy import failed
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
@@ -179,7 +178,7 @@ def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
     be nonlinear or change, or have unrecorded inputs.
     """
     # Enough samples refute every model of a real plant, and a poor fit alone may be strong noise.
-    failing = {test.name: test for test in failed(found.estimate.tests.scores)}
+    failing = {test.name: test for test in found.estimate.tests.failed}
     if not all(failing.keys() & names for names in _TESTS):
         return []
     least, doubtful = min(test.probability for test in failing.values()), []

@@ -197,6 +197,6 @@ def _shifts(
             f"({record.time[at]:.6g} {time_unit})"
         )
         runs.append((file_of(record.files, at), int(rows[first]), int(rows[last])))
-    probability = chance_of_shifts(shifts)
+    probability = chance_of_shifts(shifts)[0]
     fact = f"{' and '.join(events)}, which no input explains (probability {chance(probability)} by chance)"
     return _on_rows(kind, runs, fact, probability=probability)

@@ -7,8 +7,8 @@ many, as in a record with gaps, that alone correlates residuals. Scores are comp
 In a narrow band the noise is known no better than its model there, and a statistic follows F instead
 ([satterthwaite-1946]).
 
-All of this holds for the right noise. If the stated noise model is refuted, a larger one is to be estimated
-before other tests say anything.
+All of this holds for the right noise. If the stated noise model is refuted, residuals and regressors are
+whitened by filters that are estimated as well.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.records import Records, shifted
-from inputdesign_cli.identification.white import DEPENDENT, White
+from inputdesign_cli.identification.records import Point, Records, shifted
+from inputdesign_cli.identification.white import DEPENDENT, White, Whitening
 from inputdesign_cli.levels import level
 
 _LAGS = 25
@@ -104,11 +104,17 @@ def score(white: White, columns: Array, means: Array) -> Score:
     )
 
 
-def score_tests(records: Records, theta: Array, white: White, *, feedback: bool) -> tuple[ScoreTest, ...]:
-    """Return the score tests of past inputs, past residuals and trends at the estimate theta (k,)."""
+def score_tests(
+    records: Records, theta: Array, white: White, *, feedback: bool, robust: White | None
+) -> tuple[ScoreTest, ...]:
+    """Return the score tests of past inputs, past residuals and trends at the estimate theta (k,).
+
+    `robust` is the estimate with whitened residuals, for all regressors but past residuals.
+    """
     of_inputs = past_inputs(records, theta, feedback=feedback)
     every = [*of_inputs, *past_residuals(records, white), *_drifts(records, theta)]
-    return tuple(test for test in (tested(white, one) for one in every) if test is not None)
+    found = (tested(white if one.of_residuals else robust or white, one) for one in every)
+    return tuple(test for test in found if test is not None)
 
 
 def tested(white: White, tried: Regressors) -> ScoreTest | None:
@@ -150,13 +156,14 @@ def failed(
     )
 
 
-def noise_is_refuted(
-    records: Records, theta: Array, white: White, *, less: White, feedback: bool, more: Sequence[Array]
-) -> bool:
-    """Return whether residuals are not white, whatever may be wrong with the plant.
+def robust_white(
+    records: Records, point: Point, white: White, *, less: White, feedback: bool, more: Sequence[Array]
+) -> White | None:
+    """Return the estimate with whitened residuals, or None if the stated noise model is not refuted.
 
     A wrong plant colours residuals as well. So the part that all regressors explain is taken off before the
-    noise is judged, level shifts (`less`) and `more` columns (N, p) of single parameters among them.
+    noise is judged, level shifts (`less`) and `more` columns (N, p) of single parameters among them. The part
+    that inputs explain is taken off before the noise is estimated.
     """
 
     def white_enough(judged: White) -> bool:
@@ -164,13 +171,15 @@ def noise_is_refuted(
         return not failed([test for test in tests if test is not None])
 
     if white_enough(white) or white_enough(less):
-        return False
-    of_inputs = past_inputs(records, theta, feedback=feedback)
+        return None
+    of_inputs = past_inputs(records, point.theta, feedback=feedback)
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
-    trend = _drifts(records, theta)[0].white(white)
+    trend = _trend(records, point.theta).white(white)
     # Few regressors first: many explain a part of right residuals, which correlates the rest.
-    return not any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend])))
+    if any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend]))):
+        return None
+    return White.of(records, point, Whitening.of(white.without(columns).errors, records.lengths))
 
 
 def with_linear_faults(
@@ -230,14 +239,19 @@ def past_residuals(records: Records, white: White) -> list[Regressors]:
     ]
 
 
-def _drifts(records: Records, theta: Array) -> list[Regressors]:
-    """Return the regressors of a drift, powers of time and slow cosines, and of a leak of an integrator."""
+def _trend(records: Records, theta: Array) -> Regressors:
+    """Return the regressors of a drift: powers of time and slow cosines."""
     time = np.concatenate([np.linspace(-1.0, 1.0, length) for length in records.lengths])
     slow = [time**power for power in range(_TRENDS)]
     slow += [np.cos(0.5 * np.pi * k * (1.0 + time)) for k in range(1, _WAVES + 1)]
-    trend = Regressors("trend", "drift", records.whitened(theta, np.stack(slow, axis=1)))
+    return Regressors("trend", "drift", records.whitened(theta, np.stack(slow, axis=1)))
+
+
+def _drifts(records: Records, theta: Array) -> list[Regressors]:
+    """Return the regressors of a drift and, of a plant that is known to integrate, of a leak."""
     leaks = np.concatenate([records.kind.leaks(theta, *part) for part in records.parts], axis=1)
-    return [trend, *([Regressors("leak", "drift", leaks.transpose(2, 1, 0))] if len(leaks) else [])]
+    leak = Regressors("leak", "drift", leaks.transpose(2, 1, 0))
+    return [_trend(records, theta), *([leak] if len(leaks) else [])]
 
 
 def _runs(first: int, last: int, *, growth: float = 1.0) -> list[tuple[int, int]]:

@@ -133,7 +133,7 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
     found, mean = _score(white, group[0])
     statistic, directions = found.statistic, found.directions
     larger: Model | None = None
-    if white.probability(statistic, directions) < _OPEN:
+    if white.whitening is None and white.probability(statistic, directions) < _OPEN:
         ends = [(one[0].estimated(), one) for one in group if one[0].estimated is not None]
         if ends:
             ends.sort(key=lambda end: -end[0][1])

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.identification.white import autoregression
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.levels import level
 from inputdesign_cli.plant import TransferMatrix
-from inputdesign_cli.plant.filtering import filtered
 
 # The median of the absolute value of a normal variable, in standard deviations.
 _NORMAL = 0.6745
@@ -118,7 +117,7 @@ def frozen(
     ends, moves = np.cumsum([0, *lengths]), _MOVES * np.std(u, axis=0)
     found: dict[int, list[tuple[int, int]]] = {}
     for output, d in enumerate(resolution.tolist()):
-        stays = _likely(errors[:, output], d)
+        stays = _likely(errors[:, [output]], d)
         size = _spread(apart[:, output])
         for start, end in pairwise(ends.tolist()):
             edges = np.flatnonzero(np.diff(held[start + 1 : end, output], prepend=False, append=False))
@@ -148,9 +147,8 @@ def _likely(errors: Array, d: float) -> float:
     """Return the largest probability that a sample falls into the same cell as the last one."""
     if len(errors) < _FEWEST or not np.any(errors):
         return 1.0
-    filter = autoregression(errors, (len(errors),))
-    innovations = filtered(filter, [1.0], errors)[filter.size - 1 :]
-    variance = _spread(innovations) ** 2 - _ROUNDING * d**2
+    white = Whitening.of(errors, (len(errors),)).through(errors[None])
+    variance = _spread(white) ** 2 - _ROUNDING * d**2
     return min(1.0, _DENSITY * d / float(np.sqrt(variance))) if variance > 0.0 else 1.0
 
 

@@ -46,7 +46,8 @@ class LevelShift:
     ends: int  # likely settled from this sample on
     rises: bool  # whether the output is larger after it
     test: ScoreTest  # of the likelihood ratio, which counts every sample, lag and output that was tried
-    looks: int  # how many those are
+    score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
+    looks: int
     alone: bool  # whether it explains more than a line through its record, or single samples next to it
 
     @property
@@ -73,9 +74,10 @@ def level_shifts(
     return first, tuple(found), white
 
 
-def chance_of_shifts(shifts: Sequence[LevelShift]) -> float:
-    """Return the probability that all these shifts are chance, by the likelihood ratio."""
-    return _by_chance([shift.test.statistic for shift in shifts], shifts[0].looks)
+def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
+    """Return the probability that all these shifts are chance, by the likelihood ratio and by the score."""
+    ratios, looks = [shift.test.statistic for shift in shifts], shifts[0].looks
+    return _by_chance(ratios, looks), _by_chance([shift.score for shift in shifts], looks)
 
 
 def _by_chance(statistics: Sequence[float], looks: int) -> float:
@@ -90,7 +92,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     # Zero, then ever longer ones.
     lags = [0.0, *(x for k in range(12) if (x := _SHORTEST * _GROWTH**k) <= _SHARE * records.longest)]
     stretches, outputs = _stretches(records), records.y.shape[1]
-    through = _responses(records, point.theta, lags)
+    through = _responses(records, point.theta, lags, white)
     for (begin, length), output in product(stretches, range(outputs)):
         inner = slice(_FEWEST, length - _FEWEST)
         of_sample, _ = _scores(white, begin, output, through[output, :length, -1])
@@ -114,7 +116,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     begin, length = next(one for one in stretches if sample < sum(one))
     begins = max(sample - 1 - round(_UNSURE * lag), begin)
     ends = min(sample + 2 + round(_SETTLED * lag), begin + length)
-    return LevelShift(output, sample, lag, begins, ends, rising, test, looks, alone)
+    return LevelShift(output, sample, lag, begins, ends, rising, test, largest, looks, alone)
 
 
 def _stretches(records: Records) -> list[tuple[int, int]]:
@@ -128,14 +130,17 @@ def _smooth(samples: int, lag: float) -> Array:
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
-def _responses(records: Records, theta: Array, lags: Sequence[float]) -> Array:
+def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> Array:
     """Return the responses (p, n, m) to lagged steps and to a pulse, in errors of the longest record."""
     at, length = int(np.argmax(records.lengths)), records.longest
     begin = sum(records.lengths[:at])
     every = np.zeros((records.samples, len(lags) + 1))
     signals = [*(_smooth(length, lag) for lag in lags), np.eye(1, length)[0]]
     every[begin : begin + length] = np.column_stack(signals)
-    return records.whitened(theta, every)[:, begin : begin + length]
+    through = records.whitened(theta, every)
+    if white.whitening is not None:
+        through = white.whitening.through(through.transpose(2, 1, 0)).transpose(2, 1, 0)
+    return through[:, begin : begin + length]
 
 
 def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from inputdesign_cli.identification.adequacy import (
     ScoreTest,
     failed,
     future_tests,
-    noise_is_refuted,
+    robust_white,
     score_tests,
     with_linear_faults,
 )
@@ -113,7 +113,7 @@ class Tests:
     shift: LevelShift | None  # where an output most likely shifts; None in too short records
     shifts: tuple[LevelShift, ...]  # all that refute the structure
     beside_shifts: tuple[ScoreTest, ...]  # `scores` once these are taken off
-    # Whether the noise is refuted, whatever may be wrong with the plant: other tests then say nothing.
+    # Whether the noise is refuted: tests, but of past residuals, are then of whitened residuals.
     coloured: bool
     future: tuple[ScoreTest, ...]  # in open loop, whether the future of each input explains errors
     # Of several experiments, the probability that each differs as much from the others.
@@ -128,8 +128,6 @@ class Tests:
     @property
     def answering(self) -> tuple[ScoreTest, ...]:
         """Return the tests of inputs that depend on past outputs, or are logged later than their effect."""
-        if self.coloured:
-            return ()
         return tuple(test for test in self.future if test.probability * len(self.future) < level("feedback"))
 
     @property
@@ -143,14 +141,17 @@ class Tests:
 
         Tests of many signals that a shift upsets count with the shift removed.
         """
-        if self.coloured:
-            return ()
-        others = failed(self.scores, tuple(one.test for one in self.directed))
-        if not (self.shifts and others):
+        directed = tuple(one.test for one in self.directed)
+        others = failed(self.scores, directed)
+        if not self.shifts or not others:
             return self.shifts
-        beside = [*self.beside_shifts, *(one.test for one in self.directed if one.test in others)]
-        by_chance = chance_of_shifts(self.shifts)
-        return self.shifts if all(by_chance < test.probability for test in beside) else ()
+        # Likelihood ratios are compared with one, scores with the other.
+        by_ratio, by_score = chance_of_shifts(self.shifts)
+        compared = [(by_ratio if one.of_structure else by_score, one.test) for one in self.directed]
+        # Where the noise is refuted, that says nothing of shifts: they are tested with white residuals.
+        beside = [test for test in self.beside_shifts if not (self.coloured and test.fault == "noise")]
+        alone = all(own < test.probability for own, test in compared if test in others)
+        return self.shifts if alone and all(by_ratio < test.probability for test in beside) else ()
 
     @property
     def failed_besides(self) -> tuple[ScoreTest, ...]:
@@ -160,8 +161,7 @@ class Tests:
     def failed_within(self, looks: int) -> tuple[ScoreTest, ...]:
         """Return the tests that refute the model in one of `looks` looks; a right one seldom fails in any."""
         shifts = () if self.shift is None or not self.shift.alone else (self.shift.test,)
-        found = failed(self.scores, tuple(one.test for one in self.directed), shifts, looks)
-        return tuple(test for test in found if not self.coloured or test.fault == "noise")
+        return failed(self.scores, tuple(one.test for one in self.directed), shifts, looks)
 
 
 def tests_of(
@@ -186,24 +186,35 @@ def tests_of(
         left[:] = True
     elif records.late:
         kept = tuple(n - records.late for n in records.lengths if n > records.late)
-    errors, u, theta = point.errors[left], records.u[left], point.theta
+    errors, u = point.errors[left], records.u[left]
     white = White.of(records, point)
     shift, shifts, less = level_shifts(records, point, white)
-    structural = [one for one in alternatives if one.fault in ("plant", "noise")]
     varying = [one for one in alternatives if one.fault not in ("plant", "noise")]
-    columns, parameters = [one.column for one in varying], len(kind.model.names)
-    found = score_tests(records, theta, white, feedback=feedback)
-    linear = with_linear_faults(records, theta, white, found, feedback=feedback)
+    columns = [one.column for one in varying]
+    robust = robust_white(records, point, white, less=less, feedback=feedback, more=columns)
+    if robust is not None:
+        shift, shifts, less = level_shifts(records, point, robust)
+
+    def scores(stated: White, judged: White | None) -> tuple[ScoreTest, ...]:
+        return score_tests(records, point.theta, stated, feedback=feedback, robust=judged)
+
+    found, judged = scores(white, robust), robust or white
+    linear = with_linear_faults(records, point.theta, judged, found, feedback=feedback)
+    parameters, groups = len(records.kind.model.names), [(judged, alternatives)]
+    if linear is not judged:
+        structural = [one for one in alternatives if one.fault in ("plant", "noise")]
+        groups = [(judged, structural), (linear, varying)]
+    directed = [one for own, group in groups for one in directed_tests(own, group, parameters)]
     return Tests(
         whiteness(errors, fitted=int(np.sum(kind.whitening)), lengths=kept),
         cross_correlations(errors, u, fitted=int(np.sum(kind.explaining)), feedback=feedback, lengths=kept),
         found,
-        (*directed_tests(white, structural, parameters), *directed_tests(linear, varying, parameters)),
+        tuple(directed),
         shift,
         shifts,
-        score_tests(records, theta, less, feedback=feedback) if shifts else (),
-        noise_is_refuted(records, theta, white, less=less, feedback=feedback, more=columns),
-        () if feedback else future_tests(records, theta, white),
+        scores(less if robust is None else white, less) if shifts else (),
+        robust is not None,
+        () if feedback else future_tests(records, point.theta, judged),
         of_one_system(point, noise, experiments),
     )
 

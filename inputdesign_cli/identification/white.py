@@ -1,7 +1,7 @@
 """Express an estimate in the units of its own noise, and split signals into explained and other parts.
 
 Tests of a model compare residuals with their own noise. Where the stated model of that noise is refuted, slow
-noise looks like a drift, or like a plant that is not linear: so a noise of small orders is estimated first.
+noise looks like a drift, or like a plant that is not linear: so the noise is estimated first.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.kind import FADED
 from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.records import Point, Records, shifted
 from inputdesign_cli.identification.stability import reflected
@@ -26,10 +27,10 @@ DEPENDENT = 1e-6
 _WELL_KNOWN = 1e-3
 # A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
-# Coefficients of an autoregression: samples needed for each, and the most that are tried.
-_SAMPLES_A_COEFFICIENT, _MOST = 20, 12
 # Orders of C and D that are tried for the noise of residuals.
 _ORDERS = ((0, 1), (1, 0), (1, 1), (0, 2), (2, 2))
+# Coefficients of the filter that whitens residuals: samples needed for each, and the most that are tried.
+_SAMPLES_A_COEFFICIENT, _MOST = 20, 12
 
 Noise = tuple[Array, Array]
 """C and D, monic."""
@@ -56,16 +57,57 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
     return [list(noises) for noises in zip(*ranked, strict=True)]
 
 
-def autoregression(v: Array, lengths: Sequence[int]) -> Array:
-    """Return the filter (m + 1,), of an order by BIC, that makes residuals v (N,) of records white."""
-    most = max(min(_MOST, len(v) // _SAMPLES_A_COEFFICIENT), 1)
-    past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
-    # Squares of orders that nest, from one triangle.
-    triangle = np.linalg.qr(np.column_stack([past, v]))[1]
-    left = np.maximum(np.cumsum(triangle[::-1, -1] ** 2)[::-1][: most + 1], 1e-300)
-    order = int(np.argmin(v.size * np.log(left) + np.arange(most + 1) * np.log(v.size)))
-    ahead = scipy.linalg.solve_triangular(triangle[:order, :order], triangle[:order, -1])
-    return reflected(np.append(1.0, -ahead))
+@dataclass(frozen=True)
+class Whitening:
+    """Monic filters, one an output, that make residuals of records white; their inverses are stable."""
+
+    filters: tuple[Array, ...]
+    lengths: tuple[int, ...]
+
+    @classmethod
+    def of(cls, errors: Array, lengths: tuple[int, ...]) -> Whitening:
+        """Return the filters for residuals (N, p): autoregressions by least squares, of orders by BIC."""
+        most = max(min(_MOST, len(errors) // _SAMPLES_A_COEFFICIENT), 1)
+        found, orders = [], np.arange(most + 1)
+        for v in errors.T:
+            past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
+            # Squares of orders that nest, from one triangle.
+            triangle = np.linalg.qr(np.column_stack([past, v]))[1]
+            left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
+            left = np.maximum(left[: most + 1], 1e-300)
+            order = int(np.argmin(v.size * np.log(left) + orders * np.log(v.size)))
+            ahead = scipy.linalg.solve_triangular(triangle[:order, :order], triangle[:order, -1])
+            found.append(reflected(np.append(1.0, -ahead)))
+        return cls(tuple(found), lengths)
+
+    def through(self, signals: Array) -> Array:
+        """Return signals (.., N + M, p) filtered record by record; the M errors before the records stay.
+
+        The first samples of a record, whose past is not known, are zero.
+        """
+        found, begin = np.array(signals), 0
+        for length in self.lengths:
+            own = slice(begin, begin + length)
+            for i, filter in enumerate(self.filters):
+                found[..., own, i] = filtered(filter, [1.0], signals[..., own, i])
+                found[..., begin : begin + min(filter.size - 1, length), i] = 0.0
+            begin += length
+        return found
+
+    def slopes(self, errors: Array) -> Array:
+        """Return minus the derivative (m, N, p) of filtered residuals by every coefficient."""
+        at = [(i, lag) for i, filter in enumerate(self.filters) for lag in range(1, filter.size)]
+        found = np.zeros((len(at), *errors.shape))
+        for k, (i, lag) in enumerate(at):
+            found[k, :, i] = -shifted(errors[:, i], lag, self.lengths)
+        return found
+
+    def echoes(self) -> Array:
+        """Return the responses (m, lags, p, p) of `slopes` to past white errors; see `Kind.echoes`."""
+        samples, p = min(max(self.lengths), FADED), len(self.filters)
+        alone, impulse = replace(self, lengths=(samples,)), np.eye(1, samples)[0]
+        coloured = np.stack([filtered([1.0], filter, impulse) for filter in self.filters], axis=1)
+        return alone.slopes(coloured)[:, :, :, None] * np.eye(p)
 
 
 @dataclass(frozen=True)
@@ -80,27 +122,46 @@ class White:
     explained: Array  # ((N + M) p, m + k), what they and the k parameters explain
     basis: Array  # of that, orthonormal
     echoes: Array  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
+    whitening: Whitening | None = None  # filters of residuals that are not white, estimated along
 
     @classmethod
-    def of(cls, records: Records, point: Point) -> White:
-        """Return the estimate at a point of the search; a parameter at its limit explains nothing."""
+    def of(cls, records: Records, point: Point, whitening: Whitening | None = None) -> White:
+        """Return the estimate at a point of the search; a parameter at its limit explains nothing.
+
+        Args:
+            whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
+                estimated along; of the parameters of that noise model nothing is known then.
+        """
+        starts = point.directions
         errors, psi = point.all_errors, np.where(_held(records, point)[:, None, None], 0.0, point.all_psi)
-        root = np.linalg.inv(np.linalg.cholesky(errors.T @ errors / point.samples))
-        explained = np.column_stack([point.directions, (psi @ root.T).reshape(len(psi), -1).T])
-        echoes = records.kind.echoes(point.theta, records.longest)
+        root = _root(errors, point.samples)
+        if whitening is None:
+            echoes = records.kind.echoes(point.theta, records.longest)
+        else:
+            free = starts.T.reshape(-1, *errors.shape) @ np.linalg.inv(root).T
+            own = np.pad(whitening.slopes(point.errors), ((0, 0), (0, len(errors) - point.samples), (0, 0)))
+            errors, free, psi = (whitening.through(x) for x in (errors, free, psi))
+            echoes = whitening.echoes()
+            echoes = np.concatenate([np.zeros((len(psi), *echoes.shape[1:])), echoes])
+            psi, root = np.concatenate([psi, own]), _root(errors, point.samples)
+            starts = _orthonormal(_scaled((free @ root.T).reshape(len(free), errors.size).T))
+        explained = np.column_stack([starts, (psi @ root.T).reshape(len(psi), -1).T])
         return cls(
             root,
             records.lengths,
             (errors @ root.T).ravel(),
             point.errors.size / max(point.freedom, 1),
-            point.directions,
+            starts,
             explained,
             _orthonormal(_scaled(explained)),
             root @ echoes @ np.linalg.inv(root),
+            whitening,
         )
 
     def columns(self, signals: Array) -> Array:
         """Return signals (m, N, p) as ((N + M) p, m) in units of the residuals, zero before the records."""
+        if self.whitening is not None:
+            signals = self.whitening.through(signals)
         found = np.zeros((self.residuals.size, len(signals)))
         found[: signals[0].size] = (signals @ self.root.T).reshape(len(signals), -1).T
         return found
@@ -110,8 +171,9 @@ class White:
 
         Residuals are P e, with P = I - Q Q^T for the unknown starts Q, and e white. The score (T P e)^T P e
         of echoes T (m, lags, p, p) has the mean -tr(Q^T T Q), since T looks back in time and has no trace.
+        Under whitening it is zero.
         """
-        known = self.starts.shape[1]
+        known = self.whitening is None and self.starts.shape[1]
         return -self.variance * _traces(echoes, self._of_starts) if known else np.zeros(len(echoes))
 
     @cached_property
@@ -209,6 +271,11 @@ def _held(records: Records, point: Point) -> NDArray[np.bool_]:
         step = size * np.sign(point.slope[j]) * (np.arange(held.size) == j)
         held[j] = abs((records.stabilised(point.theta + step) - point.theta)[j]) < 0.5 * size
     return held
+
+
+def _root(errors: Array, samples: int) -> Array:
+    """Return R (p, p) that makes errors (n, p) of `samples` samples uncorrelated between outputs."""
+    return np.linalg.inv(np.linalg.cholesky(errors.T @ errors / samples))
 
 
 def _scaled(columns: Array) -> Array:

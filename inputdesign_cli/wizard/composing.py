@@ -209,7 +209,7 @@ def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> 
     """Return a remark on a record that does not take all the time there is, since it has `most` samples."""
     whole = f"{short(duration)} of the {short(there)} {plant.time_unit} that there are"
     shorter = there > most * plant.sample_time and duration < there
-    return [f"the record takes {whole}: a first one has {most} samples at most"] * shorter
+    return [f"the record takes {whole}: a design of more than {most} samples takes long"] * shorter
 
 
 def _duration(there: float, most: float, step: float, hold: int, *, nonparametric: bool) -> float:

@@ -64,6 +64,9 @@ _REJECTED = (
     'level drifts, and neither the values nor their errors are to be trusted; "log {}" explores other '
     "structures"
 )
+_AS_SAID = "plant:  # as you said"
+# What plants often have and words leave out.
+_UNNAMED = {"dead_time": "dead time", "time_constant": "lag of the actuator"}
 
 
 @dataclass(frozen=True)
@@ -153,13 +156,13 @@ def _columns(text: str = "") -> dict[str, str]:
     return found
 
 
-def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswer:
+def plant_of_words(text: str, head: str = _AS_SAID) -> PlantAnswer:
     """Return the plant of "gain 2, time constant 180 s, dead time 25 s, each within 30 %".
 
     An integrator has a slope in place of the gain: "integrates 0.02 %/s per %, dead time 20 s".
     """
     phrase = Phrase(text, "plant")
-    phrase.take(NO_DELAY)
+    none = {"dead_time"} if phrase.take(NO_DELAY) else set()
     read = {name: phrase.quantity(*words) for name, words in QUANTITIES.items()}
     found = {name: one for name, one in read.items() if one is not None}
     steady = [name for name in ("rise", "slope", "gain") if name in found]
@@ -193,6 +196,9 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     heard = [f"{taken}; the design holds for all of these"] if vague else []
     if reacts := re.search(r"\b(?:reacts?|responds?)\b(?! (?:by|with|after|only)\b)", text, re.I):
         heard.append(f'"{reacts[0]}" is taken as the time constant, in which it gets 63 % of the way')
+    missing = [what for name, what in _UNNAMED.items() if name not in {*found, *none}]
+    if missing and head == _AS_SAID:
+        heard.append(f"no {' and no '.join(missing)} was named: the design has none, a record may show it")
     plant = PlantAnswer(
         (head, f"  continuous: {_listed(values)}", "  sample: zoh  # what a converter holds"),
         values.get("time_constant", 0.0),

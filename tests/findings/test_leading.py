@@ -90,15 +90,23 @@ def test_the_command_ends_the_matter(fault, seed, tmp_path):
     assert ended(fault, IN_Q, seed, tmp_path)
 
 
-@pytest.mark.parametrize(("known", "named"), [("log.csv", "solve"), ("other.csv", "explore")])
+@pytest.mark.parametrize(
+    ("known", "names", "named"),
+    [
+        ("log.csv", "b3 b4 f1 d1", "solve"),
+        ("log.csv", "K T L", "explore"),
+        ("other.csv", "b3 b4 f1", "explore"),
+    ],
+)
 def test_a_structure_that_explore_chose_by_the_same_data_is_not_explored_again(
-    known, named, tmp_path, monkeypatch, capsys
+    known, names, named, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
     record(tmp_path / "log.csv", "delay", 0)
     Path("run").mkdir()
     Path("run/spec.yaml").write_text(f"plant: {IN_Q}{SPEC}")
     made = {"format": 1, "exploration": {}, "made_from": ["../spec.yaml", f"../{known}"]}
+    made["identification"] = {"theta": dict.fromkeys(names.split(), 1.0)}
     Path("run/result.json").write_text(json.dumps(made))
     code, out, _ = caller(monkeypatch, capsys)("assess", "run/spec.yaml", "log.csv", "--no-figures")
     assert code == EXIT_UNDECIDED

@@ -88,12 +88,23 @@ def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
     assert assess(spec, saved(tmp_path / "good.csv", rows_of(400, None, 3))).verdict == "met"
 
 
-SHIFT = ScoreTest("level_shift", "shift", 50.0, 1, 1e-9, None)
-
-
 def found_with(samples, places, split="halves"):
     """What an exploration of so many samples would return that finds steps at these places."""
-    shifts = tuple(LevelShift(0, at, 0.0, at - 1, at + 2, True, SHIFT, 99, True) for at in places)
+    shifts = tuple(
+        LevelShift(
+            0,
+            at,
+            0.0,
+            at - 1,
+            at + 2,
+            True,
+            ScoreTest("level_shift", "shift", 50.0, 1, 1e-9, None),
+            50.0,
+            99,
+            True,
+        )
+        for at in places
+    )
     estimate = SimpleNamespace(tests=SimpleNamespace(shifted=shifts))
     model = SimpleNamespace(outputs=1)
     return SimpleNamespace(

@@ -656,7 +656,22 @@ def test_about_is_within_a_fifth_and_said_back(word):
     (said,) = plant.heard
     assert "gain 1.28 to 1.92" in said
     assert "dead time" not in said
-    assert plant_of_words(f"gain {word} 1.6, time constant 9, each within 5 %").heard == ()
+    assert plant_of_words(f"gain {word} 1.6, time constant 9, dead time 1, each within 5 %").heard == ()
+
+
+@pytest.mark.parametrize(
+    ("said", "missing"),
+    [
+        ("gain 2, time constant 9 s", "dead time"),
+        ("gain 2, time constant 9 s, no dead time", ""),
+        ("gain 2, time constant 9 s, dead time 1 s", ""),
+        ("integrates 0.02 %/s per %, dead time 20 s", "lag of the actuator"),
+    ],
+)
+def test_what_a_plant_in_words_leaves_out_is_said_back(said, missing):
+    heard = plant_of_words(said).heard
+    assert len(heard) == bool(missing)
+    assert missing in "".join(heard)
 
 
 @pytest.mark.parametrize(

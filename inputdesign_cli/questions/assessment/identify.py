@@ -287,7 +287,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         *unsettled(model, estimate),
         *larger_noise(model, found.noise_refuted),
         *found.scatter,
-        *started(estimate),
+        *started(estimate, levels=any(name.startswith("y") for name in found.preparation.operating_point)),
         *on_the_circle(model, estimate),
         # Faults of measurement stand alone, as they upset other tests.
         *(
