@@ -14,6 +14,8 @@ from inputdesign_cli.plant.polynomial import roots_in_z
 
 # Of a standard deviation: nearer to where an expression ends, an estimate was stopped there.
 _ASIDE = 0.001
+# A first residual beyond this number of standard deviations is reported.
+_SEEN_AT_ONCE = 3.0
 
 
 def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
@@ -84,15 +86,21 @@ def started(kind: FindingKind, estimate: Estimate, *, levels: bool) -> list[Find
     Args:
         levels: whether the user gave the level of an output.
     """
-    remedy = ""
+    if not estimate.start.free:
+        return []
+    remedy = kind.remedy
     if levels:
         remedy = "The record does not begin at rest, or levels of --operating-point are not exact."
+    if not estimate.start.rest_refuted:
+        return [] if levels else [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
-    fact = f"from rest the first residual would be {first:.3g}, and the noise {noise:.3g}"
+    fact = "the first residuals together are larger than the noise explains"
+    if np.max(ratio) > _SEEN_AT_ONCE:
+        fact = f"a first residual is {first:.3g}, and the noise {noise:.3g}"
     where = f"y{output + 1}"
-    return kind.when(estimate.start.free, fact, where=where, remedy=remedy, first_residual=first, noise=noise)
+    return [kind.found(fact, where=where, remedy=remedy, first_residual=first, noise=noise)]
 
 
 @finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")
