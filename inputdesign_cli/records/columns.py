@@ -285,7 +285,9 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
     free = [i for i in free if i not in rising[:1] and not sheet.columns[i].dated]
     words = [set(re.split(r"[\W_\d]+", sheet.name_of(i).lower())) for i in range(len(sheet.columns))]
     for role in sorted(set(wanted) - found.keys()):
-        own, other = (set(_WORDS[letter].split()) for letter in (role[0], "y" if role[0] == "u" else "u"))
+        own, other = (
+            set(_WORDS.get(letter, "").split()) for letter in (role[0], "y" if role[0] == "u" else "u")
+        )
         strange = [(not words[i] & own, bool(words[i] & other), i) for i in free]
         likely = [i for *_, i in sorted(strange)]
         found[role] = str(likely[0] + 1) if likely else "NAME"
