@@ -173,7 +173,7 @@ def _with_typed(results: Results, begins: Mapping[str, Sequence[str]], *, explor
     assert judged is not None
     command = judged.next or ""
     if explored and command.startswith("idesign explore"):
-        command = "idesign solve SPEC  # explore knows no better structure here: take a record more"
+        command = "idesign solve SPEC  # explore knows no better structure here: take a further record"
     begin = next((one for one in begins if command.startswith(one)), None)
     if begin is not None:
         command = shlex.join(begins[begin]) + command.removeprefix(begin)
@@ -191,12 +191,10 @@ def _explored(spec: Path, data: Sequence[Path], results: Results) -> bool:
     known = {(spec.parent / str(name)).resolve() for name in made.get("made_from", ())}
     if "exploration" not in made or not known >= {one.resolve() for one in data}:
         return False
-    found = results.result.get("identification", {}).get("theta", {})
-    of_plant = (
-        {name for name in theta if parameter(name) == name}
-        for theta in (found, made.get("identification", {}).get("theta", {}))
-    )
-    return len({frozenset(names) for names in of_plant}) == 1
+    found, theirs = results.outcome.identification, made.get("identification", {}).get("theta", {})
+    ours = {} if found is None or found.theta is None else found.theta
+    here, there = ({name for name in theta if parameter(name) == name} for theta in (ours, theirs))
+    return here == there
 
 
 def campaign(

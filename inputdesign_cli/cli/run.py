@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -61,7 +60,7 @@ def name_of(file: Path) -> str:
     return "stdin" if str(file) == STANDARD_STREAM else file.stem
 
 
-# A place with such a run keeps it: another place is taken.
+# Errors about a place that keeps what it has: another place is taken.
 _OTHERS = {
     *("output-other-run", "output-is-the-spec", "output-spec-changed"),
     *("output-signal-changed", "campaign-exists"),
@@ -114,15 +113,16 @@ class Place:
         from inputdesign_cli.outcome.run_directory import check_place
 
         free = self.numbered and self.into.output is None
-        for number in itertools.count(2):
+        number = 1
+        while True:
             try:
                 check_place(place.directory, place.origin, place.spared(place.asked))
                 return place
             except OutputError as error:
                 if not free or error.diagnostics[0].code not in _OTHERS:
                     raise
-                place = replace(place, name=f"{self.name}_{number}")
-        raise AssertionError("there are always further numbers")
+            number += 1
+            place = replace(place, name=f"{self.name}_{number}")
 
     def spared(self, spec: str) -> str:
         """Return the `spec.yaml` of the run: the user's own text where it is the spec itself.

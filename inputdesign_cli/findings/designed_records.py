@@ -135,8 +135,9 @@ def start_matters(kind: FindingKind, growth: float) -> Finding:
     Args:
         growth: the factor by which errors grow if the start is not known.
     """
-    fact = f"otherwise errors are {growth:.3g} times as large"
-    return kind.found(fact, where="signal", growth=growth if np.isfinite(growth) else None)
+    known, fact = bool(np.isfinite(growth)), "otherwise the record does not determine all parameters"
+    fact = f"otherwise errors are {growth:.3g} times as large" if known else fact
+    return kind.found(fact, where="signal", growth=growth if known else None)
 
 
 @finding(

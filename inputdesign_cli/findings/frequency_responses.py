@@ -52,10 +52,8 @@ BIASED = doubt(
 @finding(NOTE, "response-without-model", "Compare it with the model in `frequency_response.png`.")
 def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
     """The frequency response was measured without a model. Even a right model misses 5 % of the discs."""
-    outside = of.model_outside or 0.0
-    fact = (
-        f"from {of.excitation}, the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies"
-    )
+    outside, by = of.model_outside or 0.0, ", measured from the reference r" * (of.excitation == "r")
+    fact = f"the model is outside at {100 * outside:.0f} % of {of.frequencies} frequencies{by}"
     found = kind.found(fact, where="frequency_response.csv", model_outside=outside)
     return [found, *BIASED.when(of.caveat, where="r")]
 

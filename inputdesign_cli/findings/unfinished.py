@@ -51,9 +51,9 @@ def ended_early(status: str, objective: Objective) -> list[Finding]:
     if status == "gap_open":
         bound = objective.upper_bound or objective.lower_bound
         gap = 1.0 if objective.relative_gap is None else objective.relative_gap
-        far = (
-            f"no other design gets beyond {bound:.6g} ({per_cent(gap, 2)})" if bound else "nothing is proved"
-        )
+        side, far = "above" if objective.upper_bound else "below", "nothing is proved yet of other designs"
+        if bound:
+            far = f"no other design gets {side} {bound:.6g} (a gap of {per_cent(gap, 2)})"
         remedy, share = f"To close the gap, {more_time()}.", objective.relative_gap
         fact = f"{what_ended()} ended the design, and {far}"
         return [DESIGN_UNFINISHED.found(fact, where="solver", remedy=remedy, relative_gap=share)]

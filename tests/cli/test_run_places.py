@@ -278,27 +278,27 @@ def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
 
 def test_runs_of_the_same_data_by_other_specs_stand_side_by_side(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    spec = questions.load_spec(write(tmp_path / "a" / "a.yaml", "a"))
-    other = Path("runs/log_assessed_2/spec.yaml")  # the spec itself lies in such a place
+    log = tmp_path / "log.csv"
 
     def place(file, into=Into()):
-        return (
-            Place(into, "log_assessed", [file, tmp_path / "log.csv"], numbered=True).checked(spec).directory
-        )
+        spec = questions.load_spec(file)
+        return Place(into, "log_assessed", [file, log], numbered=True).checked(spec).directory, spec
 
     def written(file):
-        where = place(file)
-        origin = Origin([file, tmp_path / "log.csv"], spec.to_yaml())
-        write_run(Results(typed({"format": 1, "title": "a"}), f"title: {file}\n"), where, origin=origin)
+        where, spec = place(file)
+        origin = Origin([file, log], spec.to_yaml())
+        write_run(Results(typed({"format": 1, "title": "a"}), spec.to_yaml()), where, origin=origin)
         return str(where)
 
-    names = [tmp_path / name for name in ("a.yaml", "b.yaml", "a.yaml")]
+    one, two = (write(tmp_path / "specs" / f"{name}.yaml", name) for name in "ab")
     usual = "runs/log_assessed"
-    monkeypatch.setattr(type(spec), "to_yaml", lambda self: "")
-    assert [written(one) for one in names] == [usual, f"{usual}_2", usual]
-    assert str(place(other)) == f"{usual}_3"
-    assert str(place(other, Into(overwrite=True))) == usual
-    assert code_of(place, other, Into(Path(usual)), kind=OutputError) == "output-other-run"
+    assert [written(file) for file in (one, two, one, two)] == [usual, f"{usual}_2", usual, f"{usual}_2"]
+    # A spec that lies in such a place stays where its run would write another one.
+    other = Path(f"{usual}_2/spec.yaml")
+    unlike = Place(Into(), "log_assessed", [other, log], numbered=True).checked(None)
+    assert str(unlike.directory) == f"{usual}_3"
+    assert str(place(two, Into(overwrite=True))[0]) == usual
+    assert code_of(place, two, Into(Path(usual)), kind=OutputError) == "output-other-run"
 
 
 def test_a_report_replaces_its_own_pages_only_or_goes_to_standard_output(run, analyse, tmp_path, monkeypatch):
