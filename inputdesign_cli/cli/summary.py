@@ -84,7 +84,8 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     if estimate:
         rivals = outcome.identification is not None and outcome.identification.rivals
         listed = ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
-        also = "; or other parameters, below" * bool(rivals)
+        also = "; levels are estimated as well" * (outcome.exploration is not None)
+        also += "; or other parameters, below" * bool(rivals)
         yield "estimate", f"{listed}   (+-: one standard deviation{also})"
     yield from _lines(facts(outcome, part="estimate"))
     verdicts = []

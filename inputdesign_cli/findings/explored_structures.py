@@ -47,10 +47,10 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
         tried, family = len(chosen.candidates), taken.orders.family
         better = max(one.validation for one in chosen.candidates) - taken.validation
         name = signal_name("y", i, found.model.outputs)
-        beside = f"the best explains {better:.2g} % more" if better > _MORE else "none explains more"
+        beside = f"another explains {better:.2g} % more" if better > _MORE else "no other explains more"
         fact = (
-            f"for {name}, {family} ({orders}), delay in samples {delays}; chosen of {tried} structures, of "
-            f"which {beside}"
+            f"for {name}, {family} ({orders}), delay in samples {delays}; chosen of {tried} structures: "
+            f"{beside} of the record"
         )
         said.append(kind.found(fact, where=name, family=family, structures=tried, better_percent=better))
     return said

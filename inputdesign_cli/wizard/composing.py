@@ -202,7 +202,11 @@ def _points(span: Range) -> str:
     """Return the comment that per cents of a range are points of the actuator, not a share of its middle."""
     low, high = (short(span.offset + side * span.amplitude) for side in (-1, 1))
     percent = span.unit == "%" and span.offset
-    return f"  # from {low} to {high} %: not a share of {short(span.offset)}" if percent else ""
+    return (
+        f"  # from {low} to {high} %: points of the range, not per cent of {short(span.offset)}"
+        if percent
+        else ""
+    )
 
 
 def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> list[str]:
@@ -259,7 +263,7 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     comment = f"{best.why}; longer ones are no better, as far as was tried"
     if value <= _BEYOND * bound:
         gap = max(value / bound - 1.0, _LEAST_GAP)
-        comment = f"{best.why}: no other is better by more than {per_cent(gap, 2)}"
+        comment = f"{best.why}: any other gains at most {per_cent(gap, 2)}"
     return replace(best, why=comment)
 
 
@@ -296,7 +300,7 @@ class Conversation:
             return asking.in_other_words(self.unclear[0])
         there = {*self.answers, *asking.known_from(self.answers)}
         left = (one for one in QUESTIONS if one.key not in there)
-        return next((one for one in left if not self._brief or one.always or one.default is None), None)
+        return next((one for one in left if not self._brief or one.unsaid or one.default is None), None)
 
     def answer(self, text: str) -> IdesignError | None:
         """Answer the question, and return the error of an answer, whose question then comes again.

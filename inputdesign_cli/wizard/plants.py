@@ -44,7 +44,7 @@ QUANTITIES = {
 }
 BARE_GAIN = (
     r"<ABOUT>?\s*<ALONE><NUMBER>(?:\s*[^\s\d,;|+±%][^\s,;|+±%]*)?\s*(?:/|\bper\b)\s*"
-    r"(?!(?:cent|s|sec|second|min|minute|h|hour|d|day)\b)(?:<NUMBER>\s*)?[^\s\d,;|]+"
+    r"(?!(?:cent|s|sec|second|min|minute|h|hour|d|day|position|setting|move)\b)(?:<NUMBER>\s*)?[^\s\d,;|]+"
     r"(?: of (?:the )?<DRIVE>)?(?:<WITHIN>)"
 )
 """A gain without its name, as in "about 20 rad/s per V"; a time unit makes it a slope."""

@@ -26,7 +26,7 @@ class Question:
     asks: str
     allowed: str
     default: str | None = None
-    always: bool = False  # it is asked beyond a sentence, too
+    unsaid: str = ""  # what a default means that is taken without asking; it is asked beyond a sentence, too
     pieces: list[str | list[str]] = field(default_factory=list)  # see questions.yaml
     sets: tuple[str, ...] = ()  # sections of the spec
 
@@ -76,8 +76,8 @@ def needed_of(answers: Mapping[str, str]) -> list[str]:
 
 def taken_for_granted(answers: Mapping[str, str]) -> list[str]:
     """Return a remark on the questions that a sentence leaves open and nobody was asked."""
-    unsaid = [f"{one.key} {one.default}" for one in QUESTIONS if one.always and one.key not in answers]
-    return [f"nobody said otherwise: {', '.join(unsaid)}"] if unsaid else []
+    unsaid = [one.unsaid for one in QUESTIONS if one.unsaid and one.key not in answers]
+    return [f"taken for granted: {', '.join(unsaid)}"] if unsaid else []
 
 
 def complete(answers: Mapping[str, str]) -> dict[str, str]:

@@ -218,9 +218,13 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         *taken_as(text),
         *beyond_models(text),
         *(f"{part}: assess takes that in --operating-point" for part in grammar.of_outputs(said)),
-        *([f"words that set nothing: {', '.join(beside)}"] if beside else []),
+        *([f"words without effect on the spec: {', '.join(beside)}"] if beside else []),
     ]
     remarks += _of_the_wish(answers.get("wish", ""), text)
+    measured = {one.lower() for one in re.findall(rf"\b{grammar.SIGNAL}\b(?<!position)", text, re.I)}
+    in_words = re.match(r"(?!log |step )\S+ ", answers.get("plant", ""))  # and neither a file nor a template
+    if in_words and len(measured) == 1 and not measured & {"output", "sensor", "measurement"}:
+        answers.setdefault("names", *measured)  # a log has a column of that name
     if "wish" in answers and wishes.unbounded(answers["wish"]):
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")

@@ -128,11 +128,15 @@ def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dic
     named |= {channel: name_and_unit(header) for channel, header in plant.called.items()}
     parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
     owners = ["u1" if _drives(name, span) else "y1" for name, *_ in parts]
-    if plant.channels == 1 and all(unit for *_, unit in parts) and len({*owners}) == len(parts):
+    as_said = said["names"].lower() == "as said"
+    output = re.fullmatch(SIGNAL, said["names"], re.I)
+    alone = output or (len({*owners}) == len(parts) and all(unit for *_, unit in parts))
+    if plant.channels == 1 and alone and not as_said:
         for own, (name, _, unit) in zip(owners, parts, strict=True):  # "level in cm": the other is as said
-            Phrase(said["names"], "names", unit=named[own][1]).sized(1.0, unit)
+            if unit:
+                Phrase(said["names"], "names", unit=named[own][1]).sized(1.0, unit)
             named[own] = (name, named[own][1] or unit)
-    elif said["names"].lower() != "as said":
+    elif not as_said:
         if len(parts) != len(names) or not all(name for name, _, _ in parts):
             raise bad_answer("names", f"{len(names)} channels have names, inputs first: {', '.join(names)}")
         named = {name: (called, unit.strip()) for name, (called, _, unit) in zip(names, parts, strict=True)}

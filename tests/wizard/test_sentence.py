@@ -411,6 +411,8 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("no position shorter than 10 minutes", "hold", "10 minutes"),
         ("each position lasts 20 s", "hold", "20 s"),
         ("the valve must stay 20 s in each position", "hold", "20 s"),
+        ("valve 40 +- 10 %, at least 10 min per position", "hold", "10 min"),
+        ("gain 2 degC/%, lag 30 min, temperature noise 0.1, PI loop", "names", "temperature"),
         ("positions are kept for 20 s", "hold", "20 s"),
         ("Rest at 3 V, may change by 1 V", "range", "Rest at 3 V, may change by 1 V"),
         ("Gate is at 40 mm, plus or minus 6 mm", "range", "Gate is at 40 mm, plus or minus 6 mm"),
@@ -547,7 +549,11 @@ def test_a_tolerance_of_one_quantity_is_no_tolerance_of_all(last):
 
 def test_what_nobody_was_asked_is_said():
     (said,) = taken_for_granted({"hold": "60 s"})
-    assert [one.key for one in QUESTIONS if f" {one.key} " in said] == ["time", "converter", "return"]
+    assert [one.key for one in QUESTIONS if one.unsaid and one.unsaid in said] == [
+        "time",
+        "converter",
+        "return",
+    ]
     assert taken_for_granted({"hold": "no", "time": "2 h", "converter": "no", "return": "no"}) == []
 
 
@@ -569,7 +575,7 @@ def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
     assert talk.answer("range=45 +- 8 %") is None
     assert talk.answer("valve 45 % +- 8 %") is None  # again, in place of the first
     while talk.question is not None:
-        assert (talk.question.always, talk.answer("no")) == (True, None)
+        assert (bool(talk.question.unsaid), talk.answer("no")) == (True, None)
     assert "gain: 1.72, time_constant: 262, dead_time: 31" in talk.draft.text
     assert (talk.draft.spec().limits.amplitude.input, talk.draft.spec().signal.offset) == (8, 45)
 
@@ -758,6 +764,7 @@ def test_a_range_says_what_moves_and_in_which_unit(text, found):
         ({"names": "valve in %, flow in l/min"},
          {"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "flow", "unit": "l/min"}}),
         ({"names": "flow in l/min"}, {"y1": {"name": "flow", "unit": "l/min"}}),
+        ({"names": "flow"}, {"y1": {"name": "flow"}}),
         ({}, {}),
     ],
 )  # fmt: skip
