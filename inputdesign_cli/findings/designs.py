@@ -105,7 +105,8 @@ def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Fi
 @finding(
     NOTE,
     "loop-near-its-limit",
-    "Tune it slower (a larger `tau_c` of `accuracy.loop.tuning.simc`), or allow a larger |S|.",
+    "Tune it slower (`--set accuracy.loop.tuning.simc.tau_c=..`, by default the dead time), "
+    "or allow a larger |S|.",
 )
 def near_its_limit(kind: FindingKind, loops: Iterable[Loop | None]) -> list[Finding]:
     """The loop itself takes most of the |S| that is allowed. Little is left for the error of the model."""

@@ -39,7 +39,6 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
     said = []
     for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
-        orders += f"; times in {log.time_unit}" * taken.orders.physical
         delays = " and ".join(
             f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {low} to {high})"
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, taken.ranges, strict=True)
@@ -48,10 +47,8 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
         better = max(one.validation for one in chosen.candidates) - taken.validation
         name = signal_name("y", i, found.model.outputs)
         beside = f"another explains {better:.2g} % more" if better > _MORE else "no other explains more"
-        fact = (
-            f"for {name}, {family} ({orders}), delay in samples {delays}; chosen of {tried} structures: "
-            f"{beside} of the record"
-        )
+        orders += f"; times in {log.time_unit}" if taken.orders.physical else f"; delay in samples {delays}"
+        fact = f"for {name}, {family} ({orders}), chosen of {tried} structures: {beside} of the record"
         said.append(kind.found(fact, where=name, family=family, structures=tried, better_percent=better))
     return said
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, doubt, note
+from inputdesign_cli.finding import NOTE, Finding, doubt, note
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.levels import level
 from inputdesign_cli.outcome import Nominal
@@ -35,7 +35,8 @@ ANOTHER = doubt(
 FAR = doubt(
     "far-from-the-spec",
     "The estimate lies far from the plant of the spec. The parameters of G together differ by more than "
-    "five standard deviations. The plant, the units or the values of the spec may be wrong.",
+    "five standard deviations, a stated uncertainty included. The plant, the units or the values of "
+    "the spec may be wrong; without an uncertainty its values count as exact, and this is a note.",
     "The verdict holds for the estimate: r_u and r_adm are at its parameters. Put it into the spec.",
 )
 OUTSIDE = note(
@@ -52,6 +53,7 @@ class Distance:
     Attributes:
         listed: the parameters that are farthest, with their values and deviations.
         share, place: how much G differs at most, of the larger one, and where; zero if no error of G has r_u.
+        exact: whether the spec states no uncertainty.
         outside: the parameters beyond the uncertainty of the spec, with their values.
     """
 
@@ -59,6 +61,7 @@ class Distance:
     listed: tuple[str, ...]
     share: float
     place: str
+    exact: bool = False
     outside: tuple[str, ...] = ()
 
 
@@ -109,7 +112,8 @@ def from_nominal(
         worst_difference=share if apart else None,
         opposite_sign=any(opposite for *_, opposite in apart) if apart else None,
     )
-    return Distance(found, listed, share, place)
+    exact = nominal_covariance is None or not np.any(nominal_covariance)
+    return Distance(found, listed, share, place, exact)
 
 
 def _nearest_order(nominal: Model, theta: Array, of_plant: Sequence[int]) -> NDArray[np.int_]:
@@ -133,14 +137,21 @@ def far_from_nominal(distance: Distance) -> list[Finding]:
     """Return a finding where the two are different plants, or parameters lie far apart or outside."""
     found, another = distance.nominal, distance.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
-        return OUTSIDE.when(distance.outside, ", ".join(distance.outside), where="uncertainty")
+        return OUTSIDE.when(
+            distance.outside, f"beyond chance {', '.join(distance.outside)}", where="uncertainty"
+        )
     kind = ANOTHER if another else FAR
     sign = ", with the opposite sign at low frequency" if found.opposite_sign else ""
-    apart = f"{found.deviations:.3g} standard deviations apart{sign}"
+    apart = (
+        f"{'its values count as exact, ' * distance.exact}{found.deviations:.3g} standard deviations apart"
+    )
+    apart += sign
     if distance.share:
         apart += f"; {distance.place} differs by {100 * distance.share:.0f} % of the larger one"
     fact = "; ".join((apart, *distance.listed))
-    return [kind.found(fact, where="plant", deviations=found.deviations, probability=found.probability)]
+    weight = NOTE if distance.exact and not another else None
+    far, chance = found.deviations, found.probability
+    return [kind.found(fact, where="plant", severity=weight, deviations=far, probability=chance)]
 
 
 def _apart(

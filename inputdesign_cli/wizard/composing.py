@@ -263,7 +263,7 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     comment = f"{best.why}; longer ones are no better, as far as was tried"
     if value <= _BEYOND * bound:
         gap = max(value / bound - 1.0, _LEAST_GAP)
-        comment = f"{best.why}: any other gains at most {per_cent(gap, 2)}"
+        comment = f"{best.why}: at the plant above no spectrum gains more than {per_cent(gap, 2)}"
     return replace(best, why=comment)
 
 

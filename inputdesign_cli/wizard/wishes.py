@@ -43,6 +43,7 @@ _WITHIN = {
 
 PRECISE = re.compile("|".join(_WITHIN.values()), re.I)
 """A wish for numbers, beside which a loop is the name of a plant."""
+_OF_UNIT = {"V": "voltage", "volt": "voltage", "volts": "voltage", "mV": "voltage", "A": "current"}
 NAMES_A_LOOP = re.compile(rf"(?:{SIGNAL} )?{LOOP}", re.I)
 
 # The share of the amplitude by which an operating point may differ from the middle of the range.
@@ -124,7 +125,7 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
     """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
-    named = {"u1": (span.name, span.unit), "y1": ("", plant.units[0])}
+    named = {"u1": (span.name or _OF_UNIT.get(span.unit, ""), span.unit), "y1": ("", plant.units[0])}
     named |= {channel: name_and_unit(header) for channel, header in plant.called.items()}
     parts = [one.strip().partition(" in ") for one in said["names"].split(",")]
     owners = ["u1" if _drives(name, span) else "y1" for name, *_ in parts]

@@ -127,7 +127,7 @@ def test_answers_make_a_spec_that_is_accepted(run, tmp_path):
     assert (code, err) == (0, "")
     assert "mine.yaml: written" in out
     text = (tmp_path / "mine.yaml").read_text()
-    assert "filtered noise of order 20: any other gains at most" in text
+    assert "filtered noise of order 20: at the plant above no spectrum gains more than" in text
     assert yaml.safe_load(text)["accuracy"]["loop"]["controller"]["pid"] == {"Kp": 1.5, "Ti": 180}
     assert run("validate", "mine.yaml")[0] == 0
     code, _, err = run("wizard", *options, "-o", "mine.yaml")

@@ -221,7 +221,8 @@ FOUND = SimpleNamespace(
 
 def test_what_another_spec_asks_for_is_kept():
     """But for information on its own parameters, and only in the unit of its times."""
-    wishes = "accuracy: {loop: {max_sensitivity_db: 6}}\nlimits: {amplitude: 3, duration: 4e-3}\n"
+    wishes = "title: a loop\nchannels: {u1: {unit: V}, y1: {name: speed, unit: rpm}}\n"
+    wishes += "accuracy: {loop: {max_sensitivity_db: 6}}\nlimits: {amplitude: 3, duration: 4e-3}\n"
     held = (
         "experiment: {controller: {numerator: [1], denominator: [1]}, prior: {information: [[1, 0], [0, 1]]}}"
     )
@@ -229,8 +230,10 @@ def test_what_another_spec_asks_for_is_kept():
         f"sample_time: 1e-5\nplant: {{B: [0, 2], F: [1, -0.7]}}\nnoise: {{variance: 1}}\n{wishes}{held}"
     )
     found = parse_spec(spec_text(LOG, FOUND, [Path("a.csv")], asked=Asked.of(spec)))
-    for name in ("accuracy", "limits", "objective"):
+    for name in ("accuracy", "limits", "objective", "title"):
         assert getattr(found, name) == getattr(spec, name)
+    named = {name: (one.name, one.unit) for name, one in found.channels.items()}  # names as in the log
+    assert named == {"u1": ("a: # b", "V"), "y1": ("speed", "rpm")}
     assert (found.experiment.prior, found.plant.B) == (None, (0, 1))
     assert found.experiment.controller == spec.experiment.controller
     assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"

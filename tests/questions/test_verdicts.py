@@ -1,6 +1,7 @@
 """Met, missed or undecided: what is said of records, of models, and of the plant of the spec."""
 
 import shlex
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import scipy.stats
 from scipy.stats import chi2, norm
 
 from inputdesign_cli import assess, parse_spec
+from inputdesign_cli.finding import Severity
 from inputdesign_cli.findings.far_from_nominal import far_from_nominal, from_nominal
 from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.outcome.units import Units
@@ -163,6 +165,10 @@ def test_a_far_estimate_contradicts_the_spec_by_its_statistic_where_something_is
     assert distance.nominal.probability == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
     told = "another-plant" if contradicts else "far-from-the-spec"
     assert [one.code for one in far_from_nominal(distance)] == [told] * (contradicts or asked)
+    weights = {one.severity for one in far_from_nominal(distance)}  # a value without uncertainty is no doubt
+    assert weights <= ({Severity.DOUBT} if contradicts else {Severity.NOTE})
+    uncertain = replace(distance, exact=False)
+    assert {one.severity for one in far_from_nominal(uncertain)} <= {Severity.DOUBT}
 
 
 def test_looks_share_the_level_of_what_they_may_end():

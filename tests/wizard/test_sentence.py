@@ -456,7 +456,8 @@ def test_a_part_of_a_sentence_answers_its_question(part, question, answer, tmp_p
 
 @pytest.mark.parametrize("fades", ["fades in", "that fades over", "which dies away in", "varies within"])
 @pytest.mark.parametrize(
-    "noise", ["noise of 0.1", "the reading scatters by 0.1", "the level is noisy by 0.1"]
+    "noise",
+    ["noise of 0.1", "the reading scatters by 0.1", "the tacho scatters 0.1", "the level is noisy by 0.1"],
 )
 def test_noise_fades_in_the_time_that_is_said(noise, fades, tmp_path):
     """Also where nobody says how long the experiment may take: the time was taken for that."""

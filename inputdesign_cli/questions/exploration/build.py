@@ -6,7 +6,7 @@ import json
 import textwrap
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +58,8 @@ class Asked:
 
     time_unit: str
     sections: Mapping[str, Any]
+    title: str = ""
+    channels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     drifts: bool = False  # whether its noise does
     integrates: bool = False  # whether its plant does
 
@@ -71,7 +73,9 @@ class Asked:
         integrates = False
         with suppress(SpecError):  # a plant that no log is compared with
             integrates = bool(np.any(np.abs(build_model(spec).plant_points) < INTEGRATES))
-        return cls(spec.time_unit, sections, bool(np.any(spec.noise.drift)), integrates)
+        drifts = bool(np.any(spec.noise.drift))
+        named = {one: own.model_dump(exclude_none=True) for one, own in (spec.channels or {}).items()}
+        return cls(spec.time_unit, sections, spec.title or "", named, drifts, integrates)
 
     def check_unit(self, time_unit: str) -> None:
         """Raise `SpecError` (`data-wrong-unit`) unless a log counts times in the same unit."""
@@ -128,8 +132,11 @@ def spec_text(
         if asked.drifts and "drift" not in blocks["noise"]:
             comments["noise"].append("The given spec lets the noise drift. This record shows no sign of it.")
         comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
+    # The log names its columns; units are those of the spec that explore was given.
+    stated = dict(asked.channels)
+    named = {one: {**stated.get(one, {}), **named.get(one, {})} for one in sorted({*stated, *named})}
     sections = {
-        "title": f"{_DOUBTED * bool(reasons)}The next experiment after {source}",
+        "title": f"{_DOUBTED * bool(reasons)}{asked.title or f'The next experiment after {source}'}",
         "sample_time": log.step,
         "time_unit": log.time_unit,
         **({"channels": named} if named else {}),
