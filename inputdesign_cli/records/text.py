@@ -97,7 +97,8 @@ def sheet_of(
     width, given = len(names) or max(len(row) for _, row in body), source.given
     if width > _MOST_FIELDS:
         raise source.unreadable(f"has more than {_MOST_FIELDS} columns", "write one sample a line")
-    cells, clocks = joined_clocks([*zip_longest(*(row for _, row in body), fillvalue="")][:width])
+    filled = (row + [""] * (width - len(row)) for _, row in body)  # no row may be as long as the header
+    cells, clocks = joined_clocks([*zip_longest(*filled, fillvalue="")][:width])
     every = [cell for column in cells for cell in column if cell.strip()]
     decimal = given.decimal or decimal_of(every, between_commas=separator == ",")
     columns = [column_of(column, decimal, stated=bool(given.decimal)) for column in cells]

@@ -54,6 +54,7 @@ MOMENTS = [BEGAN + timedelta(seconds=30 * k) for k in range(20)]
         (",".join("1" * 16_385), "data-unreadable", None, "one sample a line"),
         ("u,y\n1,2\n3,\x004\n", "data-unreadable", 3, "take the line out"),
         ("u,y\n", "data-unreadable", None, "rows below it"),
+        ("v,u,y\n1,2\n3,4\n", "data-not-a-number", 2, "another column"),
         ("a,b\n3,2\n1,4\n2,3\n", "data-missing-column", 1, '--columns "u1=1,y1=2"'),
         ("u,y,time\n1,2,0\n3,4,0\n5,6,1\n", "data-not-uniform", 3, "--sample-time"),
     ],
