@@ -81,7 +81,7 @@ def draw_orders(page: Figure, curves: of.OrderCurves, time_unit: str) -> None:
         axes.plot(sizes, behind, marker, color=color, markersize=5, alpha=0.8, label=family)
     size, chosen = curves.chosen
     (ring,) = axes.plot(size, np.clip(best - chosen, *_BEHIND), "o", color=BLACK, markersize=12)
-    ring.set(markerfacecolor="none", label=f"chosen: {curves.family}, fit {chosen:.4g} %")
+    ring.set(markerfacecolor="none", label=f"chosen, fit {chosen:.4g} %")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_yscale("log")
     axes.set_ylim(1.6 * _BEHIND[1], 0.6 * _BEHIND[0])
@@ -89,8 +89,8 @@ def draw_orders(page: Figure, curves: of.OrderCurves, time_unit: str) -> None:
     axes.set_yticks(ticks, ["0.01\nor less", *(f"{tick:g}" for tick in ticks[1:-1]), "100\nor more"])
     name = "y" if curves.output is None else f"y{curves.output + 1}"
     which = "unseen data" if curves.unseen else "the data that estimate"
-    axes.set_xlabel("parameters")
-    axes.set_ylabel(f"points of fit below the best ({best:.4g} %),\nof {name} on {which}")
+    axes.set_xlabel(f"parameters; fit of {name} on {which}")
+    axes.set_ylabel(f"points below the\nbest fit, {best:.4g} %")
     style.legend_over_all(page)
 
 

@@ -314,7 +314,6 @@ class OrderCurves(Curves):
 
     fits: Mapping[str, tuple[Array, Array]]  # family -> numbers of parameters, per cent
     chosen: tuple[float, float]
-    family: str  # of the chosen one
     output: int | None = None  # from zero; None: the only one
     unseen: bool = True
 

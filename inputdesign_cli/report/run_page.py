@@ -77,7 +77,7 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
         "simulation": simulation_table(outcome.simulation),
         "simulated_runs": None if outcome.simulation is None else outcome.simulation.runs,
         "assumptions": said("assumptions", outcome, question=question),
-        "command": _command(verb, outcome, sources),
+        "command": command_of(verb, outcome, sources),
         "explored": outcome.exploration is not None,
         "campaign": verb == "campaign",
         "files": sources[1:],
@@ -137,12 +137,14 @@ def _verb(outcome: Outcome) -> str:
     return next((verb for verb, part in found.items() if part is not None), "analyse")
 
 
-def _command(verb: str, outcome: Outcome, sources: Sequence[str]) -> str:
+def command_of(verb: str, outcome: Outcome, sources: Sequence[str]) -> str:
     """Return the command that makes the run again, with its data and what was removed from them."""
     if outcome.exploration is not None:
         columns = ",".join(f"{role}={column}" for role, column in outcome.exploration.channels.items())
-        options = ["--columns", columns] if columns else []
-        return shlex.join(["idesign", "explore", *(sources or ["DATA"]), *options])
+        asked = [one for one in sources if one.endswith((".yaml", ".yml"))]
+        logs = [one for one in sources if one not in asked] or ["DATA"]
+        options = [part for one in asked for part in ("--spec", one)] + ["--columns", columns] * bool(columns)
+        return shlex.join(["idesign", "explore", *logs, *options])
     found = outcome.identification
     if verb not in ("assess", "identify") or found is None:
         return f"idesign {verb} spec.yaml"

@@ -245,9 +245,9 @@ def apart(lines):
 @pytest.mark.parametrize("families", [1, 6, 8, 20])
 def test_every_family_is_drawn_and_told_apart(page, families):
     fits = {f"F{n}": (SIZES, np.array([90.0 - n, 80.0 - n])) for n in range(families)}
-    (axes,) = (figure := page(OrderCurves(fits, (2.0, 90.0), "OE"))).axes
+    (axes,) = (figure := page(OrderCurves(fits, (2.0, 90.0)))).axes
     named = lines_by_label(axes)
-    assert set(named) == {*fits, "chosen: OE, fit 90 %"}
+    assert set(named) == {*fits, "chosen, fit 90 %"}
     for n, family in enumerate(fits):
         np.testing.assert_array_equal(named[family].get_ydata(), [n or 0.01, 10.0 + n])
     assert apart(list(named.values()))
@@ -255,9 +255,7 @@ def test_every_family_is_drawn_and_told_apart(page, families):
 
 
 def test_fits_that_hardly_differ_are_decades_apart_and_the_worst_is_shown(page):
-    (axes,) = page(
-        OrderCurves({"OE": (np.arange(4.0), np.array([95.0, 94.9, 94.0, -1e9]))}, (0, 95), "OE")
-    ).axes
+    (axes,) = page(OrderCurves({"OE": (np.arange(4.0), np.array([95.0, 94.9, 94.0, -1e9]))}, (0, 95))).axes
     shown = axes.transAxes.inverted().transform(axes.transData.transform(axes.lines[0].get_xydata()))[:, 1]
     assert np.all(np.diff(shown) < -0.2)
     assert np.all((shown > 0.0) & (shown < 1.0))

@@ -10,6 +10,7 @@ import shutil
 from functools import cache, reduce
 from importlib import resources
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -19,6 +20,7 @@ from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, si
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.run_directory import read_curves, write_run
 from inputdesign_cli.report.render import bibtex_text, report_text
+from inputdesign_cli.report.run_page import command_of
 from tests.support.pages import LOOP, SPEC, XHTML, parse, recorded, rows, words
 from tests.support.refusals import refused
 from tests.support.sweep_files import run_sweep
@@ -296,3 +298,16 @@ def test_the_chart_of_the_error_says_what_gave_it(data, tmp_path):
     ]
     named = {curve["name"] for panels in drawn for panel in panels for curve in panel["curves"]}
     assert {"r_u, design", "r_u, data"} <= named
+
+
+@pytest.mark.parametrize(
+    ("sources", "command"),
+    [
+        (["a.csv", "b.csv"], "idesign explore a.csv b.csv --columns u1=valve"),
+        (["wish.yaml", "a b.csv"], "idesign explore 'a b.csv' --spec wish.yaml --columns u1=valve"),
+        ([], "idesign explore DATA --columns u1=valve"),
+    ],
+)
+def test_the_page_of_an_explored_log_names_its_command(sources, command):
+    explored = SimpleNamespace(exploration=SimpleNamespace(channels={"u1": "valve"}))
+    assert command_of("identify", explored, sources) == command

@@ -116,11 +116,8 @@ CURVES = {
             ("ARMAX", "ARX", "BJ", "FIR", "FOPDT", "OE", "SOPDT", "TOPDT"), (T[2:8], 10 * T[2:8] - 40)
         ),
         (3.0, 33.0),
-        "ARX",
     ),
-    "structures": c.OrderCurves(
-        {"ARX": (T[2:8], 10 * T[2:8]), "OE": (T[2:4], 11 * T[2:4])}, (3.0, 33.0), "ARX", 1
-    ),
+    "structures": c.OrderCurves({"ARX": (T[2:8], 10 * T[2:8]), "OE": (T[2:4], 11 * T[2:4])}, (3.0, 33.0), 1),
     "fan": c.FanCurves(W, np.stack([0.3 * G, 0.5 * G]), 0.4 * G, {"plant 2": 0.5 * G}),
     "campaign": c.CampaignCurves(T[20:80:20], 60.0 / T[20:80:20], T[20:80:20], 200),
     "estimates": c.EstimateCurves(T[20:80:20], {"b1": W[:3], "f1": W[3:6]}, {"b1": W[:3], "f1": W[:3]}),

@@ -102,6 +102,6 @@ def structure_curves(found: Found) -> dict[str, Curves]:
             sizes, shares = np.array(own, dtype=float).T
             fits[family] = sizes, shares
         at, output = (float(taken.orders.size), taken.validation), None if single else i
-        drawn = OrderCurves(fits, at, taken.orders.family, output, found.split != "none")
+        drawn = OrderCurves(fits, at, output, found.split != "none")
         curves["structures" if single else f"structures_{i + 1}"] = drawn
     return curves
