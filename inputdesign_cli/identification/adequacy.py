@@ -93,14 +93,18 @@ def score(white: White, columns: Array, means: Array) -> Score:
     """Return the score of regressors ((N + M) p, m), whose scores have the means (m,) under the model."""
     norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     regressors = white.unexplained(columns / norms)
-    scores = regressors.T @ white.residuals - white.mean_left(columns / norms, means / norms)
+    scores, mean = regressors.T @ white.residuals, white.mean_left(columns / norms, means / norms)
     left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
     kept = sizes > DEPENDENT
-    along = (right[kept] @ scores) / sizes[kept]
+    expected = right @ mean
+    if not np.any(means):
+        # To first order parameters add no more than the deviation, else too little of the column is left.
+        expected[np.abs(expected) > np.sqrt(white.variance) * sizes] = 0.0
+    along = (right @ scores - expected)[kept] / sizes[kept]
     return Score(
         float(np.sum(along**2)) / white.variance,
         left[:, kept],
-        scores / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT),
+        (scores - mean) / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT),
     )
 
 
@@ -167,8 +171,9 @@ def robust_white(
     """
 
     def white_enough(judged: White) -> bool:
-        tests = (tested(judged, tried) for tried in past_residuals(records, judged))
-        return not failed([test for test in tests if test is not None])
+        found = [tested(judged, tried) for tried in past_residuals(records, judged)]
+        tests = [test for test in found if test is not None]
+        return all(test.probability * len(tests) >= level("noise") for test in tests)
 
     if white_enough(white) or white_enough(less):
         return None

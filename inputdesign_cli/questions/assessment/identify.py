@@ -202,8 +202,11 @@ def _with_enough_noise(
     estimate = found.estimate
     plant = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
     noises = noises_of_residuals(estimate.errors, estimate.lengths) if estimate.tests.coloured else ()
-    better = None
+    passing, better = list[tuple[int, float, tuple[Identification, Identified]]](), None
     for more in noises:
+        size = sum(C.size + D.size for C, D in more)
+        if passing and size > passing[0][0]:
+            break
         try:
             larger = replace(task.with_noise(found.model, more), header=task.header)
             start = larger.nominal.theta.copy()
@@ -215,12 +218,13 @@ def _with_enough_noise(
         tests = other.estimate.tests
         if other.estimate.search.converged and not tests.coloured:
             chosen = larger, replace(other, noise_refuted=noise_probability(estimate))
-            if not any(test.fault == "noise" for test in tests.failed):
-                return chosen
             better = better or chosen
-    if better is not None:
-        return better
-    return task, found
+            if not any(test.fault == "noise" for test in tests.failed):
+                errors = other.estimate.errors
+                passing.append((size, float(np.linalg.slogdet(errors.T @ errors)[1]), chosen))
+    if passing:  # of equally many coefficients the likeliest
+        return min(passing, key=lambda one: one[1])[2]
+    return better or (task, found)
 
 
 def estimated(
