@@ -105,7 +105,8 @@ def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Fi
 @finding(
     NOTE,
     "loop-near-its-limit",
-    "Tune it slower (`--set accuracy.loop.tuning.simc.tau_c=..`, by default the dead time), "
+    "Tune it slower (`--set accuracy.loop.tuning.simc.tau_c=..`; the default is the dead time with "
+    "half of a second lag and half a sample), "
     "or allow a larger |S|.",
 )
 def near_its_limit(kind: FindingKind, loops: Iterable[Loop | None]) -> list[Finding]:

@@ -14,6 +14,8 @@ from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Severity
 from inputdesign_cli.questions import explore, identify, solve
+from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.questions.building.uncertainty import build_nominal_covariance
 from inputdesign_cli.questions.exploration.build import Asked, spec_text
 from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
@@ -215,6 +217,9 @@ LOG = SimpleNamespace(
 FOUND = SimpleNamespace(
     model=stated("plant: {B: [0, 1], F: [1, -0.5]}"),
     taken=(SimpleNamespace(orders=SimpleNamespace(physical=False, family="OE")),),
+    estimate=SimpleNamespace(
+        names=("b1", "f1"), theta=np.array([1.0, -0.5]), covariance=np.diag([1e-2, 1e-3])
+    ),
     integrates=(),
 )
 
@@ -234,6 +239,9 @@ def test_what_another_spec_asks_for_is_kept():
         assert getattr(found, name) == getattr(spec, name)
     named = {name: (one.name, one.unit) for name, one in found.channels.items()}  # names as in the log
     assert named == {"u1": ("a: # b", "V"), "y1": ("speed", "rpm")}
+    np.testing.assert_array_equal(
+        build_nominal_covariance(found, build_model(found)), FOUND.estimate.covariance
+    )
     assert (found.experiment.prior, found.plant.B) == (None, (0, 1))
     assert found.experiment.controller == spec.experiment.controller
     assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"

@@ -16,6 +16,7 @@ from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore.fits import output_error_form
 from inputdesign_cli.explore.joint import Found
 from inputdesign_cli.findings.prepared_records import name_and_unit
+from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import Model
@@ -125,10 +126,13 @@ def spec_text(
         ],
         **_USUAL,
     }
+    known = dict[str, Any]()
     if asked is None or not asked.sections:
         asked = _as_in_the_record(log, integrates=bool(found.integrates))
     else:
         comments = {key: comments[key] for key in ("title", "plant", "noise")}
+        comments["estimate"] = ["How well the record determines them, for assess; it changes no design."]
+        known = _known(found.estimate)
         if asked.drifts and "drift" not in blocks["noise"]:
             comments["noise"].append("The given spec lets the noise drift. This record shows no sign of it.")
         comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
@@ -141,9 +145,19 @@ def spec_text(
         "time_unit": log.time_unit,
         **({"channels": named} if named else {}),
         **blocks,
+        **known,
         **asked.sections,
     }
     return _commented(sections, comments)
+
+
+def _known(estimate: Estimate) -> dict[str, Any]:
+    """Return the section `estimate`: the parameters with their covariance, if that is one."""
+    values, covariance = estimate.theta.tolist(), estimate.covariance
+    if not np.all(np.isfinite(covariance)) or np.any(np.linalg.eigvalsh(covariance) <= 0.0):
+        return {}
+    named = dict(zip(estimate.names, values, strict=True))
+    return {"estimate": {"parameters": named, "covariance": covariance.tolist()}}
 
 
 def _as_in_the_record(log: Record, *, integrates: bool) -> Asked:

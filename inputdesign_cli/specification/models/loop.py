@@ -175,7 +175,9 @@ MOST_DECIBELS = 100.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: fields.Positive | None = optional("Time constant of the closed loop (default: the dead time).")
+    tau_c: fields.Positive | None = optional(
+        "Time constant of the closed loop (default: the dead time, half of a second lag and half a sample)."
+    )
 
 
 class Amigo(Section):
