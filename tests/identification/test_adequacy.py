@@ -241,3 +241,17 @@ def test_the_noise_of_residuals_is_found():
     C, D = next((C, D) for C, D in found if C.size == D.size == 2)
     assert pytest.approx([1.0, 0.5], abs=0.1) == C
     assert pytest.approx([1.0, -0.8], abs=0.1) == D
+
+
+@pytest.mark.first(4)
+@pytest.mark.parametrize("seed", [4, 5, 6, 8, 10, 16, 21, 24, 29])
+def test_the_future_of_a_periodic_input_says_nothing(seed):
+    """Its past predicts it: what is left is too small for a correction to first order."""
+    rng = np.random.default_rng(seed)
+    u = np.tile(np.repeat([1.0, -1.0], 6), 36)
+    noise = scipy.signal.lfilter([0.045], [1.0, -0.85], rng.standard_normal(u.size))
+    y = scipy.signal.lfilter([0.0, 0.0, 0.06], [1.0, -0.96], u) + noise + 0.05 * rng.standard_normal(u.size)
+    one = np.ones(1)
+    start = ((np.array([0.0, 0.0, 0.004, 0.001]),),), (np.array([1.0, -1.1, 0.2]),), ((one,),)
+    armax = PolynomialModel(*start, (np.array([1.0, -0.7, 0.01]),), (one,), np.eye(1))
+    assert not identify(armax, u[:, None], (y - y.mean())[:, None]).tests.answering
