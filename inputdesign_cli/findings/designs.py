@@ -54,14 +54,14 @@ def inputs_without_power(kind: FindingKind, excited: Sequence[float]) -> list[Fi
     "Raise `experiment.samples` to twice this time constant, or check with `idesign simulate`.",
 )
 def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]:
-    """The experiment ends before the plant settles. The plant needs two of its slowest time constants.
+    """An experiment of this length ends before the plant settles. It takes two of the slowest time constants.
 
     The accuracy of a spectrum holds for long records. A short one loses the response after its end.
     """
     slowest, samples = experiment.slowest, experiment.samples
     if experiment.model.continuous or samples == 1 or _SETTLED * slowest <= samples:
         return []
-    fact = f"the slowest time constant is {slowest:.2g} samples, and the record has {samples}"
+    fact = f"the slowest time constant is {slowest:.2g} samples, and the spectrum is for {samples}"
     return [kind.found(fact, time_constant=slowest, samples=samples)]
 
 
@@ -71,13 +71,13 @@ def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]
     "Take at least 20 samples a parameter, or leave a reserve: ask for half of the error.",
 )
 def few_samples(kind: FindingKind, experiment: Experiment) -> list[Finding]:
-    """The record has few samples for its parameters. Stated deviations hold for many samples.
+    """There are few samples for the parameters. Stated deviations hold for many samples.
 
     Estimates from fewer than 20 samples a parameter may scatter twice as much. `assess` simulates them.
     """
     samples, parameters = experiment.samples, len(experiment.model.names)
     few = samples > 1 and samples * experiment.model.outputs < _FEW * parameters
-    fact = f"{samples} samples for {parameters} parameter{'s' * (parameters > 1)}"
+    fact = f"the spectrum is for {samples} samples, and {parameters} parameter{'s' * (parameters > 1)}"
     return kind.when(few, fact, samples=samples, parameters=parameters)
 
 
@@ -105,8 +105,8 @@ def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Fi
 @finding(
     NOTE,
     "loop-near-its-limit",
-    "Tune it slower (`--set accuracy.loop.tuning.simc.tau_c=..`; the default is the dead time with "
-    "half of a second lag and half a sample), "
+    "Tune it slower (`--set accuracy.loop.tuning.simc.tau_c=..`; the default is the effective "
+    "dead time, with half of a smaller lag), "
     "or allow a larger |S|.",
 )
 def near_its_limit(kind: FindingKind, loops: Iterable[Loop | None]) -> list[Finding]:

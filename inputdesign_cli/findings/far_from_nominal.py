@@ -138,7 +138,7 @@ def far_from_nominal(distance: Distance) -> list[Finding]:
     found, another = distance.nominal, distance.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
         return OUTSIDE.when(
-            distance.outside, f"beyond chance {', '.join(distance.outside)}", where="uncertainty"
+            distance.outside, f"{', '.join(distance.outside)}, by more than chance", where="uncertainty"
         )
     kind = ANOTHER if another else FAR
     sign = ", with the opposite sign at low frequency" if found.opposite_sign else ""
