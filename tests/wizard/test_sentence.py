@@ -414,6 +414,8 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
         ("valve 40 +- 10 %, at least 10 min per position", "hold", "10 min"),
         ("gain 2 degC/%, lag 30 min, temperature noise 0.1, PI loop", "names", "temperature"),
         ("positions are kept for 20 s", "hold", "20 s"),
+        ("gain 2, lag 3 s; PI loop with 6 dB peak sensitivity", "wish", "PI loop, 6 dB"),
+        ("gain 2, lag 3 s; PI loop, maximum sensitivity of at most 2", "wish", "PI loop, Ms 2"),
         ("it must not hold any position for less than 10 minutes", "hold", "10 minutes"),
         ("Rest at 3 V, may change by 1 V", "range", "Rest at 3 V, may change by 1 V"),
         ("Gate is at 40 mm, plus or minus 6 mm", "range", "Gate is at 40 mm, plus or minus 6 mm"),
