@@ -33,7 +33,7 @@ import scipy.special
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification import Estimate, Moves, identify, noises_of_residuals, that_matter
+from inputdesign_cli.identification import Estimate, Moves, Noise, identify, that_matter, with_larger_noise
 from inputdesign_cli.plant import PolynomialModel
 
 FAULTS = ("lag", "delay", "drift", "noise", "change", "nonlinear")
@@ -260,24 +260,15 @@ def estimated(made: Trial) -> tuple[PolynomialModel, Estimate]:
     """The model and its estimate, with a larger noise where its own is refuted, as `assess` has it."""
     u, y = made.u[:, None], made.y[:, None]
     found = identify(made.model, u, y)
-    model, better, passing = (
-        made.model.at(found.theta),
-        None,
-        list[tuple[int, float, PolynomialModel, Estimate]](),
-    )
-    for ((C, D),) in noises_of_residuals(found.errors, found.lengths) if found.tests.coloured else ():
-        size = C.size + D.size
-        if passing and size > passing[0][0]:
-            break
-        larger = replace(model, C=(np.convolve(model.C[0], C),), D=(np.convolve(model.D[0], D),))
-        other = identify(larger, u, y, start=larger.theta, near=True)
-        if other.search.converged and not other.tests.coloured:
-            better = better or (larger, other)
-            if not any(test.fault == "noise" for test in other.tests.failed):
-                passing.append((size, float(np.sum(other.errors**2)), larger, other))
-    if passing:
-        return min(passing, key=lambda one: one[1])[2:]
-    return better or (made.model, found)
+    model = made.model.at(found.theta)
+
+    def larger(noises: list[Noise]) -> tuple[Estimate, tuple[PolynomialModel, Estimate]]:
+        ((C, D),) = noises
+        structured = replace(model, C=(np.convolve(model.C[0], C),), D=(np.convolve(model.D[0], D),))
+        other = identify(structured, u, y, start=structured.theta, near=True)
+        return other, (structured, other)
+
+    return with_larger_noise(found, larger) or (made.model, found)
 
 
 def judged(made: Trial, rng: np.random.Generator) -> Judged:

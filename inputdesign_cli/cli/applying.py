@@ -50,7 +50,9 @@ def instructions(results: Results, spec: str, joint: str = "") -> list[str]:
     if around is not None:
         known = [f"{name}={level:g}" for name, level in zip(inputs, around, strict=True)]
         point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-        means = f"in place of REST, the mean of {' and '.join(outputs)} while the plant rests: note it before"
+        means = (
+            f"in place of REST, the mean of {' and '.join(outputs)} while the plant rests, before signal.csv"
+        )
         judge += f" --operating-point {point}   ({means})"
     if any(" " in name for name in (*tables["signal"].columns, *tables["predicted_output"].columns)):
         columns = ",".join(f"{name}=NAME" for name in ("time", *inputs, *outputs))

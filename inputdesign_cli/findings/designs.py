@@ -105,9 +105,8 @@ def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Fi
 @finding(
     NOTE,
     "loop-near-its-limit",
-    "Tune it slower (`--set accuracy.loop.tuning.simc.tau_c=..`; the default is the effective "
-    "dead time, with half of a smaller lag), "
-    "or allow a larger |S|.",
+    "Tune it slower, or allow a larger |S|. A slower loop has `--set accuracy.loop.tuning.simc.tau_c=..` "
+    "with a time beyond the dead time and half of the smaller lag.",
 )
 def near_its_limit(kind: FindingKind, loops: Iterable[Loop | None]) -> list[Finding]:
     """The loop itself takes most of the |S| that is allowed. Little is left for the error of the model."""

@@ -137,15 +137,12 @@ def far_from_nominal(distance: Distance) -> list[Finding]:
     """Return a finding where the two are different plants, or parameters lie far apart or outside."""
     found, another = distance.nominal, distance.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
-        return OUTSIDE.when(
-            distance.outside, f"{', '.join(distance.outside)}, by more than chance", where="uncertainty"
-        )
+        fact = f"{', '.join(distance.outside)}, by more than chance"
+        return OUTSIDE.when(distance.outside, fact, where="uncertainty")
     kind = ANOTHER if another else FAR
     sign = ", with the opposite sign at low frequency" if found.opposite_sign else ""
-    apart = (
-        f"{'its values count as exact, ' * distance.exact}{found.deviations:.3g} standard deviations apart"
-    )
-    apart += sign
+    exact = "its values count as exact, " * distance.exact
+    apart = f"{exact}{found.deviations:.3g} standard deviations apart{sign}"
     if distance.share:
         apart += f"; {distance.place} differs by {100 * distance.share:.0f} % of the larger one"
     fact = "; ".join((apart, *distance.listed))

@@ -14,6 +14,7 @@ from inputdesign_cli.identification.estimators import (
     fit_batch as fit_batch,
     identify as identify,
     information_of_data as information_of_data,
+    with_larger_noise as with_larger_noise,
 )
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
@@ -31,4 +32,4 @@ from inputdesign_cli.identification.tests import (
     cross_correlations as cross_correlations,
     whiteness as whiteness,
 )
-from inputdesign_cli.identification.white import Noise as Noise, noises_of_residuals as noises_of_residuals
+from inputdesign_cli.identification.white import Noise as Noise

@@ -98,13 +98,14 @@ def score(white: White, columns: Array, means: Array) -> Score:
     kept = sizes > DEPENDENT
     expected = right @ mean
     if not np.any(means):
-        # To first order parameters add no more than the deviation, else too little of the column is left.
+        # A mean that comes of the parameters alone is of first order. Where it exceeds the deviation of the
+        # score, too little of the regressors is left for it to hold.
         expected[np.abs(expected) > np.sqrt(white.variance) * sizes] = 0.0
     along = (right @ scores - expected)[kept] / sizes[kept]
     return Score(
         float(np.sum(along**2)) / white.variance,
         left[:, kept],
-        (scores - mean) / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT),
+        (scores - right.T @ expected) / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT),
     )
 
 

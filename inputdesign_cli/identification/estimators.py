@@ -5,10 +5,10 @@ A new kind of model registers what it supplies with `estimator`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, singledispatch
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy
@@ -40,6 +40,7 @@ from inputdesign_cli.identification.search import Rival, Search, from_rest_or_fr
 from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.transfer_matrix import TransferKind
+from inputdesign_cli.identification.white import Noise, noises_of_residuals
 from inputdesign_cli.information.experiment import taking_part, triangular_factor
 from inputdesign_cli.plant import (
     Coloured,
@@ -61,6 +62,9 @@ _MOST = 2e7
 # rounded otherwise. Parameters this share apart are the same to rounding.
 _UNCERTAIN = 0.03
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
+
+
+T = TypeVar("T")
 
 
 class Begun(NamedTuple):
@@ -211,6 +215,34 @@ def identify(
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
     best = from_rest_or_free(records, False if ramp else rest, searched, start)
     return concluded(best, parts, step, experiments=experiments or (len(outputs),), feedback=feedback)
+
+
+def with_larger_noise(
+    estimate: Estimate, estimated: Callable[[list[Noise]], tuple[Estimate, T] | None]
+) -> T | None:
+    """Return the result with the smallest further noise that the tests accept, or None.
+
+    Of noises with as many coefficients the likeliest is taken. If tests refute all of them, the first with
+    white residuals is taken. None is needed where residuals are white already.
+
+    Args:
+        estimated: returns the estimate with a further noise, and the result; None if there is no estimate.
+    """
+    passing, better = list[tuple[int, float, T]](), None
+    for noises in noises_of_residuals(estimate.errors, estimate.lengths) if estimate.tests.coloured else ():
+        size = sum(C.size + D.size for C, D in noises)
+        if passing and size > passing[0][0]:
+            break
+        if (made := estimated(noises)) is None:
+            continue
+        other, result = made
+        if not other.search.converged or other.tests.coloured:
+            continue
+        better = result if better is None else better
+        if not any(test.fault == "noise" for test in other.tests.failed):
+            power = float(np.linalg.slogdet(other.errors.T @ other.errors)[1])
+            passing.append((size, power, result))
+    return min(passing, key=lambda one: one[1])[2] if passing else better
 
 
 def fit_batch(

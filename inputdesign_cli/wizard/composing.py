@@ -202,11 +202,8 @@ def _points(span: Range) -> str:
     """Return the comment that per cents of a range are points of the actuator, not a share of its middle."""
     low, high = (short(span.offset + side * span.amplitude) for side in (-1, 1))
     percent = span.unit == "%" and span.offset
-    return (
-        f"  # from {low} to {high} %: points of the range, not per cent of {short(span.offset)}"
-        if percent
-        else ""
-    )
+    middle = short(span.offset)
+    return f"  # from {low} to {high} %: points of the range, not per cent of {middle}" if percent else ""
 
 
 def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> list[str]:

@@ -75,6 +75,12 @@ _LESS = re.compile(
     r"|\bless$",
     re.I,
 )
+# What names the output: "PI level loop", "temperature noise", "raises the level", "noise of the speed".
+_CONTROLLED = re.compile(
+    rf"\b({grammar.SIGNAL})\s+(?:loop|control(?:ler)?|regulator|noise|scatters|(?:has|with)\s+\S+\s+\S*\s*noise)\b"
+    rf"|\b(?:{grammar.UP}|noise (?:of|on|in))\s+the\s+({grammar.SIGNAL})\b",
+    re.I,
+)
 _OTHER_LAWS = re.compile(
     r"\b(?!I control\b(?! loop))(?:PD|P|I|LQG?|MPC)(?:[- ]only)?[- ](?:loop|controller|control|regulator)\b"
 )
@@ -221,10 +227,10 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         *([f"words without effect on the spec: {', '.join(beside)}"] if beside else []),
     ]
     remarks += _of_the_wish(answers.get("wish", ""), text)
-    measured = {one.lower() for one in re.findall(rf"\b{grammar.SIGNAL}\b(?<!position)", text, re.I)}
+    controlled = {(one[1] or one[2]).lower() for one in _CONTROLLED.finditer(text)}
     in_words = re.match(r"(?!log |step )\S+ ", answers.get("plant", ""))  # and neither a file nor a template
-    if in_words and len(measured) == 1 and not measured & {"output", "sensor", "measurement"}:
-        answers.setdefault("names", *measured)  # a log has a column of that name
+    if in_words and len(controlled) == 1 and not controlled & {"output", "sensor", "measurement"}:
+        answers.setdefault("names", *controlled)  # a log has a column of that name
     if "wish" in answers and wishes.unbounded(answers["wish"]):
         answers["wish"] += " with a safe margin"
         remarks.append("no margin was named: a safe one is taken, 6 dB")

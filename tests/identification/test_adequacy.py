@@ -1,13 +1,15 @@
 """Tests of the structure: their level, their power, their regression; noise that the model does not have."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.signal
 import scipy.stats
 
-from inputdesign_cli.identification import identify, noises_of_residuals
+from inputdesign_cli.identification import identify, with_larger_noise
 from inputdesign_cli.identification.adequacy import ScoreTest, failed
-from inputdesign_cli.identification.white import White, Whitening
+from inputdesign_cli.identification.white import White, Whitening, noises_of_residuals
 from inputdesign_cli.levels import RATE, SHARES, level
 from inputdesign_cli.plant import PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
@@ -255,3 +257,31 @@ def test_the_future_of_a_periodic_input_says_nothing(seed):
     start = ((np.array([0.0, 0.0, 0.004, 0.001]),),), (np.array([1.0, -1.1, 0.2]),), ((one,),)
     armax = PolynomialModel(*start, (np.array([1.0, -0.7, 0.01]),), (one,), np.eye(1))
     assert not identify(armax, u[:, None], (y - y.mean())[:, None]).tests.answering
+
+
+@pytest.mark.parametrize(
+    ("coloured", "powers", "refuted", "taken"),
+    [
+        (False, [1.0, 1.0], [], None),
+        (True, [2.0, 1.0], [], 1),  # as many coefficients: the likelier
+        (True, [1.0, 2.0], [], 0),
+        (True, [1.0, 2.0, 0.1], [], 0),  # a smaller noise is enough
+        (True, [1.0, 2.0, 3.0], [0, 1], 2),
+        (True, [2.0, 1.0], [0, 1, 2, 3, 4], 0),
+    ],
+)
+def test_the_smallest_noise_is_taken_and_of_equal_ones_the_likeliest(coloured, powers, refuted, taken):
+    """Two noises of one coefficient come first, then those of two and of four."""
+    errors, tried = np.random.default_rng(1).standard_normal((400, 1)), []
+    first = SimpleNamespace(errors=errors, lengths=(400,), tests=SimpleNamespace(coloured=coloured))
+
+    def estimated(noises):
+        number = len(tried)
+        tried.append(noises)
+        failed = [SimpleNamespace(fault="noise")] if number in refuted else []
+        power = powers[number] if number < len(powers) else 4.0
+        tests = SimpleNamespace(coloured=False, failed=failed)
+        search = SimpleNamespace(converged=True)
+        return SimpleNamespace(errors=power * errors, tests=tests, search=search), number
+
+    assert with_larger_noise(first, estimated) == taken

@@ -758,6 +758,24 @@ def test_a_range_says_what_moves_and_in_which_unit(text, found):
 
 
 @pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("gain 20 rad/s per V, lag 0.4 s, 9 +- 3 V, noise 0.5 rad/s, PI speed loop", "speed"),
+        ("opening the valve 10 % raises the level by 10 cm per minute, PI loop with 6 dB", "level"),
+        ("gain 2 degC/%, lag 30 min, temperature noise 0.1, PI loop", "temperature"),
+        ("gain 2 degC/%, lag 30 min, noise of the temperature 0.1, PI loop", "temperature"),
+        ("fan speed stands at 60 % and may move by 10 %, gain -0.2 degC per %, lag 5 min, PI loop", None),
+        ("gain 0.1 pH per l/h, lag 60 s, acid flow 30 +- 5 l/h, noise 0.02 pH, PI loop", None),
+        ("steam pressure 4 +- 0.5 bar, gain 10 degC per bar, lag 10 min, noise 0.1, PI loop", None),
+        ("pump speed 1500 +- 100 rpm, gain 0.2 bar per 100 rpm, lag 20 s, PI pressure loop", "pressure"),
+        ("log log.csv columns u=valve, y=outlet; PI temperature loop", None),
+    ],
+)
+def test_an_output_has_the_name_of_what_is_controlled_not_of_what_moves(text, name):
+    assert in_sentence(text).answers.get("names") == name
+
+
+@pytest.mark.parametrize(
     ("answers", "channels"),
     [
         ({"plant": "gain 2 degC/%, time constant 180 s"}, {"u1": {"unit": "%"}, "y1": {"unit": "degC"}}),

@@ -38,7 +38,7 @@ from inputdesign_cli.identification import (
     Noise,
     Rival,
     identify as estimate_model,
-    noises_of_residuals,
+    with_larger_noise,
 )
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Outcome
@@ -201,30 +201,19 @@ def _with_enough_noise(
     found = estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
     estimate = found.estimate
     plant = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
-    noises = noises_of_residuals(estimate.errors, estimate.lengths) if estimate.tests.coloured else ()
-    passing, better = list[tuple[int, float, tuple[Identification, Identified]]](), None
-    for more in noises:
-        size = sum(C.size + D.size for C, D in more)
-        if passing and size > passing[0][0]:
-            break
+
+    def larger(noises: list[Noise]) -> tuple[Estimate, tuple[Identification, Identified]] | None:
         try:
-            larger = replace(task.with_noise(found.model, more), header=task.header)
-            start = larger.nominal.theta.copy()
-            for k in np.flatnonzero(larger.nominal.in_plant):
-                start[k] = plant[larger.nominal.names[k]]
-            other = estimated(larger, found.data, paths[0], taken, start=start)
+            asked = replace(task.with_noise(found.model, noises), header=task.header)
+            start = asked.nominal.theta.copy()
+            for k in np.flatnonzero(asked.nominal.in_plant):
+                start[k] = plant[asked.nominal.names[k]]
+            other = estimated(asked, found.data, paths[0], taken, start=start)
         except IdesignError:  # this plant cannot have this noise, or it cannot be estimated
-            continue
-        tests = other.estimate.tests
-        if other.estimate.search.converged and not tests.coloured:
-            chosen = larger, replace(other, noise_refuted=noise_probability(estimate))
-            better = better or chosen
-            if not any(test.fault == "noise" for test in tests.failed):
-                errors = other.estimate.errors
-                passing.append((size, float(np.linalg.slogdet(errors.T @ errors)[1]), chosen))
-    if passing:  # of equally many coefficients the likeliest
-        return min(passing, key=lambda one: one[1])[2]
-    return better or (task, found)
+            return None
+        return other.estimate, (asked, replace(other, noise_refuted=noise_probability(estimate)))
+
+    return with_larger_noise(estimate, larger) or (task, found)
 
 
 def estimated(

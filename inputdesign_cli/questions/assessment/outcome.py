@@ -93,6 +93,13 @@ def _test(test: ResidualTest | ScoreTest, lag: int | None = None) -> Test:
     return Test(test.statistic, test.freedom, test.probability, lag)
 
 
+def determined(estimate: Estimate) -> dict[str, dict[str, float] | list[list[float]]]:
+    """Return the entries of a section `estimate`: the parameters, and their covariance if it is definite."""
+    values = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
+    covariance = estimate.covariance.tolist()
+    return {"parameters": values, **({"covariance": covariance} if is_prior(values, covariance) else {})}
+
+
 def model_text(units: Units, model: Model, estimate: Estimate) -> str:
     """Return the blocks to paste, with the clock of the data and the prior for a next experiment."""
     lines = [
@@ -103,15 +110,14 @@ def model_text(units: Units, model: Model, estimate: Estimate) -> str:
     ]
     for key, block in blocks_of(model).items():
         lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]
-    values = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
+    known = determined(estimate)
     lines += [
         "# How far to trust them; a later spec may say experiment: {prior: {information: model.yaml}}.",
         "estimate:",
-        f"  parameters: {json.dumps(values)}",
+        f"  parameters: {json.dumps(known['parameters'])}",
     ]
-    covariance = estimate.covariance.tolist()
-    if is_prior(values, covariance):
-        lines += ["  covariance:", *(f"    - {json.dumps(row)}" for row in covariance)]
+    if "covariance" in known:
+        lines += ["  covariance:", *(f"    - {json.dumps(row)}" for row in known["covariance"])]
     else:
         lines += [
             "  # No covariance: it is singular to rounding, for the data do not distinguish some of these.",

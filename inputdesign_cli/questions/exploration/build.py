@@ -16,13 +16,13 @@ from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore.fits import output_error_form
 from inputdesign_cli.explore.joint import Found
 from inputdesign_cli.findings.prepared_records import name_and_unit
-from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.loop import INTEGRATES
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.assessment.identify import Identification
+from inputdesign_cli.questions.assessment.outcome import determined
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.records import Record
 from inputdesign_cli.specification import Spec, parse_spec
@@ -102,16 +102,7 @@ def spec_text(
         asked: what another spec asks for, in place of that input.
     """
     source = " ".join(" and ".join(path.name for path in sources).split())
-    families = ", ".join(
-        f"{signal_name('y', i, found.model.outputs)}: {c.orders.family}" for i, c in enumerate(found.taken)
-    )
-    kind = f"plants in s, times in {log.time_unit}, inputs held between samples"
-    if not any(c.orders.physical for c in found.taken):
-        kind = "A y = (B/F) u + (C/D) e, polynomials in q^-1"
-    blocks, named = blocks_of(found.model), _channels(log)
-    others = [
-        f"{x} is {' '.join(name.split())}" for x, name in log.names.items() if x != "time" and x not in named
-    ]
+    blocks = blocks_of(found.model)
     blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
     comments = {
         "title": [
@@ -120,44 +111,49 @@ def spec_text(
             *(_UNTRUSTED + one for one in reasons),
             *([_LOOP] if loop else []),
         ],
-        "plant": [f"Known from the record: {kind} ({families}).", *([", ".join(others)] if others else [])],
+        "plant": _of_the_model(log, found),
         "noise": [
             f"Roots of {one} on the circle were drawn into it by one in {len(log.y)}." for one in drawn
         ],
         **_USUAL,
     }
-    known = dict[str, Any]()
     if asked is None or not asked.sections:
         asked = _as_in_the_record(log, integrates=bool(found.integrates))
     else:
         comments = {key: comments[key] for key in ("title", "plant", "noise")}
-        comments["estimate"] = ["How well the record determines them, for assess; it changes no design."]
-        known = _known(found.estimate)
+        comments["estimate"] = ["How well the record determines the parameters; it changes no design."]
+        if "covariance" in (known := determined(found.estimate)):
+            blocks["estimate"] = known
         if asked.drifts and "drift" not in blocks["noise"]:
             comments["noise"].append("The given spec lets the noise drift. This record shows no sign of it.")
         comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
     # The log names its columns; units are those of the spec that explore was given.
-    stated = dict(asked.channels)
-    named = {one: {**stated.get(one, {}), **named.get(one, {})} for one in sorted({*stated, *named})}
+    stated, own = dict(asked.channels), _channels(log)
+    named = {one: {**stated.get(one, {}), **own.get(one, {})} for one in sorted({*stated, *own})}
     sections = {
         "title": f"{_DOUBTED * bool(reasons)}{asked.title or f'The next experiment after {source}'}",
         "sample_time": log.step,
         "time_unit": log.time_unit,
         **({"channels": named} if named else {}),
         **blocks,
-        **known,
         **asked.sections,
     }
     return _commented(sections, comments)
 
 
-def _known(estimate: Estimate) -> dict[str, Any]:
-    """Return the section `estimate`: the parameters with their covariance, if that is one."""
-    values, covariance = estimate.theta.tolist(), estimate.covariance
-    if not np.all(np.isfinite(covariance)) or np.any(np.linalg.eigvalsh(covariance) <= 0.0):
-        return {}
-    named = dict(zip(estimate.names, values, strict=True))
-    return {"estimate": {"parameters": named, "covariance": covariance.tolist()}}
+def _of_the_model(log: Record, found: Found) -> list[str]:
+    """Return comments on the model: its form, and channels whose names a spec cannot have."""
+    families = ", ".join(
+        f"{signal_name('y', i, found.model.outputs)}: {c.orders.family}" for i, c in enumerate(found.taken)
+    )
+    kind = f"plants in s, times in {log.time_unit}, inputs held between samples"
+    if not any(c.orders.physical for c in found.taken):
+        kind = "A y = (B/F) u + (C/D) e, polynomials in q^-1"
+    named = _channels(log)
+    others = [
+        f"{x} is {' '.join(name.split())}" for x, name in log.names.items() if x != "time" and x not in named
+    ]
+    return [f"Known from the record: {kind} ({families}).", *([", ".join(others)] if others else [])]
 
 
 def _as_in_the_record(log: Record, *, integrates: bool) -> Asked:
