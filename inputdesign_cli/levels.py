@@ -10,8 +10,7 @@ RATE = 0.05
 
 SHARES = {
     "one parameter": 0.12,  # a coefficient, a delay, a gain that is not always the same
-    "many signals": 0.04,  # past inputs, past residuals, trends
-    "noise": 0.1,  # residuals that are not white: their noise is estimated, and other tests rest on that
+    "many signals": 0.1,  # past inputs, past residuals, trends
     "varying gain": 0.1,  # of such a size that it moves G by more than is admitted
     "level shift": 0.02,
     "one system": 0.02,  # experiments that differ
@@ -20,7 +19,7 @@ SHARES = {
     "feedback": 0.002,  # an input that answers the outputs, or is logged late
     "frozen": 0.002,  # a sensor that stands still
 }
-"""The share of each group of tests; what is left of the rate keeps chance findings rare."""
+"""The share of each group of tests; what is left of the rate makes chance findings rarer."""
 
 
 def level(tests: str) -> float:

@@ -172,9 +172,8 @@ def robust_white(
     """
 
     def white_enough(judged: White) -> bool:
-        found = [tested(judged, tried) for tried in past_residuals(records, judged)]
-        tests = [test for test in found if test is not None]
-        return all(test.probability * len(tests) >= level("noise") for test in tests)
+        tests = (tested(judged, tried) for tried in past_residuals(records, judged))
+        return not failed([test for test in tests if test is not None])
 
     if white_enough(white) or white_enough(less):
         return None
