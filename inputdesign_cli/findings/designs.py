@@ -118,6 +118,21 @@ def near_its_limit(kind: FindingKind, loops: Iterable[Loop | None]) -> list[Find
     return found
 
 
+@finding(
+    NOTE,
+    "loop-moves-every-sample",
+    "If the actuator needs this time in the loop too, choose it as `sample_time` and tune the loop slower.",
+)
+def loop_not_held(kind: FindingKind, loops: Iterable[Loop | None], hold: int) -> list[Finding]:
+    """The margins are of a loop that moves its input at every sample. The record holds it longer.
+
+    Args:
+        hold: samples for which the record holds each value.
+    """
+    held = hold > 1 and any(loops)
+    return kind.when(held, f"each value of the record lasts {hold} samples at least", hold=hold)
+
+
 @finding(NOTE, "excitation-almost-free", "Give `cost.excitation_power` a small weight, or limit it.")
 def almost_free(
     kind: FindingKind, units: Units, lines: Array, power: Array, costs: Array, dearest: float

@@ -82,12 +82,16 @@ class ModelError:
 
 @dataclass(frozen=True)
 class Loop:
-    """Holds the controller of a loop and the margins kept; times in the user's unit, phase in degrees."""
+    """Holds the controller of a loop and the margins kept; times in the user's unit, phase in degrees.
+
+    Noise moves the input of this loop by `input_deviation`, a standard deviation.
+    """
 
     nominal_peak: float | None = None
     max_sensitivity: float | None = None
     gain_margin: float | None = None
     phase_margin: float | None = None
+    input_deviation: float | None = None
     Kp: float | None = None
     Ti: float | None = None
     Td: float | None = None

@@ -109,6 +109,7 @@ FOUND = {
     "initial-estimate-off": runs.initial_estimate_off(UNITS, {"design": ELSEWHERE}),
     "runs-see-one-minimum": runs.one_minimum(Searched(10, 3, 7)),
     "unstable-runs": runs.unstable_runs({"design": 3, "white": 0}, 100),
+    "loop-moves-every-sample": designs.loop_not_held([None, Loop(1.5, 2.0)], 4),
     "loop-near-its-limit": designs.near_its_limit([None, Loop(1.9, 2.0), Loop(1.5, 2.0)]),
     "met-within-table": [designs.met_within_table(1e-5)],
 }
@@ -128,6 +129,7 @@ def test_what_is_in_order_is_not_noted():
     assert designs.inputs_without_power([1.0, 0.5]) == []
     assert designs.short_experiment(Experiment(MODEL, 1000)) == []
     assert designs.few_samples(Experiment(MODEL, 40)) == []
+    assert designs.loop_not_held([None], 4) == designs.loop_not_held([Loop(1.5, 2.0)], 1) == []
     assert unfinished.fewer_plants(120, 120) == unfinished.unstable_draws(40, 100) == []
     assert unfinished.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good) == []

@@ -106,6 +106,9 @@ def test_the_margin_is_kept_by_the_plants_that_the_data_leave_over():
     w = np.geomspace(1e-4, np.pi, 20001)
     nominal = np.abs(1.0 / (1.0 + sampled((GAIN, LAG, DEAD), w) * pi(loop, w)))
     assert loop["nominal_peak"] == pytest.approx(nominal.max(), rel=1e-4)
+    middles = (np.arange(100_000) + 0.5) * np.pi / 100_000
+    moved = np.abs(pi(loop, middles) / (1.0 + sampled((GAIN, LAG, DEAD), middles) * pi(loop, middles)))
+    assert loop["input_deviation"] == pytest.approx(np.sqrt(0.04 * np.mean(moved**2)), rel=1e-6)
     root = np.linalg.cholesky(np.array(found["information"]["covariance"]))
     w, theta, rng = w[::20], np.array([GAIN, LAG, DEAD]), np.random.default_rng(0)
     C, G = pi(loop, w), sampled(theta, w)

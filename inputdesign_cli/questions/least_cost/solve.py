@@ -15,6 +15,7 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings import designed_records as of_records, unfinished
+from inputdesign_cli.findings.designs import loop_not_held
 from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.outcome import Outcome, White
@@ -217,6 +218,7 @@ class ConvexTask(SpectrumTask):
             *made.findings,
             *of_records.accuracy_missed(record),
             *of_records.length_of_record(record, asked, request.settings.block),
+            *loop_not_held((one.loop for one in results.outcome.requirements or ()), request.settings.hold),
         ]
         if known is not None:
             cost = (1.0 + record.extra_power) * design_cost(done.design, done.cost)
