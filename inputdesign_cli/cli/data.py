@@ -67,6 +67,8 @@ def explore(
         found_spec = argument(str(place.directory / "spec.yaml"))
         if spec is None:
             then = f"idesign solve {shlex.quote(found_spec)}   (say in it how accurate the model must be)"
+        elif any(one.code == "written-spec-refused" for one in found.results.outcome.findings or ()):
+            then = f"mend {found_spec}, until this accepts it: idesign validate {shlex.quote(found_spec)}"
         else:
             removed = found.levels.split() if rows.detrend == "none" else []
             options = [*typed(rows), *(point if point and "--detrend" not in removed else removed)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.errors import Diagnostic
 from inputdesign_cli.explore.fits import Parts, by_chance
 from inputdesign_cli.explore.joint import Found
 from inputdesign_cli.explore.relation import (
@@ -267,3 +268,11 @@ def _unstable(kind: FindingKind, parts: Parts) -> list[Finding]:
             fact = f"{output} has a pole at a radius of {radius:.4g} +- {deviation:.1g}, A: [{A}]"
             found.append(kind.found(fact, where=output, radius=radius, deviation=deviation))
     return found
+
+
+@finding(DOUBT, "written-spec-refused", "Mend `spec.yaml` before `solve` or `assess` read it.")
+def written_spec_refused(kind: FindingKind, refusal: Diagnostic | None) -> list[Finding]:
+    """The model does not fit what the given spec asks for. The spec that was written is refused."""
+    if refusal is None:
+        return []
+    return [kind.found(f"{refusal.message} ({refusal.hint})", where=refusal.key, error=refusal.code)]

@@ -31,6 +31,8 @@ _GROWTH = 1.35
 _FARTHEST = 400
 _AHEAD = 20
 _TRENDS, _WAVES = 3, 4
+# Deviations of a correlation: of past residuals that parameters explain up to less, nothing is known.
+_LEFT = 2.0
 # At most one direction per this number of residuals is tried.
 _SAMPLES_A_DIRECTION = 8
 
@@ -95,9 +97,11 @@ def score(white: White, columns: Array, means: Array) -> Score:
     regressors = white.unexplained(columns / norms)
     scores, mean = regressors.T @ white.residuals, white.mean_left(columns / norms, means / norms)
     left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
-    kept = sizes > DEPENDENT
-    expected = right @ mean
-    if not np.any(means):
+    kept, expected = sizes > DEPENDENT, right @ mean
+    if np.any(means):
+        # They are right to first order: where parameters explain almost all, the second order is as large.
+        kept &= sizes >= np.minimum(sizes[0], _LEFT / np.sqrt(len(white.residuals)))
+    else:
         # A mean that comes of the parameters alone is of first order. Where it exceeds the deviation of the
         # score, too little of the regressors is left for it to hold.
         expected[np.abs(expected) > np.sqrt(white.variance) * sizes] = 0.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import polynomial as ascending
@@ -160,7 +160,8 @@ class ContinuousModel(WhiteNoise):
         rows = (self.numerator, self.denominator)
         above, below = (part[output][input] for part in rows)
         late = self._delays((output, input))
-        return HeldEntry.of(above, below, sample_time, float(late[0]) if late.size else None)
+        delay = float(late[0]) if late.size else None
+        return _held(tuple(above.tolist()), tuple(below.tolist()), sample_time, delay)
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -242,3 +243,11 @@ class ContinuousModel(WhiteNoise):
 
     def _below(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
         return np.asarray(ascending.polyval(s, self.denominator[i][j]), dtype=complex)
+
+
+@lru_cache(maxsize=64)
+def _held(
+    above: tuple[float, ...], below: tuple[float, ...], sample_time: float, delay: float | None
+) -> HeldEntry:
+    """Return one entry as samples drive it; the segments of a record share its matrix exponential."""
+    return HeldEntry.of(np.array(above), np.array(below), sample_time, delay)

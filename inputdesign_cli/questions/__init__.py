@@ -21,8 +21,9 @@ import yaml
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.errors import DataError, IdesignError, InaccurateError, InfeasibleError
+from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, InaccurateError, InfeasibleError
 from inputdesign_cli.findings import with_added
+from inputdesign_cli.findings.explored_logs import written_spec_refused
 from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.specification import Spec, load_spec, parse_spec
 
@@ -216,7 +217,10 @@ def explore(
     if model is None:
         with sound_arithmetic(most_extreme({})):
             found = explore_log(_paths(data), prepared, structure, Asked.of(asked) if asked else None)
-            return replace(found, results=with_added(found.results))
+            results = found.results
+            if asked is not None:
+                results = results.saying(written_spec_refused(_refusal(results.resolved_spec)))
+            return replace(found, results=with_added(results))
     with _placed(model):
         found = judge(model_to_judge(model), build_header(model), _paths(data), prepared)
         return replace(found, results=with_added(found.results))
@@ -247,6 +251,15 @@ def _(model: Results) -> control.lti.LTI:
     found = model.files.get("model.yaml")
     blocks = {} if found is None else yaml.safe_load(found)
     return to_control(spec.with_(**{key: blocks[key] for key in ("plant", "noise") if key in blocks}))
+
+
+def _refusal(text: str) -> Diagnostic | None:
+    """Return the first reason why `solve` would refuse a spec, or None."""
+    try:
+        build_task(parse_spec(text, "spec.yaml"))
+    except IdesignError as error:
+        return error.diagnostics[0]
+    return None
 
 
 def _known(spec: Stated, design: bool | None = True) -> Spec:

@@ -222,9 +222,12 @@ def _table_begins(rows: Rows) -> tuple[int, bool]:
         return 0, False
     width = widths.most_common(1)[0][0]
     first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and of_values(row))
-    if not of_words(first - 1):  # nothing above, or a header of another width
+    above = first - 1
+    while above > 0 and len(rows[above][1]) < width and of_values(rows[above][1]):  # rows that lack a field
+        above -= 1
+    if not of_words(above):  # nothing above, or a header of another width
         return (first if first > 1 and any(len(row) != width for _, row in rows[:first]) else 0), False
     # Names stand above all columns; sheets fill other lines above a table with empty cells.
     plain = all(is_missing(cell) or is_plain(cell) for cell in rows[first][1])
-    two = of_words(first - 2) and all(map(str.strip, rows[first - 2][1]))
-    return first - 1 - two, two and plain
+    two = of_words(above - 1) and all(map(str.strip, rows[above - 1][1]))
+    return above - two, two and plain

@@ -259,6 +259,20 @@ def test_the_future_of_a_periodic_input_says_nothing(seed):
     assert not identify(armax, u[:, None], (y - y.mean())[:, None]).tests.answering
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_record_in_many_short_pieces_does_not_refute_its_model(seed):
+    """Noise parameters explain past residuals up to so little that a mean to first order says nothing."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 8)
+    noise = scipy.signal.lfilter([0.3], [1.0, -0.8], rng.standard_normal(u.size))
+    y, one = scipy.signal.lfilter([0.0, 0.1], [1.0, -0.95], u) + noise, np.ones(1)
+    F, C, D = (np.array([1.0, x]) for x in (-0.95, 0.05, -0.8))
+    model = PolynomialModel(((np.array([0.0, 0.1]),),), (one,), ((F,),), (C,), (D,), np.eye(1))
+    tests = identify(model, u[:, None], y[:, None], lengths=(40,) * 40).tests
+    assert not failed(tests.scores)
+
+
 @pytest.mark.parametrize(
     ("coloured", "powers", "refuted", "taken"),
     [

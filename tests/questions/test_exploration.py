@@ -247,6 +247,23 @@ def test_what_another_spec_asks_for_is_kept():
     assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"
 
 
+def test_a_spec_that_does_not_fit_the_model_of_the_log_is_said_so(tmp_path):
+    """The plant of the spec has other parameters, and the log another unit."""
+    log = lag_log(tmp_path / "log.csv", samples=200)
+    log.write_text(log.read_text().replace("output", "output (cm)", 1))
+    spec = tmp_path / "s.yaml"
+    spec.write_text(
+        f"sample_time: 0.5\ntime_unit: min\nchannels: {{y1: {{unit: m}}}}\n{PLANT}noise: {{variance: 1}}\n"
+        "experiment: {samples: 60}\naccuracy: {standard_deviation: {f1: 0.01}}\nspectrum: {type: white}\n"
+    )
+    done = CliRunner().invoke(app, ["explore", str(log), "--spec", str(spec), "-o", str(tmp_path / "run")])
+    found = {one["code"]: one for one in json.loads((tmp_path / "run/result.json").read_text())["findings"]}
+    assert done.exit_code == 0
+    assert "idesign validate" in done.output.splitlines()[-1]
+    assert found["written-spec-refused"]["figures"]["error"] == "unknown-parameter"
+    assert found["unit-not-converted"]["figures"] == {"found": "cm", "stated": "m"}
+
+
 @pytest.mark.parametrize(
     ("head", "stated"), [("Valve [%]", ("Valve", "%")), ("u", None), ("level " * 8, None)]
 )

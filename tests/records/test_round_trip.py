@@ -87,7 +87,7 @@ def test_blanks_separate_columns_of_numbers(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "layout", ["preamble", "units", "comments", "no header", "trailing separator", "quotes"]
+    "layout", ["preamble", "units", "comments", "no header", "short rows", "trailing separator", "quotes"]
 )
 def test_text_in_every_layout(layout, tmp_path):
     lines = text(";", ".", DATES["iso"]).splitlines()
@@ -100,6 +100,8 @@ def test_text_in_every_layout(layout, tmp_path):
         lines = ["# a comment", *lines[:9], "# another", *lines[9:], "// the end"]
     elif layout == "no header":
         lines, columns = lines[1:], {"time": "1", "u1": "2", "y1": "3"}
+    elif layout == "short rows":
+        lines = [lines[0], "2000-01-01 00:00:00;1", *lines[1:]]
     elif layout == "trailing separator":
         lines = [lines[0], *(f"{line};" for line in lines[1:])]
     else:

@@ -22,6 +22,7 @@ from inputdesign_cli.findings.explored_structures import explored_structures
 from inputdesign_cli.findings.faults import SPIKES, biasing, left_out, shifted_levels
 from inputdesign_cli.findings.frequency_responses import contradicted, response_note, silent_lines_answer
 from inputdesign_cli.findings.judged_models import other_plants
+from inputdesign_cli.findings.prepared_records import columns_against_spec
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs, perhaps_swapped
 from inputdesign_cli.identification import silent_in
@@ -102,6 +103,9 @@ def explore(
     findings = [*map(_untrusted, doubts)]
     findings += () if lines is None else response_note(lines)
     findings += silent_lines_answer(silent)
+    if asked is not None:
+        stated = {one: (own.get("name", ""), own.get("unit", "")) for one, own in asked.channels.items()}
+        findings += columns_against_spec([*log.names.values()], stated, units.inputs, units.outputs, log.names)
     text = spec_text(log, found, paths, reasons, loop=looped and not asked, asked=asked)
     fit = fit_to_log(cast(FitCurves, results.curves["fit"]), whole_log, data)
     curves = {**structure_curves(found), **curves, "fit": fit}
