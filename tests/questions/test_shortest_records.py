@@ -12,11 +12,13 @@ from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.common.record import Made, make_record
 from inputdesign_cli.questions.least_cost.record_search import ShortestRecord, Way
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.selection import Record
+from tests.support.refusals import code_of
 
 # A lag whose spectrum alone would take five samples, and two inputs whose designs of stated length differ.
 LAG = """
@@ -256,3 +258,14 @@ def test_what_is_known_may_do_without_an_experiment(text, more):
     found = solve(parse_spec(text + SHORTEST + prior)).result
     assert (found["status"], found["objective"]["value"]) == ("nothing_needed", 0.0)
     assert "signal" not in found
+
+
+@pytest.mark.parametrize(("samples", "expected"), [(20, "conflicting-keys"), (4000, None)])
+def test_a_stated_length_is_no_shortest_record_if_it_misses(samples, expected):
+    text = f"plant: {{B: [0, 0.2], F: [1, -0.8]}}\nnoise: {{variance: 0.1}}\n{SHORTEST}"
+    text += "spectrum: {type: white}\naccuracy: {standard_deviation: {b1: 0.02}}\nlimits: {input_power: 1}\n"
+    spec = parse_spec(f"{text}signal: {{samples: {samples}}}\n")
+    if expected is None:
+        assert solve(spec).result["signal"]["worst_ratio"] <= 1.0
+    else:
+        assert code_of(solve, spec, kind=SpecError) == expected

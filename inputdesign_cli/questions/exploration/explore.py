@@ -105,7 +105,9 @@ def explore(
     findings += silent_lines_answer(silent)
     if asked is not None:
         stated = {one: (own.get("name", ""), own.get("unit", "")) for one, own in asked.channels.items()}
-        findings += columns_against_spec([*log.names.values()], stated, units.inputs, units.outputs, log.names)
+        findings += columns_against_spec(
+            [*log.names.values()], stated, units.inputs, units.outputs, log.names
+        )
     text = spec_text(log, found, paths, reasons, loop=looped and not asked, asked=asked)
     fit = fit_to_log(cast(FitCurves, results.curves["fit"]), whole_log, data)
     curves = {**structure_curves(found), **curves, "fit": fit}

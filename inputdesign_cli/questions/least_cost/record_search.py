@@ -20,7 +20,7 @@ from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import Goal, PowerLimit
 from inputdesign_cli.design.convex.record_bound import RecordBound, bound_over_records
-from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.findings.designed_records import other_signal
 from inputdesign_cli.questions.common.record import (
     Made,
@@ -230,10 +230,16 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
 
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
+        SpecError: `conflicting-keys`, the spec states a length that is too short.
     """
     made = _first_fitting(request, question, design, samples)
-    sought = question.goal == "samples" and request.samples is None
-    if not sought or made.record is None or not searches(design, made.request.settings):
+    if made.record is None or question.goal != "samples":
+        return made
+    if request.samples is not None and not made.record.met:
+        message = f"the shortest record is sought, and {request.samples} samples miss the accuracy"
+        hint = "leave it out; limits.samples states the longest experiment"
+        raise bad_spec("conflicting-keys", message, hint=hint, key="signal.samples")
+    if request.samples is not None or not searches(design, made.request.settings):
         return made
     search = level_search(made.request, design)
     return replace(made, record=of_samples(search, made.record, search.shortest(made.record.samples)))
@@ -387,9 +393,18 @@ def _refusal(
     best += f"; tried besides: {', '.join(kinds)}" if kinds else ""
     best += f"; proved: {proof}" if proof else ""
     hint = "raise the limits, or loosen the accuracy"
-    if np.isfinite(needed):
-        hint += f": a record of the kinds that were tried would take about {needed:.3g} samples"
+    enough = _enough(max(needed, len(missed.samples)))
+    if enough <= request.longest:
+        hint += f": a record of the kinds that were tried would take about {enough} samples"
     return no_record(request, len(missed.samples), best, "; or ".join(filter(None, (hint, remedy))))
+
+
+def _enough(samples: float) -> float:
+    """Return a length a tenth above an estimate, in two digits: one that just misses names a longer one."""
+    if not np.isfinite(samples):
+        return samples
+    unit = 10 ** max(int(np.log10(samples)) - 1, 0)
+    return unit * int(np.ceil(1.1 * samples / unit))
 
 
 def _ways(request: RecordRequest, question: Question, design: Design) -> list[Way]:
