@@ -70,12 +70,8 @@ def study_losses(
         problem: the problem of an ARX plant and a law that states its loop.
         inputs: name -> spectrum on the harmonics of the record.
         executor: where batches of the runs are computed (default: in this process).
-
-    Raises:
-        ValueError: the law states no loop.
     """
-    if problem.law.desired is None:
-        raise ValueError("only laws that state the loop are simulated")
+    assert problem.law.desired is not None  # for types
     roots = {name: dense_roots(lines, samples) for name, lines in inputs.items()}
     tried = partial(_losses, problem, problem.law.desired, roots, samples)
     size = max(1, _BATCH_SAMPLES // samples)

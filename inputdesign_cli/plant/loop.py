@@ -277,12 +277,6 @@ def _prediction_gradients(
 
 
 def close_loop(model: Model, controller: TransferMatrix) -> Loop:
-    """Return the loop of a model under a controller; `SpecError` (`not-supported`) if it is not sampled."""
-    if model.continuous:
-        raise bad_spec(
-            "not-supported",
-            "this version has no loop around a plant in continuous time",
-            hint="write plant.sample: zoh: controllers act on samples",
-            key="experiment.controller",
-        )
+    """Return the loop of a sampled model under a controller."""
+    assert not model.continuous
     return Loop(cast(SampledPlant, model), controller)

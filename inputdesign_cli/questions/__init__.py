@@ -264,8 +264,8 @@ def _refusal(text: str) -> Diagnostic | None:
 
 def _known(spec: Stated, design: bool | None = True) -> Spec:
     """Return a spec as it is, or read it from the file that is named or from a mapping; see `load_spec`."""
-    if isinstance(spec, Spec):
-        return spec
+    if isinstance(spec, Spec):  # one that was read for `identify` alone has not passed the checks of designs
+        return spec.revised({}, design=True) if design and not spec.asks_for_design else spec
     if isinstance(spec, Mapping):
         return Spec.from_dict(spec, design=design)
     return load_spec(Path(spec), design=design)

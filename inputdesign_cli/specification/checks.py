@@ -360,6 +360,10 @@ def something_asked(spec: Spec) -> _Found:
             "write accuracy: {model_error: {relative: 0.01}}, accuracy: {criterion: D} for the best within "
             "limits, or give the excitation under spectrum.given"
         )
+        if spec.plant.kind == "regression":
+            weights = f"estimated: {[1] * spec.plant.regression.estimated}, neglected_norm: 1.0"
+            message = "nothing is asked of the regression"
+            hint = f"write accuracy: {{mean_squared_error: {{target: 1.0, {weights}}}}}"
         yield PathDiagnostic("nothing-asked", message, hint, ("accuracy",))
     if "scale" in accuracy.model_fields_set and accuracy.criterion is None:
         message = "{key} is the scale of a criterion, and there is none"
@@ -394,7 +398,7 @@ def limits_present(spec: Spec) -> _Found:
         return
     keys = "limits.input_power, limits.output_power, limits.excitation_power or limits.amplitude"
     path = ["objective"]
-    if spec.goal == "shortest_experiment":
+    if spec.goal == "shortest_experiment" and spec.plant.kind != "regression":  # else it is refused as such
         message = "the shortest experiment needs a limit on power: otherwise one strong sample would do"
     elif spec.goal == "best_accuracy" and asked:
         message = f"accuracy.{asked[0]} is to be the best that limits allow, but nothing limits its power"

@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.least_cost.build import build_convex
-from tests.support.refusals import code_of
+from tests.support.refusals import code_of, refusal
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS as EVERYWHERE
 
 # Between samples a dead time brings a zero near -1, where r_adm would be that of `uncertainty.floor`.
@@ -116,6 +116,16 @@ def test_a_plant_whose_parameters_are_not_told_is_an_error():
         code_of(analysed, FIRST, zero, sine, "noise={variance: 1}", "uncertainty={scenarios: [{b2: 0.9}]}")
         == "not-exciting"
     )
+
+
+def test_the_plant_that_a_sinusoid_at_its_zero_leaves_open_is_named():
+    """G vanishes at pi/2, and with it what the output tells of f1; all of the plant of the spec is known."""
+    text = "plant: {B: [0, 1, 1, 1], F: [1, -0.5], known: [b1, b3]}\nnoise: {variance: 1}\n"
+    text += "experiment: {samples: 500}\naccuracy: {standard_deviation: {f1: 0.1}}\n"
+    sine = f"spectrum={{given: {{type: multisine, frequencies: [{np.pi / 2}], amplitudes: [1]}}}}"
+    found = refusal(lambda: analysed(text, sine, "uncertainty={scenarios: [{b2: 0.9}, {b2: 0}]}"))
+    assert (found.code, found.key) == ("not-exciting", "uncertainty")
+    assert "b2 = 0, f1 = -0.5" in found.message
 
 
 def test_the_criterion_of_a_given_excitation_is_told():

@@ -207,6 +207,11 @@ def test_a_margin_that_the_loop_lacks_is_refused_with_what_it_has_as_stated(marg
     edge, roomy = (
         LoopMargin(**{key: float(found)}) for found in re.findall(rf"{key}: ([\d.]+)", refused.hint)
     )
+    assert "tau_c" in refused.hint
+    own = "accuracy={loop: {controller: {pid: {Kp: 1.3, Ti: 180}}, max_sensitivity_db: 3}}"
+    with pytest.raises(SpecError, match=r"reaches") as caught:
+        solve(parse_spec(TEXT, overrides=[own]))
+    assert "tau_c" not in caught.value.diagnostics[0].hint
     reached = float(re.search(r"reaches ([\d.]+)", refused.message)[1])
     assert reached <= edge.peak * (1.0 + 1e-4) <= 1.003 * reached
     assert roomy.peak == pytest.approx(1.2 * reached, rel=3e-3)

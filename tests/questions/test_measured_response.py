@@ -110,6 +110,8 @@ def test_without_lines_in_the_spec_the_data_say_which_they_are(write):
     results = identify(plain, write(table(u, y)), frequency_response=True)
     assert results.result["frequency_response"]["frequencies"] == 12
     assert "deviations" not in results.tables
+    found = identify(parse_spec(TEXT), write(table(u, y))).result  # a model, whatever is asked of the lines
+    assert "requirements" not in found
 
 
 def test_records_that_repeat_count_together(write):

@@ -195,6 +195,9 @@ unknown-parameter uncertainty.scenarios[1] | uncertainty={scenarios: [{f1: -0.6}
 no-stable-plant uncertainty.scenarios[0] | uncertainty={scenarios: [{f1: -1.0}]}
 no-stable-plant uncertainty.scenarios[0] | uncertainty={scenarios: [{c1: 1.0}]}
 not-a-plant uncertainty.scenarios[1] | uncertainty={scenarios: [{b1: 3}, {b1: 0}]}
+not-identifiable uncertainty | plant.B=[0, 3.6, 0.4] | uncertainty={scenarios: [{b1: 1, b2: -0.7}]}
+not-identifiable uncertainty | plant.B=[0, 3.6, 0.4] | GIVEN_ONE | signal=null |
+  uncertainty={scenarios: [{b1: 1, b2: -0.7}]}
 wrong-shape uncertainty.covariance | uncertainty={covariance: [[1, 0], [0, 1]]}
 unknown-parameter uncertainty.covariance | uncertainty={covariance: [[1, 0], [0, 1]], parameters: [b1, b9]}
 not-positive-definite uncertainty.information | uncertainty={information: [[1, 0, 0], [0, 0, 0], [0, 0, 1]]}
@@ -261,7 +264,14 @@ not-supported limits.energy | limits.energy=1.0
 not-supported signal.hold | signal.hold=2
 not-supported accuracy.model_error | accuracy.model_error={"relative": 0.1}
 too-few-lines RESPONSE.lines | RESPONSE.lines=500
-bad-period experiment.samples | RESPONSE.transient=5
+bad-period signal.periods | RESPONSE.transient=5
+bad-period signal.periods | signal.periods=1
+bad-period signal.periods | signal.periods=1 | RESPONSE.period=2000
+bad-period signal.periods | signal.periods=1000
+bad-period experiment.samples | signal=null | experiment.samples=14
+bad-period RESPONSE.period | signal=null | RESPONSE.period=2000
+out-of-range RESPONSE.period | RESPONSE.period=2
+not-supported spectrum.given | spectrum={given: {type: white, power: 1}}
 missing-key RESPONSE | RESPONSE.relative=null
 needs-limits RESPONSE | objective="best_accuracy"
 too-large experiment.samples | experiment.samples=100000000
@@ -307,6 +317,8 @@ conflicting-keys accuracy.model_error.confidence.exact | CONFIDENCE {exact: 0.9,
 conflicting-keys accuracy.model_error.region | CONFIDENCE {exact: 0.9}, region: ellipsoid}}
 """),
     "regression": (None, """
+nothing-asked accuracy | accuracy={}
+not-supported objective | objective=shortest_experiment
 not-supported report.ellipses | report.ellipses=[[b1, b2]]
 """),
     "distillation_column": (None, """

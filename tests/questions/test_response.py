@@ -1,10 +1,12 @@
 """Designs of a frequency response: closed forms, refusals, the audit, and simulated experiments."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError
@@ -12,7 +14,7 @@ from inputdesign_cli.outcome import Outcome, read_plain
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.frequency_response.solve import audit_response
-from tests.support.refusals import code_of
+from tests.support.refusals import code_of, refusal
 
 SINGLE = """
 plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
@@ -190,6 +192,31 @@ def test_limits_that_are_too_tight_say_what_would_do():
     assert "2 times those admitted" in str(caught.value)
     assert solve(spec(limits__input_power=need / 4, accuracy__frequency_response__relative=0.1 * (1 + 1e-9)))
     assert solve(spec(limits__input_power=need * (1 + 1e-9)))
+
+
+@pytest.mark.parametrize("limit", ["amplitude.input", "amplitude.output", "rate"])
+@pytest.mark.parametrize("share", [0.5, 1.05])
+def test_what_a_hint_says_of_limits_on_samples_makes_a_record(limit, share):
+    """A share of the level whose square is the power that the lines need, and a little more than that."""
+    key, u = f"limits.{limit}", solve(spec()).signal[:, 0]
+    y = scipy.signal.lfilter([0, 0.4, 0.1], [1, -1.5, 0.8], u)[400:]
+    of = {"amplitude.input": u, "amplitude.output": y, "rate": np.diff(u, prepend=0.0)}[limit]
+    stated = share * float(np.sqrt(np.mean(of**2)))
+    found = refusal(lambda: solve(parse_spec(SINGLE, overrides=[f"{key}={stated}"])), InfeasibleError)
+    assert found.code == ("infeasible" if share < 1 else "limits-too-tight")
+    times = float(re.search(r"admit ([0-9.]+) times", found.hint)[1])
+    period = re.search(r"objective: shortest_experiment, with (\S+): (\d+)", found.hint)
+    assert (period is None) == (limit == "rate")  # which bounds no power by itself
+    ways = [[f"{key}={times * stated}"], [f"accuracy.frequency_response.relative={0.05 * times}"]]
+    ways += [["objective=shortest_experiment", f"{period[1]}={period[2]}"]] if period else []
+    for way in ways:
+        done = solve(parse_spec(SINGLE, overrides=[f"{key}={stated}", *way])).outcome
+        assert done.signal.worst_ratio <= 1.01
+
+
+def test_a_spec_that_was_read_for_identify_is_checked_before_it_is_designed():
+    told = refusal(lambda: solve(parse_spec(f"{SINGLE}\n", overrides=["accuracy={}"], design=False)))
+    assert told.code == "nothing-asked"
 
 
 @pytest.fixture(scope="module")

@@ -152,7 +152,9 @@ TABLES = [
     ("phi", "frequency,phi\n0.2,1\n5.0,1\n", "bad-table", "Nyquist"),
     ("phi", "frequency,phi\n0.2,-1\n0.5,1\n", "bad-table", "phi must be nonnegative"),
     ("phi", "frequency,power\n0.3,1\n0.9,-0.2\n", "bad-table", "power must be nonnegative"),
+    ("phi", "frequency,phi\n0.2,1\n0.5,-1\n", "bad-table", "row 3"),
     ("level", "frequency,phi\n1,1\n0,1\n", "bad-table", "increase"),
+    ("level", "frequency,phi\n0,1\n3.2,-1\n", "bad-table", "row 3"),
     (
         "entries",
         "frequency,r_adm_11,r_adm_12\n0,1,1\n3.2,1,1\n",

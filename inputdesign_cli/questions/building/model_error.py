@@ -19,7 +19,7 @@ from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.questions.building.controllers import loop_controller
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_loop
-from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
+from inputdesign_cli.questions.building.tables import bad_table, check_rows, has_column, read_frequency_table
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates
 from inputdesign_cli.specification import ModelError as StatedError, Spec
@@ -157,7 +157,8 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
     peak = float(np.max(admissible.nominal(made.grid)))
     message = f"|S| of the nominal loop reaches {peak:.4g}, and the margin asks for {stated.peak:.4g} at most"
     less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
-    hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
+    slower = "lower its gain" if stated.tuning is None else "tune more slowly (simc with a larger tau_c)"
+    hint = f"{slower}, or ask for less of a margin than {less}"
     if stated.max_sensitivity_db is None:
         hint += (
             "; gain and phase margins are kept by a bound on |S|, which asks for more than the margin alone"
@@ -212,11 +213,8 @@ def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str
     units = build_units(spec)
     columns = read_frequency_table(spec, name, [column], key)
     frequency, value = columns["frequency"], columns[column]
-    if np.any(value <= 0):
-        row = int(np.argmax(value <= 0))
-        message = f"{column} is {value[row]:g} in row {row + 2}: it must be positive"
-        hint = "leave frequencies that do not matter out, and restrict band"
-        raise bad_table(spec, name, message, hint, key)
+    hint = "leave frequencies that do not matter out, and restrict band"
+    check_rows(spec, name, column, value, value <= 0, "it must be positive", hint, key)
     if frequency[0] > band[0] * (1 + 1e-9) or frequency[-1] < band[1] * (1 - 1e-9):
         ends = np.array([frequency[0], frequency[-1], *band]) / units.frequency
         covered, asked = (f"{low:g} to {high:g} {units.per_time}" for low, high in ends.reshape(2, 2))
@@ -236,15 +234,10 @@ def _sensitivity(
         given = None if asked is None else asked.controller or spec.experiment.controller
     assert asked is not None
     assert given is not None
-    key = f"{_KEY}.sensitivity" if kept is None else _LOOP
     loop = build_loop(spec, model, given)
-    if not np.any(loop.controller.numerator):
-        message = "the controller is zero: no model error can harm the sensitivity"
-        hint = "give the controller of the loop to be kept"
-        raise spec.complain("no-feedback", message, hint=hint, key=key)
     if asked.weight is not None:
         weight = rational(asked.weight)
-        check_finite(spec, weight, band, "admissible-not-positive", key)
+        check_finite(spec, weight, band, "admissible-not-positive", f"{_KEY}.sensitivity")
         return accuracy.Sensitivity(loop, weight)
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
     settings: dict[str, float] = {}

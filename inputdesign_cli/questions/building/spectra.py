@@ -14,7 +14,7 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.signal_settings import stated_moves, stated_peaks
-from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
+from inputdesign_cli.questions.building.tables import bad_table, check_rows, has_column, read_frequency_table
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
@@ -22,7 +22,6 @@ from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.spectrum import (
     FirSpectrum,
     FreeSpectrum,
-    GivenSpectrum,
     MultisineSpectrum,
     PolynomialSpectrum,
     WhiteSpectrum,
@@ -79,8 +78,6 @@ def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
             basis = _fir(spec, inputs, _DEFAULT_ORDER)
         case FirSpectrum(order=order):
             basis = _fir(spec, inputs, order)
-        case GivenSpectrum():
-            raise _refused(spec, "the excitation is given: there is nothing to design")
         case other if other.type in added("spectra"):
             basis = cast(AddedSpectrum, other).build(spec, inputs, band)
         case other:
@@ -148,7 +145,8 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
     eigenvalues, vectors = np.linalg.eigh(values)
     if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
         wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
-        raise bad_table(spec, name, f"{symbol} must be {wanted}", _HINTS[symbol], _GIVEN)
+        least = f"it is least in row {int(np.argmin(eigenvalues.min(axis=1))) + 2}"
+        raise bad_table(spec, name, f"{symbol} must be {wanted}; {least}", _HINTS[symbol], _GIVEN)
     if spec.plant.sampled and frequency[-1] > np.pi * (1 + 1e-4):
         message = f"it reaches {build_units(spec).named(frequency[-1])}, beyond the Nyquist frequency"
         raise bad_table(spec, name, message, "frequencies end at pi/sample_time", _GIVEN)
@@ -258,8 +256,8 @@ def _level(
     if curve.kind == "table":
         columns = read_frequency_table(spec, curve.table, ["phi"], key)
         frequency, value = columns["frequency"], columns["phi"]
-        if np.any(value < 0):
-            raise bad_table(spec, curve.table, "phi must not be negative", "correct the values", key)
+        why, hint = "it must not be negative", "correct the values"
+        check_rows(spec, curve.table, "phi", value, value < 0, why, hint, key)
         return lambda w: np.interp(w, frequency, value), frequency, smooth, None
     W = build_weight(spec, curve, key)
     check_finite(spec, W, band, "bad-limit", key)

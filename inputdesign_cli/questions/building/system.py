@@ -125,8 +125,8 @@ def build_model(spec: Spec) -> Model:
         case StateSpacePlant() as plant:
             model = state_space_model(spec, plant, covariance)
         case _:
-            message = "a regression has no dynamics to be estimated here"
-            hint = "ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1"
+            message = "a regression has no dynamic model to estimate or to judge"
+            hint = "write the plant as polynomials A, B, F in q^-1, or in s under continuous"
             raise spec.complain("not-supported", message, hint=hint, key="plant")
     if any(noise.drifts) or any(len(p) > 1 for p in (*C, *D)):
         model = Coloured(model, C, D, noise.held, noise.drifts)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
@@ -76,12 +77,18 @@ def read_frequency_table(
         raise bad_table(spec, name, message, hint, key)
     for column, values in found.items():
         size = np.abs(values)
-        beyond = np.flatnonzero((size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0)))
-        if beyond.size:
-            message = f"{column} is {values[beyond[0]]:g} in row {beyond[0] + 2}"
-            hint = f"numbers other than zero lie between {1.0 / _LARGEST:g} and {_LARGEST:g}"
-            raise bad_table(spec, name, message, hint, key)
+        beyond = (size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0))
+        hint = f"numbers other than zero lie between {1.0 / _LARGEST:g} and {_LARGEST:g}"
+        check_rows(spec, name, column, values, beyond, "it is out of range", hint, key)
     return found | {"frequency": frequency * build_units(spec).frequency}
+
+
+def check_rows(
+    spec: Spec, name: str, column: str, values: Array, wrong: NDArray[np.bool_], why: str, hint: str, key: str
+) -> None:
+    """Raise `DataError` (`bad-table`) at the first row (of n) where a value is `wrong`, and say why."""
+    for row in np.flatnonzero(wrong)[:1]:
+        raise bad_table(spec, name, f"{column} is {values[row]:g} in row {row + 2}: {why}", hint, key)
 
 
 def bad_table(spec: Spec, name: str, message: str, hint: str, key: str) -> DataError:

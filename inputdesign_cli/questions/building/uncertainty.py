@@ -160,8 +160,10 @@ class UncertainPlant:
     def _radius(self) -> float:
         return farthest_radius(self.spec, self.experiment)
 
-    def at(self, theta: Array, radius: float) -> Alternative:
+    def at(self, theta: Array, radius: float, *, distinct: bool = False) -> Alternative:
         """Return the plant with these parameters, and the requirements on the design there.
+
+        If `distinct`, some excitation has to distinguish its parameters.
 
         Raises `_NoPlantError`: they give no plant of this structure, or a pole of it, or of its loop, lies
         beyond the radius. Or `SpecError`: a requirement cannot be asked of this plant.
@@ -178,6 +180,8 @@ class UncertainPlant:
             experiment = replace(self.experiment, model=model, loop=loop)
             check_effects(spec, experiment)
             experiment = on_finite_information(spec, experiment)
+            if distinct:
+                experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
             return Alternative(experiment, *build_asked(spec, experiment, self.nominal))
         except SpecError as error:
             found = error.diagnostics[0]
@@ -215,7 +219,7 @@ class UncertainPlant:
             key = f"{KEY}.scenarios[{number}]"
             thetas.append(self.moved(values, key))
             try:
-                plants.append(self.at(thetas[-1], farthest))
+                plants.append(self.at(thetas[-1], farthest, distinct=True))
             except _NoPlantError as error:
                 code, what = error.args
                 message = f"at the scenario {self._named(thetas[-1])} {what}"

@@ -28,7 +28,7 @@ from inputdesign_cli.signal import harmonic_grid
 from inputdesign_cli.specification import FrequencyResponse, Spec
 from inputdesign_cli.specification.models.sizes import most
 
-_ZERO = 1e-12
+_ZERO, _SAMPLES = 1e-12, "experiment.samples"
 # Periods that are tried for a hint, up to that many times as long.
 _LONGEST, _TRIED = 1e3, 400
 # Periods of a block after the transient, if none are stated: their scatter shows the noise.
@@ -135,19 +135,21 @@ def _periods(spec: Spec, stated: FrequencyResponse, *, shortest: bool) -> Period
     if not shortest and times <= stated.transient:
         each = f" for each of {blocks} inputs" if blocks > 1 else ""
         left = f"{stated.transient} are left to the transient: none counts"
-        enough = blocks * (stated.transient + 2) * max(period, 3)
-        key = f"{KEY}.period" if stated.period is not None else "experiment.samples"
-        hint = f"take {enough} samples or more, or a shorter period"
+        key, hint = "signal.periods", f"write {blocks * (stated.transient + 1)} or more, without {KEY}.period"
+        if repeated is None:
+            enough = blocks * (stated.transient + 2) * period
+            key, hint = f"{KEY}.period", f"take {enough} samples or more, or a shorter period"
         raise bad_spec("bad-period", f"the record has {times} periods{each}, and {left}", hint=hint, key=key)
     if period < 3:
         message = f"a period of {period} samples has no harmonic between 0 and the Nyquist frequency"
-        hint = "take more samples, or fewer periods"
-        raise bad_spec("bad-period", message, hint=hint, key="experiment.samples")
+        key, fewer = ("signal.periods", "fewer periods") if repeated else (_SAMPLES, "a shorter transient")
+        hint = f"take {3 * blocks * times} samples or more, or {fewer}"
+        raise bad_spec("bad-period", message, hint=hint, key=key)
     longest = most("signal.samples")
     if not shortest and blocks * times * period > longest:
         message = f"the record has {blocks * times * period} samples, and at most {longest} are computed"
-        hint = f"write experiment.samples: {longest} or less"
-        raise bad_spec("too-large", message, hint=hint, key="experiment.samples")
+        hint = f"write {_SAMPLES}: {longest} or less"
+        raise bad_spec("too-large", message, hint=hint, key=_SAMPLES)
     return Periods(period, blocks, stated.transient)
 
 
@@ -247,10 +249,12 @@ def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
     given, unit = spec.given, f"rad/{spec.time_unit}"
     if given is None:
         return None
-    if given.type != "multisine" or spec.plant.inputs > 1:
-        what = "compute the deviations of a frequency response by this excitation"
-        hint = "give {type: multisine, frequencies, amplitudes} of one input"
-        raise refuse("spectrum.given", what=what, hint=hint)
+    if spec.plant.inputs > 1:
+        hint = "remove spectrum.given, so that lines are designed; or take a plant with one input"
+        raise refuse("spectrum.given", "analyse given lines of a plant with several inputs", hint)
+    if given.type != "multisine":
+        hint = "give {type: multisine, frequencies, amplitudes}"
+        raise refuse("spectrum.given", "compute a frequency response by this excitation", hint)
     places = np.array(given.frequencies) * spec.sample_time * grid.period / (2.0 * np.pi)
     for n in np.flatnonzero(np.abs(places - np.rint(places)) > 1e-6 * places):
         message = f"{given.frequencies[n]:.6g} {unit} is no harmonic of a period of {grid.period} samples"

@@ -171,30 +171,20 @@ class ResponseTask:
     def _planned(self, design: ResponseDesign, counted: int) -> Planned:
         """Return the record of a design, scaled so that it meets the accuracy or keeps to the limits."""
         powers = design.powers.reshape(-1, self.experiment.inputs)
-        samples = self._best(powers, self._length(counted))
-        beyond = self._beyond(samples)
+        samples, beyond, exact = self._drawn(powers, counted)
         if self.goal == "samples" and beyond > 1.0:
             # The lines are scaled into the limits, and more periods make up for it.
             counted = self._whole(beyond**2 / design.value)
-            samples = self._best(powers, self._length(counted))
-            beyond = self._beyond(samples)
-        noise, periods = self.lines.noise, self.periods
-        if not self.tabulated:
-            times = counted // (periods.blocks * periods.period)
-            spectrum = NoiseSpectrum.of(self.experiment.model)
-            noise = spectrum.averaged(self.grid.period, self.grid.excited, times)
-        exact = self.lines.deviations(powers, counted, noise)
-        worst, scale = float(np.max(self.lines.ratios(exact))), 1.0
+            samples, beyond, exact = self._drawn(powers, counted)
+        worst, scale, periods = float(np.max(self.lines.ratios(exact))), 1.0, self.periods
         if self.goal == "cost" and self.record.meets:
             problem = self.problem(counted)
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
-                length, factor = len(samples), rounded_up(scale * beyond, 4)
-                more = self.record.units.length(int(np.ceil(length * (scale * beyond) ** 2)))
+                factor = rounded_up(worst * beyond, 4)
                 best = f"meets the accuracy: its peaks are {factor} times as large as they allow"
-                hint = f"write {more}; raise the limits, admit {factor} times as much, or write "
-                hint += "objective: shortest_experiment"
-                raise no_record(self.record, length, best, hint)
+                hint = f"raise the limits, or admit {factor} times as much{self._longer}"
+                raise no_record(self.record, len(samples), best, hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
@@ -210,14 +200,35 @@ class ResponseTask:
         if not np.isfinite(factor):
             return contradictory(limits, "contradict each other: no powers of these lines keep all of them")
         exhausted = " and ".join(dict.fromkeys(map(named, limits)))
-        raised = (factor * one.bound**0.5 if one.implied else factor**2 * one.bound for one in limits)
-        needed = (f"{one.key} to {rounded_up(to)}" for one, to in zip(limits, raised, strict=True))
-        more, times = int(np.ceil(samples * factor**2)), rounded_up(factor, 4)
-        message = f"the limits buy deviations {times} times those admitted; the {exhausted} is exhausted"
-        longer = f"count {more} samples in place of {samples}"
-        hint = f"raise {' and '.join(needed)}, {longer}, or admit {times} times as much"
+        message = f"the limits buy deviations {rounded_up(factor, 4)} times those admitted; "
+        message += f"the {exhausted} is exhausted"
+        raised = [f"{one.key} to {rounded_up(factor**2 * one.bound)}" for one in limits if not one.implied]
+        # The peaks of a record exceed the root of its power, so that limits on samples need more than that.
+        powers = self.problem(samples).needed.reshape(-1, self.experiment.inputs)
+        _, beyond, exact = self._drawn(powers, samples)
+        peaks = beyond * float(np.max(self.lines.ratios(exact)))
+        if peaks > 1.0:
+            raised += [f"{key} to {rounded_up(peaks, 4)} times its value" for key in self.record.limit_keys]
+        admitted = rounded_up(max(factor, peaks), 4)
+        hint = f"raise {' and '.join(raised)}, or admit {admitted} times as much{self._longer}"
         details = {"factor": factor}
         return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
+
+    @property
+    def _longer(self) -> str:
+        """Return the end of a hint: let the length be found at these lines, if a limit bounds their power."""
+        if all(limit.kind == "moves" or not limit.upper for limit in self.limits):
+            return ""
+        return f"; or write objective: shortest_experiment, with {KEY}.period: {self.grid.period}"
+
+    def _drawn(self, powers: NDArray[np.float64], counted: int) -> tuple[Array, float, NDArray[np.float64]]:
+        """Return a record of these lines, the share of its limits that it takes, and exact deviations."""
+        samples, noise, periods = self._best(powers, self._length(counted)), self.lines.noise, self.periods
+        if not self.tabulated:
+            times = counted // (periods.blocks * periods.period)
+            spectrum = NoiseSpectrum.of(self.experiment.model)
+            noise = spectrum.averaged(self.grid.period, self.grid.excited, times)
+        return samples, self._beyond(samples), self.lines.deviations(powers, counted, noise)
 
     def _length(self, counted: int) -> int:
         """Return the length of a record with its transient; raise `too-long` or `too-large`."""

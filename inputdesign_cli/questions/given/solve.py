@@ -246,8 +246,14 @@ class GivenTask(SpectrumTask):
             starts = [experiment.model.theta, *(batch.thetas[place] for place in reversed(rising))]
             worst_found, _ = worst_plant(plants.region, at, starts)
             plants, looked_at = replace(plants, searched=worst_found), [*looked_at, worst_found.kept]
-        if not all(np.isfinite(one.share) for one in looked_at):
-            message = "the given excitation does not determine the parameters of every plant of uncertainty"
+        thetas = [experiment.model.theta, *batch.thetas[kept]]
+        thetas += [] if plants.searched is None else [plants.searched.theta]
+        shares = np.array([one.share for one in looked_at])
+        for place in np.flatnonzero(~np.isfinite(shares))[:1]:
+            where = ", ".join(
+                f"{name} = {x:.4g}" for name, x in zip(plants.names, thetas[place], strict=True)
+            )
+            message = f"the given excitation does not determine all parameters at the scenario {where}"
             hint = "excite more frequencies, or state the uncertainty more tightly"
             raise bad_spec("not-exciting", message, hint=hint, key="uncertainty")
         binding = [int(np.argmax([one.share for one in at_each]))]

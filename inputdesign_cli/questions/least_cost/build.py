@@ -108,7 +108,7 @@ def _approaching(question: Question, band: tuple[float, float]) -> Question:
 _STATED = "state the accuracy as model_error or a criterion"
 _UNHANDLED = {
     "accuracy.closed_loop_error": _STATED,
-    "accuracy.mean_squared_error": _STATED,
+    "accuracy.mean_squared_error": "remove spectrum.given: a regression is designed, by its moments",
     "limits.energy": "limit input_power, its mean a sample",
     "solver.method": "use exchange or lmi",
     "signal.order": "remove it: noise comes from a long filter",

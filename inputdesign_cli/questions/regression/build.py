@@ -15,7 +15,7 @@ from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.regression.solve import KEY, RegressionTask
-from inputdesign_cli.specification import Noise, Simulation, SimulationNoise, Spec
+from inputdesign_cli.specification import Simulation, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
 _STRUCTURED_TOLERANCE = 1e-6
@@ -35,10 +35,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
     """Return the task; everything that can be wrong with its spec is reported here."""
     error, plant = spec.accuracy.mean_squared_error, spec.plant
     assert plant.kind == "regression"
-    if error is None:
-        message = "nothing is asked of the regression"
-        hint = "add accuracy: {mean_squared_error: {target: 1.0, estimated: [..], neglected_norm: 1.0}}"
-        raise bad_spec("missing-key", message, hint=hint, key="accuracy")
+    assert error is not None
     _check_supported(spec)
     check_record(spec, plant.inputs)
     if not any(error.estimated):
@@ -49,7 +46,6 @@ def build_regression_task(spec: Spec) -> RegressionTask:
     simulation = spec.simulation or Simulation()
     check_compared(simulation.compare, *get_args(Contender))
     true, noise = simulation.plant, simulation.noise or spec.noise
-    _refuse_coloured(noise, "simulation.noise")
     known: dict[str, Contender] = {name: name for name in get_args(Contender)}
     regression = Regression(
         estimated=np.array(error.estimated, dtype=float),
@@ -82,21 +78,12 @@ def build_regression_task(spec: Spec) -> RegressionTask:
     )
 
 
-def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
-    """Raise `SpecError` (`not-supported`) unless noise is white, as the theory takes it."""
-    for name, polynomial in (("C", noise.C), ("D", noise.D)):
-        if np.ravel(polynomial).tolist() != [1.0]:
-            hint = f"remove {key}.{name}; filter regressors and output with its inverse beforehand"
-            raise _refuse(f"{key}.{name}", "take coloured noise", hint)
-
-
 def _check_supported(spec: Spec) -> None:
     """Refuse keys that are not supported for regressions, rather than ignore them."""
-    _refuse_coloured(spec.noise, "noise")
     if "cost" in spec.model_fields_set:
         raise _refuse("cost", what="weigh powers", hint="remove it: what counts is the energy, trace R")
     if spec.goal == "shortest_experiment":
-        hint = "use least_cost or best_accuracy"
+        hint = "remove it: a target asks for the least energy, limits.energy for the best accuracy"
         raise _refuse("objective", what="look for the shortest experiment", hint=hint)
     if spec.at("accuracy", "mean_squared_error", "target") is not None and spec.limits.energy is not None:
         hint = "remove it: the least energy for the target is found; or remove the target"

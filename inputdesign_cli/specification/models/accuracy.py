@@ -185,7 +185,7 @@ class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("fr
     lines: Annotated[fields.Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "Number of lines in the band (default: every harmonic of the period)."
     )
-    period: Annotated[fields.Count, SIZES["signal.samples"]] | None = optional(
+    period: Annotated[fields.Count, Field(ge=3), SIZES["signal.samples"]] | None = optional(
         "Samples of a period (default: the record in signal.periods equal ones, or in five)."
     )
     transient: Annotated[fields.Index, SIZES["signal.samples"]] = Field(
