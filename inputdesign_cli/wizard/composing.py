@@ -257,11 +257,12 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     clear = [one for one in tried if not one[3]] or tried
     least = min(value for _, value, *_ in clear)
     best, value, bound, _ = next(one for one in clear if one[1] <= _ENOUGH * least)
-    comment = f"{best.why}; longer ones are no better, as far as was tried"
+    closer = "better ones leave other dead times open" * (value > _ENOUGH * min(one[1] for one in tried))
+    comment = closer or "longer ones are no better, as far as was tried"
     if value <= _BEYOND * bound:
-        gap = max(value / bound - 1.0, _LEAST_GAP)
-        comment = f"{best.why}: at the plant above no spectrum gains more than {per_cent(gap, 2)}"
-    return replace(best, why=comment)
+        gap = per_cent(max(value / bound - 1.0, _LEAST_GAP), 2)
+        comment = "; ".join(filter(None, (f"at the plant above no spectrum gains more than {gap}", closer)))
+    return replace(best, why=f"{best.why}: {comment}")
 
 
 class Conversation:

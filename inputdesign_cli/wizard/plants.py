@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.errors import DataError, IdesignError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models import fields
@@ -52,6 +53,8 @@ NO_DELAY = (
     r"\b(?:(?:no|without|hardly any|negligible)\s+(?:[a-z]+able\s+)?(?:dead time|delay)"
     r"|(?:dead time|delay)(?:\s+is)?[:=]?\s+(?:none|zero|negligible))\b"
 )
+COLUMN = r"(?!(?:Kp|T[id]|M_?s|tau_c)\b)[a-z]\w*\s*=\s*(?:[^,;.|]|\.(?=\S))+"
+"""A column of a file with its name, as in "u=valve", and no setting of a controller."""
 _SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
 _SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
 _HARDLY = 0.5  # of a sample: as good as no dead time in a log
@@ -135,7 +138,7 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
     if text.lower() in TEMPLATES:
         return TEMPLATES[text.lower()]
     if word.lower() in ("step", "log") and rest.strip():
-        name, *named = re.split(r",?\s+(?:with\s+)?columns?\s+", rest.strip(), maxsplit=1)
+        name, *named = re.split(r",?\s+(?:with\s+)?columns?:?\s+", rest.strip(), maxsplit=1)
         path, columns = file_of("plant", folder / name), _columns(*named)
         with in_their_words({}, "plant"):
             return (_stepped if word.lower() == "step" else _explored)(path, stem, columns)
@@ -149,7 +152,7 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
 def _columns(text: str = "") -> dict[str, str]:
     """Return channel -> column of "time=Date, u=valve, y=level", as `explore --columns` takes them."""
     found = {}
-    for part in filter(None, map(str.strip, text.split(","))):
+    for part in filter(None, map(str.strip, re.split(r"[,;]|\s+and\s+(?=\w+\s*=)", text))):
         if (named := re.fullmatch(r"(?:(time)|([uy])(\d*))\s*=\s*(.+)", part)) is None:
             raise bad_answer("plant", f'"{part}" names no column, as u=valve and y=level do')
         found[named[1] or f"{named[2]}{named[3] or 1}"] = named[4].strip().strip("\"'")
@@ -399,21 +402,17 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
 
     named, name = Preparation(columns=columns), f"{stem}-model.yaml"
     found = questions.explore([path], named)
-    if "model.yaml" not in found.results.files:
-        why = "; ".join(found.reasons) or "no model deserves trust"
-        raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
-
     spec, process = _read(found, name)
     assert spec.plant.kind != "regression"
     channels, heard = max(spec.plant.inputs, spec.plant.outputs), ""
     if channels == 1 and process is None:
-        simple = questions.explore([path], named, structure="fopdt")
-        fits = [
-            one.results.result.get("validation", {}).get("simulation_fit_percent") for one in (simple, found)
-        ]
-        if "model.yaml" in simple.results.files and not simple.reasons and fits[0] >= fits[1] - _NEARLY:
-            found, (spec, process) = simple, _read(simple, name)
-            heard = f"another structure fits {path.name} a little better than gain, lag and dead time do"
+        with suppress(IdesignError):  # not every log determines all three
+            simple = questions.explore([path], named, structure="fopdt")
+            judged = (one.results.result["validation"] for one in (simple, found))
+            fits = [one["simulation_fit_percent"] or 0.0 for one in judged]  # none: it diverges
+            if not simple.reasons and fits[0] >= fits[1] - _NEARLY:
+                found, (spec, process) = simple, _read(simple, name)
+                heard = f"another structure fits {path.name} a little better than gain, lag and dead time do"
     text = found.results.files["model.yaml"].decode()
     lag = None if process is None else process.time_constant
     late = 0.0 if process is None else process.dead_time - 0.5 * spec.sample_time  # that is the converter's
@@ -431,7 +430,7 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
         called={channel: header for channel, header in columns.items() if channel != "time"},
         source=path.name,
         time_unit=spec.time_unit,
-        against=found.against,
+        against=(*found.reasons, *found.against),
         heard=(heard,) if heard else (),
     )
 

@@ -302,11 +302,9 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
         ]
     if controlled:
         return ["accuracy:  # with the controller of the experiment", f"  loop: {{{margin}}}"]
-    raise bad_answer(
-        "wish",
-        "no rule of tuning is at hand for this plant (they are for a gain, one or two lags and a dead time); "
-        'name your own settings, as in "own loop with 6 dB, Kp 1.5, Ti 180"',
-    )
+    why = "no rule of tuning is at hand for this plant (they are for a gain, one or two lags and a dead time)"
+    own = 'name your own settings, as in "own loop with 6 dB, Kp 1.5, Ti 180"'
+    raise bad_answer("wish", "; ".join([why, own, *(one.removesuffix(".") for one in plant.doubts)]))
 
 
 def unbounded(text: str) -> bool:

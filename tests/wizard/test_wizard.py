@@ -171,6 +171,8 @@ FIR, NO_BETTER, ALL = "{type: fir, order: 20}", "no better, as far as was tried"
         ((0.5, 0.4, 4.8, 1.7, 0.3), 0.299, (), ALL, "{type: multisine, lines: 240}", "by"),
         # The first leaves another dead time open.
         ((1.0, 1.01), 1.0, (0,), ALL[:2], "{type: fir, order: 40}", "more than 1 %"),
+        ((1.2, 1.1, 1.05, 1.03, 1.0), 1.0, (3, 4), ALL, "{type: multisine, lines: 60}", "5 %; better"),
+        ((1.2, 1.0, 1.0, 1.0, 0.9), 0.05, (4,), ALL, "{type: fir, order: 40}", "other dead times open"),
         # Without exponents.
         ((1.9,) * 5, 1.0, (), ALL, FIR, "more than 90 %"),
     ],
@@ -287,10 +289,15 @@ def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_speaks_against_the_model_of_a_log_is_said(tmp_path):
-    first_order_log(tmp_path, 5, 300, noise=lambda rng, t: white(rng, t) + 4.0 * np.sin(t / 200.0))
+@pytest.mark.parametrize(("size", "loop"), [(1.0, "PI Kp 0.5, Ti 180"), (0.0, "open")])
+def test_what_speaks_against_the_model_of_a_log_is_said(size, loop, tmp_path):
+    """A log without a plant has reasons against every model, and determines no lag and dead time."""
+    swings = 4.0 * size
+    first_order_log(
+        tmp_path, 5, 300, size=size, noise=lambda rng, t: white(rng, t) + swings * np.sin(t / 200.0)
+    )
     wish = "prediction within 5 % up to 0.1"
-    draft = draft_of(tmp_path, plant="log log.csv", wish=wish, loop="PI Kp 0.5, Ti 180")
+    draft = draft_of(tmp_path, plant="log log.csv", wish=wish, loop=loop)
     draft.validate()
     assert any(one.startswith("against the model of log.csv") for one in draft.notes)
     for one in draft.notes:
