@@ -109,7 +109,9 @@ _MINUS = re.compile(
     re.I,
 )
 _SCATTER = re.compile(
-    rf"\b(?P<what>noise|standard deviation|deviation|std|rms|sigma)\s*{PLUS_MINUS}\s*(?P<size>[\d.]+)", re.I
+    r"\b(?P<what>(?P<loose>noise|noisy|scatters?|fluctuates?)|standard deviation|std|rms|sigma"
+    rf"|deviation(?=\s*{PLUS_MINUS}))(?P<of>(?:\s+(?:by|of|with|is)\b)?(?:\s*{ABOUT})?)\s*{PLUS_MINUS}\s*(?P<size>[\d.]+)",
+    re.I,
 )
 _HOURS_AND_MINUTES = re.compile(
     r"(?<![\w.])(\d+(?:\.\d+)?)\s*h(?:ours?)?\s*(?:and\s+)?(\d+)\s*min(?:utes?)?\b", re.I
@@ -275,7 +277,7 @@ _GROWS = (
 _LEAKS = rf"(?:leak\w*(?:{_GROWS}|\s+slowly)?|(?:outflow|outlet|losses|drain)(?:\s+flow)?{_GROWS})"
 BEYOND = re.compile(
     r"(?:\b(?:and|with|has|some|an?|a (?:bit|little) of|much|strong|dry|static|coulomb|slow|small)\s+)*"
-    rf"(?<!viscous )\b(?:(?P<what>(?:{_NONLINEAR})\b"
+    rf"(?<!viscous )\b(?:(?P<what>(?:{_NONLINEAR})\b(?![-/\w]*\.[a-z])"
     rf"(?:\s+(?:a (?:bit|little)|sometimes|at low speeds?|of {_DIGITS}[^,;]*))*)|(?P<leak>{_LEAKS})\b)",
     re.I,
 )
@@ -454,7 +456,7 @@ def in_figures(text: str) -> str:
     figures = _NOTHING.sub(lambda found: f"dead time of {'a ' * bool(found['few'])}", figures)
     figures = _CUBED.sub(lambda found: "²³"[found[0] == "3"], figures)  # no digits of a number
     figures = _SYMBOL.sub(lambda found: f"{_SYMBOLS[(found[1] or found[2]).lower()]} ", figures)
-    figures = _SCATTER.sub(r"\g<what> \g<size>", figures)
+    figures = _SCATTER.sub(r"\g<what>\g<of> \g<size>", figures)
     figures = _MINUS.sub(lambda found: "gain -" if found["gain"] else "-", figures)
     figures = _HOURS_AND_MINUTES.sub(lambda found: f"{60 * float(found[1]) + float(found[2]):g} min", figures)
     figures = _FRACTION.sub(lambda found: f"{_FRACTIONS[found[1].lower()]:g} ", figures)
@@ -494,7 +496,7 @@ def taken_as(text: str) -> list[str]:
         *(
             f'"{one[0]}" is taken as a standard deviation of {one["size"]}'
             for one in _SCATTER.finditer(text)
-            if one["what"].lower() == "noise"
+            if one["loose"]
         ),
         *(
             f'"{text[one.begin : one.end]}" is taken as the effect of a change of {one.assumed}'

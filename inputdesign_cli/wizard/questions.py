@@ -58,7 +58,7 @@ def question(key: str) -> Question:
 
 def in_other_words(part: str) -> Question:
     """Return the question about a part of a sentence that is not understood."""
-    examples = '"valve 40 +- 15 %", "noise 0.2 degC", "PI loop with 6 dB" or "time=2 h"'
+    examples = '"valve 40 +- 15 %", "noise 0.2 degC", "log FILE columns u=valve, y=level" or "time=2 h"'
     allowed = f"the same in other words, as in {examples}"
     return Question(UNCLEAR, f'"{part}" is not understood. In other words?', allowed, "leave it out")
 

@@ -43,7 +43,7 @@ _MATTERS = re.compile(
     r"dead time|delay|time constant|lag|gain|react\w*|respon[ds]\w*|answers|cannot|or|pp|p-p|negligible|"
     r"hardly|range|span|band|old|had|used|hope|expect\w*|perhaps|might|predict\w*|humidity|"
     r"(?:(?:milli|micro)?second|minute|hour|day|night|week|month|morning|afternoon|evening)s?|half|twice|doubled?|"
-    r"peak\S*)\b",
+    r"peak\S*|columns|cols|sampl(?:e|ing) time)\b|\w\s*=",
     re.I,
 )
 # Words that need no remark where the rest of their clause is understood.
@@ -78,7 +78,9 @@ _LESS = re.compile(
 # What names the output: "PI level loop", "temperature noise", "raises the level", "noise of the speed".
 _CONTROLLED = re.compile(
     rf"\b({grammar.SIGNAL})\s+(?:loop|control(?:ler)?|regulator|noise|scatters|(?:has|with)\s+\S+\s+\S*\s*noise)\b"
-    rf"|\b(?:{grammar.UP}|noise (?:of|on|in))\s+the\s+({grammar.SIGNAL})\b",
+    rf"|\b(?:{grammar.UP}|noise (?:of|on|in))\s+the\s+({grammar.SIGNAL})\b"
+    # A speed, a position or a flow that is controlled may be the input of another loop.
+    rf"|(?:^|[,;.]\s+|\b(?:the|my|our|room|tank|water)\s+)((?!speed|position|flow){grammar.SIGNAL})\s+is\s+controlled\s+by\b",
     re.I,
 )
 _OTHER_LAWS = re.compile(
@@ -191,16 +193,17 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     left = grammar.OUTPUT_RESTS.sub(_taken, BEYOND.sub(_taken, said))
     unwanted = [part[0].strip() for part in _unwanted().finditer(left)]
     left = _unwanted().sub(_taken, left)
-    for key in _TURNS:
-        for pattern, template in _pieces(key):
-            while piece := _first(pattern, left, key):
-                says = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
-                rest = _taken(piece)
-                if key == "plant" and " per " in says and (less := _LESS.search(piece[0])):
-                    says = f"{says.removesuffix(' less')} less"
-                    rest = rest.replace(less[0], "").ljust(len(rest), "|")
-                found.setdefault(key, []).append((piece.start(), says.strip(" ,.")))
-                left = left[: piece.start()] + rest + left[piece.end() :]
+    pieces = [(key, *piece) for key in _TURNS for piece in _pieces(key)]
+    # Names of files and columns come first: "good.csv" says nothing of a margin.
+    for key, pattern, template in sorted(pieces, key=lambda piece: r"\S+\." not in piece[1]):
+        while piece := _first(pattern, left, key):
+            says = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
+            rest = _taken(piece)
+            if key == "plant" and " per " in says and (less := _LESS.search(piece[0])):
+                says = f"{says.removesuffix(' less')} less"
+                rest = rest.replace(less[0], "").ljust(len(rest), "|")
+            found.setdefault(key, []).append((piece.start(), says.strip(" ,.")))
+            left = left[: piece.start()] + rest + left[piece.end() :]
     if len(found) < least:
         return Heard({})
     if "wish" in found and any(wishes.PRECISE.search(said) for _, said in found["wish"]):  # "of a flow loop"
@@ -227,7 +230,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
         *([f"words without effect on the spec: {', '.join(beside)}"] if beside else []),
     ]
     remarks += _of_the_wish(answers.get("wish", ""), text)
-    controlled = {(one[1] or one[2]).lower() for one in _CONTROLLED.finditer(text)}
+    controlled = {(one[1] or one[2] or one[3]).lower() for one in _CONTROLLED.finditer(text)}
     in_words = re.match(r"(?!log |step )\S+ ", answers.get("plant", ""))  # and neither a file nor a template
     if in_words and len(controlled) == 1 and not controlled & {"output", "sensor", "measurement"}:
         answers.setdefault("names", *controlled)  # a log has a column of that name

@@ -54,6 +54,7 @@ HOSTILE = {
         gain 2, time constant 9, dead time -3 | gain 2, time constant 9, within -30 % |
         gain 2, time constant 9, within 0 % | gain 2, time constant 180 min | gain 2, time constant 1e90 s |
         log none.csv | log empty.csv | log head.csv | step none.csv | step empty.csv | step head.csv |
+        log text.csv columns u, y | log text.csv columns u=u, y=y, q=3 |
         log text.csv | step text.csv | log nan.csv | step nan.csv | log . | step | none.json | empty.json |
         lists.json | sampled.json | unstable.json | half_unstable.json | improper.json | negative.json |
         nothing.json | huge.json

@@ -446,6 +446,14 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
             "the valve is at 30 %, may be varied by 4 %",
         ),
         ("level 3 m; the level must stay within 20 cm", "limits", "output 20 cm"),
+        ("temperature scatters by +- 0.3 K, flow 12 +- 1 l/min", "range", "flow 12 +- 1 l/min"),
+        ("lag 3 s; shortest positions of 2 min", "hold", "2 min"),
+        ("lag 3 s; shortest time between moves 30 s", "hold", "30 s"),
+        (
+            "log good.csv, columns u=controller output; y=level",
+            "plant",
+            "log good.csv, columns u=controller output; y=level",
+        ),
         ("lag 3 s; at the end the valve must be where it started", "return", "yes"),
     ],
 )
@@ -460,7 +468,15 @@ def test_a_part_of_a_sentence_answers_its_question(part, question, answer, tmp_p
 @pytest.mark.parametrize("fades", ["fades in", "that fades over", "which dies away in", "varies within"])
 @pytest.mark.parametrize(
     "noise",
-    ["noise of 0.1", "the reading scatters by 0.1", "the tacho scatters 0.1", "the level is noisy by 0.1"],
+    [
+        *(
+            "noise of 0.1",
+            "the reading scatters by 0.1",
+            "the tacho scatters 0.1",
+            "the level is noisy by 0.1",
+        ),
+        *("the level scatters by +- 0.1", "noise of +-0.1", "the level is noisy with 0.1"),
+    ],
 )
 def test_noise_fades_in_the_time_that_is_said(noise, fades, tmp_path):
     """Also where nobody says how long the experiment may take: the time was taken for that."""
@@ -529,7 +545,7 @@ def test_other_words_say_nothing_of_the_plant(part):
      "rate 2 % per sample", "four times faster than the plant", "it may move by 5 % in total", "unstable",
      "upwards only", "known to a factor of two", "all accurate to ten percent", "noise slower than the plant",
      "PRBS please", "the valve is open or closed", "overnight", "not white", "not PID",
-     "the loop is switched off"],
+     "the loop is switched off", "columns of the log: valve and level", "sample time x", "u=valve"],
 )  # fmt: skip
 def test_words_that_matter_are_asked_for(part):
     assert in_sentence(f"{part}; {PLAIN}").unclear
@@ -769,6 +785,8 @@ def test_a_range_says_what_moves_and_in_which_unit(text, found):
         ("steam pressure 4 +- 0.5 bar, gain 10 degC per bar, lag 10 min, noise 0.1, PI loop", None),
         ("pump speed 1500 +- 100 rpm, gain 0.2 bar per 100 rpm, lag 20 s, PI pressure loop", "pressure"),
         ("log log.csv columns u=valve, y=outlet; PI temperature loop", None),
+        ("temperature is controlled by steam flow, gain 2 degC per l/h, lag 9 min, PI loop", "temperature"),
+        ("pump speed is controlled by an inverter, gain 2 bar/%, lag 20 s, PI loop", None),
     ],
 )
 def test_an_output_has_the_name_of_what_is_controlled_not_of_what_moves(text, name):
