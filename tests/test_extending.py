@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -52,6 +53,8 @@ FINDING = {
     "not finite": "@finding(NOTE, 'mine', 'R')\ndef judges(kind, results):\n"
     "    'T. X'\n    return [kind.found(size=float('nan'))]\n",
     "no function": "judges = 1\n",
+    "nothing": "def judges(results):\n    pass\n",
+    "an error": "def judges(results):\n    yield results.nowhere\n",
 }
 ENTRY_POINTS = """
 [idesign.requirements]
@@ -210,9 +213,11 @@ def test_its_words_are_checked_like_all_others(found):
     assert found["wrong"] == [["out-of-range", f"{key}.max"], ["unknown-key", f"{key}.weihgt"]]
 
 
-def test_a_broken_package_is_named(tmp_path):
+@pytest.mark.parametrize("point", ["new = nowhere:New", "fir = h2:Pieces", "new = h2:Pieces"])
+def test_a_broken_package_is_named(point, installed, tmp_path):
+    shutil.copy(installed / "h2.py", tmp_path)
     (tmp_path / "x-1.dist-info").mkdir()
-    (tmp_path / "x-1.dist-info" / "entry_points.txt").write_text("[idesign.spectra]\nnew = nowhere:New\n")
+    (tmp_path / "x-1.dist-info" / "entry_points.txt").write_text(f"[idesign.spectra]\n{point}\n")
     done = run(tmp_path, "-m", "inputdesign_cli", "schema")
     assert done.returncode == 2
     assert "bad-plug-in" in done.stderr

@@ -32,7 +32,7 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
     """
     lines = [
         *_lines(facts(outcome, part="campaign_stands")),
-        *(_trouble(outcome) if _is_trouble(outcome) else _everything(outcome, time_unit)),
+        *(_trouble(outcome, files) if _is_trouble(outcome) else _everything(outcome, time_unit)),
         *(("files", str(file.parent)) for file in files[:1]),
         *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
     ]
@@ -48,12 +48,12 @@ def _is_trouble(outcome: Outcome) -> bool:
     return outcome.campaign is None and assessment is not None and assessment.next is not None
 
 
-def _trouble(outcome: Outcome) -> Iterator[Line]:
+def _trouble(outcome: Outcome, files: Sequence[Path]) -> Iterator[Line]:
     """Yield the finding that comes first: no number of a refuted model counts."""
     yield from _named("verdict", said("verdict", outcome))
     more = len(outcome.notes or ()) - 1
     if more > 0:
-        yield "note", f"{more} more in result.json; most follow from this one"
+        yield "note", f"{more} more {'in result.json' if files else 'with --json'}; most follow from this one"
 
 
 def _everything(outcome: Outcome, time_unit: str) -> list[Line]:

@@ -10,10 +10,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome import read_plain
+from inputdesign_cli.outcome import OutcomeError, read_plain
 from inputdesign_cli.outcome.design import objective
 from inputdesign_cli.outcome.results import Array
+from inputdesign_cli.outcome.run_files import readable
 from inputdesign_cli.outcome.text_formats import csv_rows
 from inputdesign_cli.regular_file import read_regular
 
@@ -136,20 +136,13 @@ def read_sweep(root: Path) -> SweepTable:
     """Read the table of a sweep.
 
     Raises:
-        DataError: `run-missing` or `run-unreadable`.
+        DataError: `run-unreadable`.
     """
-    try:
+    with readable(root / "sweep.json", "a sweep"):
         summary = read_content(root)
+    with readable(root / "sweep.csv", "a sweep"):
         header, *rows = csv_rows(read_regular(root / "sweep.csv"))
         columns = {name: [row[i] for row in rows] for i, name in enumerate(header)}
-        table = SweepTable(summary, columns)
-        missing = {"status", "code", "run", *table.axes} - columns.keys()
-        if missing:
-            raise ValueError(f"sweep.csv has no column {min(missing)}")
-    except (FileNotFoundError, NotADirectoryError) as error:
-        message = f"{root} holds no sweep: there is no {Path(error.filename).name} in it"
-        raise DataError.because("run-missing", message, hint="run it with `idesign sweep`") from None
-    except (OSError, ValueError, KeyError, IndexError) as error:
-        message = f"{root} cannot be read as a sweep: {error}"
-        raise DataError.because("run-unreadable", message, hint="run the sweep again") from error
-    return table
+        if missing := {"status", "code", "run", *(axis.key for axis in summary.axes)} - columns.keys():
+            raise OutcomeError(f"it has no column {min(missing)}")
+        return SweepTable(summary, columns)

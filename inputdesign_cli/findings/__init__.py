@@ -39,15 +39,18 @@ def with_added(results: Results) -> Results:
     The verdict is there before them.
 
     Raises:
-        SpecError: `bad-plug-in`, what is referred to cannot be loaded. Or it gives something other than notes
-            and doubts with declared codes and finite figures.
+        SpecError: `bad-plug-in`, what is referred to cannot be loaded, or fails. Or it gives something other
+            than notes and doubts with declared codes and finite figures.
     """
     for point in points("idesign.findings").values():
         find = loaded(point)
         if not callable(find):
             raise refused(point, "is no function from results to findings")
-        found = list(find(results))
-        if not {getattr(one, "severity", None) for one in found} <= {NOTE, DOUBT}:
+        try:
+            found = list(find(results))
+        except Exception as error:  # whatever the code of another package raises
+            raise refused(point, f"gives no list of findings: {type(error).__name__}: {error}") from error
+        if not all(getattr(one, "severity", None) in (NOTE, DOUBT) for one in found):
             raise refused(point, "gives something that is no note and no doubt")
         if undeclared := [one.code for one in found if one.code not in KINDS]:
             raise refused(point, f"gives {', '.join(undeclared)}, which no function declares with @finding")

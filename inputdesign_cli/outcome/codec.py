@@ -25,6 +25,8 @@ class OutcomeError(ValueError):
     """Says that plain data do not have the form of the result that they should hold."""
 
 
+_NAMES = {str: "text", bool: "truth value", int: "whole number", float: "number", list: "list"}
+_NAMES |= dict.fromkeys((dict, Mapping), "object")
 NULL = {"null": True}
 """Metadata of a field that is written as null where it is None."""
 
@@ -136,10 +138,10 @@ def _object(kind: Any, content: Mapping[str, Any], where: str) -> Any:
             given[field.name] = {key: item for key, item in content.items() if key not in known}
         elif field.name in content:
             given[field.name] = _read(hint, content[field.name], _below(where, field.name))
-    try:
-        return kind(**given)
-    except TypeError as error:
-        raise OutcomeError(f'"{where or "result"}" is not complete: {error}') from error
+    needed = (one for one, _ in _fields(kind) if one.default is one.default_factory is dataclasses.MISSING)
+    if missing := [one.name for one in needed if one.name not in given]:
+        raise OutcomeError(f'"{where or "result"}" lacks {", ".join(missing)}')
+    return kind(**given)
 
 
 def _first_that_fits(kinds: tuple[Any, ...], data: Any, where: str) -> Any:
@@ -177,6 +179,6 @@ def _below(where: str, name: str) -> str:
 def _expected(data: Any, kind: Any, where: str) -> Any:
     """Return data of this type; a truth value is no number."""
     if not isinstance(data, kind) or (kind is int and isinstance(data, bool)):
-        name = "object" if kind is Mapping else getattr(kind, "__name__", "list")
-        raise OutcomeError(f'"{where or "result"}" is of type {type(data).__name__}, not {name}')
+        found, wanted = _NAMES.get(type(data), "null"), _NAMES.get(kind, "list")
+        raise OutcomeError(f'"{where or "result"}" is of type {found}, not {wanted}')
     return data

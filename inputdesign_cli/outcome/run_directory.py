@@ -22,9 +22,10 @@ from typing import Any, cast
 
 import numpy as np
 import orjson
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError, OutputError
-from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
+from inputdesign_cli.outcome import Outcome, read_plain
 from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results
@@ -343,10 +344,8 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
     content = read_run(directory) if result is None else result
     if "spec_sha256" not in content:  # every run has it, of whatever kind
         raise unreadable(directory / RESULT, 'it has no "spec_sha256"')
-    try:
+    with readable(directory / RESULT):
         return read_plain(Outcome, content)
-    except OutcomeError as error:
-        raise unreadable(directory / RESULT, str(error)) from error
 
 
 def run_contents(
@@ -373,10 +372,8 @@ def curves_json(curves: Mapping[str, Curves]) -> bytes:
     return orjson.dumps(content, default=_plain, option=orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _plain(value: object) -> object:
+def _plain(value: NDArray) -> object:
     """Return values without a type in JSON: complex numbers, and arrays that are not contiguous."""
-    if not isinstance(value, np.ndarray):
-        raise TypeError(f"a figure cannot hold a {type(value).__name__}")
     if np.iscomplexobj(value):
         return {"re": np.ascontiguousarray(value.real), "im": np.ascontiguousarray(value.imag)}
     return np.ascontiguousarray(value)

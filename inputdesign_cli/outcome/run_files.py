@@ -21,7 +21,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.errors import DataError, Location, OutputError
+from inputdesign_cli.outcome.codec import OutcomeError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.version import __version__
 
@@ -48,16 +49,14 @@ def load_result(directory: Path) -> dict[str, Any]:
     Raises:
         DataError: `run-missing`, `run-unreadable`.
     """
-    try:
-        result = json.loads(
-            read_regular(directory / RESULT).decode("utf-8"), parse_float=_finite, parse_constant=_finite
-        )
-    except (FileNotFoundError, NotADirectoryError):
-        message = f"{directory} holds no finished run: there is no {RESULT} in it"
-        hint = "write one with `idesign solve SPEC -o DIR`"
-        raise DataError.because("run-missing", message, hint) from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise unreadable(directory / RESULT, str(error)) from error
+    with readable(directory / RESULT):
+        try:
+            text = read_regular(directory / RESULT).decode("utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            message = f"{directory} holds no finished run: there is no {RESULT} in it"
+            hint = "write one into a new directory: `idesign solve SPEC -o DIR`"
+            raise DataError.because("run-missing", message, hint) from None
+        result = json.loads(text, parse_float=_finite, parse_constant=_finite)
     if not isinstance(result, dict) or result.get("format") != 1:
         raise unreadable(directory / RESULT, 'it has no "format": 1')
     files = result.get("files", [])
@@ -98,25 +97,34 @@ def is_page(path: Path) -> bool:
         return False
 
 
-def unreadable(file: Path, why: str) -> DataError:
-    """Return the error about a record that cannot be used."""
-    message = f"{file} cannot be read as the result of a run: {why}"
-    return DataError.because("run-unreadable", message, hint="run the spec again")
+def unreadable(file: Path, why: str, of: str = "a run", line: int | None = None) -> DataError:
+    """Return the error about a file of a run, or of `a sweep`, that cannot be used."""
+    hint = "run the spec again with -o and a new directory"
+    hint = hint if of == "a run" else "give the command of the sweep again"
+    message = f"{file} cannot be read as part of {of}: {why}"
+    place = None if line is None else Location(str(file), line, 1)
+    return DataError.because("run-unreadable", message, hint, location=place)
 
 
 @contextmanager
-def readable(file: Path) -> Iterator[None]:
-    """Turn errors about a record that somebody else wrote or damaged into `run-unreadable`."""
+def readable(file: Path, of: str = "a run") -> Iterator[None]:
+    """Turn errors about a file that somebody wrote, damaged or removed into `run-unreadable`."""
     try:
         yield
+    except OutcomeError as error:
+        raise unreadable(file, str(error), of) from error
+    except json.JSONDecodeError as error:
+        raise unreadable(file, "it is damaged or cut off", of, error.lineno) from error
+    except OSError as error:
+        raise unreadable(file, error.strerror or "it cannot be opened", of) from error
     except _DAMAGES as error:
-        raise unreadable(file, f"its entries are not what idesign writes ({error})") from error
+        raise unreadable(file, "its entries are not what idesign writes", of) from error
 
 
 def _finite(text: str) -> float:
     """Return a number of a result; idesign writes no other than finite ones."""
     if not math.isfinite(value := float(text)):
-        raise ValueError(f"{text} is no finite number")
+        raise OutcomeError(f"{text} is no finite number")
     return value
 
 

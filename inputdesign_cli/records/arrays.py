@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -21,6 +22,7 @@ _MATLAB = (
 # The fields of a saved iddata, and how its columns are called here.
 _IDDATA = {"InputData": "u", "OutputData": "y", "SamplingInstants": "time"}
 _SAMPLE_TIMES, _TIME_UNITS = ("ts", "sample_time", "dt"), ("timeunit", "time_unit")
+_TIMES = ("time", "t", "tout")
 # Types of the elements of MATLAB's files: numbers and texts, arrays, and compressed elements.
 _PLAIN, _ARRAY, _COMPRESSED = {*range(1, 8), 9, 12, 13, 16, 17, 18}, 14, 15
 _DEEPEST = 30
@@ -88,9 +90,13 @@ def columns_of_arrays(
         raise source.unreadable("has no such variable", f"it holds {', '.join(values)}")
     arrays, owners, left_out = dict[str, NDArray](), dict[str, str](), list[str]()
     step, unit = None, None
-    for owner, value in values.items():
-        for name, array in _flat(owner, value) if named in ("", owner) else ():
-            numbers = array.dtype.kind in "fiubmM" and array.ndim in (1, 2) and array.size > 1
+    fields = {owner: [*_flat(owner, value)] for owner, value in values.items() if named in ("", owner)}
+    signals = {o: [n for n, x in own if x.size > 1 and n.lower() not in _TIMES] for o, own in fields.items()}
+    counts = Counter(name for names in signals.values() for name in names)
+    for owner, own in fields.items():
+        for field, array in own:
+            # Simulink logs each signal as a struct, and their fields have the same names.
+            name = owner if counts[field] > 1 and signals[owner] == [field] else field
             if array.size == 1 and name.lower() in _TIME_UNITS:
                 unit = str(array.item())
             elif array.size == 1 and name.lower() in _SAMPLE_TIMES:
@@ -98,14 +104,16 @@ def columns_of_arrays(
                 if not 0.0 < step < np.inf:
                     what = f"states the sample time {array.item()}"
                     raise source.unreadable(what, "make it a positive number")
-            elif not numbers:
+            elif not (array.dtype.kind in "fiubmM" and array.ndim in (1, 2) and array.size > 1):
                 left_out.append(f"{name}: {'text' if array.dtype.kind in 'SU' else array.dtype}")
-            elif name in arrays:
+            elif name not in arrays:
+                arrays[name], owners[name] = array if array.ndim == 2 else array[:, None], owner
+            elif not np.array_equal(arrays[name].ravel(), array.ravel()):
                 what = f"holds {owners[name]} and {owner}, each with a {name} of its own"
                 file = source.path.name.partition("#")[0]
-                raise source.unreadable(what, f"name one: '{file}#{owners[name]}' or '{file}#{owner}'")
-            else:
-                arrays[name], owners[name] = array if array.ndim == 2 else array[:, None], owner
+                whole = [f"'{file}#{one}'" for one, names in signals.items() if len(names) > 1]
+                hint = f"name one: {' or '.join(whole)}" if whole else "log all signals at the same times"
+                raise source.unreadable(what, hint)
     if not arrays:
         held = f" ({', '.join(left_out[:5])})" if left_out else ""
         raise source.unreadable(f"holds no arrays of numbers{held}", _MATLAB)

@@ -52,13 +52,29 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Record:
     records = [read_log(path, preparation) for path in paths]
     first = records[0]
     for path, one in zip(paths, records, strict=True):
-        shapes = [(record.u.shape[1], record.y.shape[1], record.time_unit) for record in (first, one)]
-        if shapes[0] != shapes[1] or abs(one.step - first.step) > _ROUND * first.step:
-            message = f"{path.name} has other channels or another sample time than {paths[0].name}"
-            hint = "explore one experiment at a time, or say --columns and --sample-time"
-            raise DataError.because("data-not-uniform", message, hint)
+        _check_alike(path, one, paths[0], first)
     joined = _together(paths, records)
     return replace(joined, findings=(*joined.repeated, *joined.findings))
+
+
+def _check_alike(path: Path, one: Record, first_path: Path, first: Record) -> None:
+    """Raise `DataError` (`data-not-uniform`) if a file has other channels or steps than the first."""
+    both, line = (one, first), 1
+    ours, theirs = (", ".join(sorted(role for role in log.names if role[0] in "uy")) for log in both)
+    hint = "name columns that all files have: --columns u1=NAME,y1=NAME"
+    if ours == theirs:
+        if one.time_unit == first.time_unit and abs(one.step - first.step) <= _ROUND * first.step:
+            return
+        line = 1 if one.recorded is None else int(one.recorded.rows[:2][-1])
+        ours, theirs = (f"a sample every {log.step:.6g} {log.time_unit}" for log in both)
+        hint = f"add --sample-time {max(one.step, first.step):.6g} --resample"
+        if one.time_unit != first.time_unit:
+            hint = "write all times in one unit"
+        elif not all("time" in log.names for log in both):
+            hint = "give the sample time of all by --sample-time"
+    message = f"{path.name} has {ours}, and {first_path.name} has {theirs}"
+    place = Location(str(path), line, 1)
+    raise DataError.because("data-not-uniform", message, f"explore one file at a time, or {hint}", "", place)
 
 
 def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Record:
@@ -96,8 +112,12 @@ def _read(path: Path, preparation: Preparation, units: Units | None = None) -> R
     else:
         known = _step_of(signals, preparation.sample_time, resample=preparation.resample)
         if known is None and signals.name:
-            hint = "give the sample time: --sample-time 0.5"
-            raise sheet.error("data-not-uniform", f"{sheet.path.name} has one time only", hint, 0)
+            if len(signals.time) == 1:
+                message = f"one row of {sheet.path.name} is too few"
+                raise sheet.error("too-few-samples", message, "record more samples, or keep more rows", 0)
+            message = f"the times in column {signals.name} show no sample time"
+            hint = "give it: --sample-time 0.5; if that column does not count, add --columns time=none"
+            raise sheet.error("data-not-uniform", message, hint, 0)
         step, unit, found = known or 1.0, signals.unit or "s", TIMES_ASSUMED.when(known is None)
     record = _record(signals, step, unit, preparation)
     return replace(record, names=roles, findings=(*record.findings, *found))

@@ -44,8 +44,8 @@ def _is_sweep(directory: Path) -> bool:
         return True
     if (directory / RESULT).is_file():
         return False
-    message = f"{directory} holds neither a finished run nor a sweep"
-    hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
+    message = f"{directory} holds no finished run and no sweep: neither {RESULT} nor sweep.json is in it"
+    hint = "make one in a new directory: `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
     raise DataError.because("run-missing", message, hint=hint)
 
 
@@ -57,7 +57,7 @@ def _filled(
     It carries the SHA-256 of the file `record`, so that a reader can see whether it is about that file.
     Its date is the date of the record, so that the same run gives the same page.
     """
-    with readable(directory / record):
+    with readable(directory / record, "a run" if record == RESULT else "a sweep"):
         digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
         date = datetime.fromtimestamp((directory / record).stat().st_mtime).strftime("%Y-%m-%d %H:%M")
         content = content_of(directory)

@@ -9,6 +9,7 @@ from pathlib import Path
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.run_directory import read_outcome, read_run
+from inputdesign_cli.outcome.run_files import readable
 from inputdesign_cli.outcome.sentences import shown
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, run_charts
@@ -118,12 +119,15 @@ def run_sources(run: Path) -> list[Source]:
 def _asked(run: Path, verb: str) -> tuple[Question, str]:
     """Return the question of a run, and the text of its spec."""
     file = run / "spec.yaml"
-    text = read_regular(file).decode()
+    with readable(file):
+        text = read_regular(file).decode()
     try:
         return read_question(text, str(file), verb), text
     except SpecError as error:
-        message = f"{file} is no spec of this version: {error}"
-        raise DataError.because("run-unreadable", message, hint="run the spec again") from error
+        first = error.diagnostics[0]
+        message = f"{file} was changed, or is of another version: {first.message}"
+        hint = "undo the change, or give the command of the run again with --overwrite"
+        raise DataError.because("run-unreadable", message, hint, first.key, first.location) from error
 
 
 def _verb(outcome: Outcome) -> str:

@@ -15,6 +15,7 @@ from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.design import OBJECTIVES, objective
 from inputdesign_cli.outcome.run_directory import read_outcome
+from inputdesign_cli.outcome.run_files import readable
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, chart
 from inputdesign_cli.report.facts import provenance
@@ -41,6 +42,8 @@ def sweep_page(root: Path) -> dict[str, object]:
     table = read_sweep(root)
     _check_points(table, root)
     summary = table.summary
+    with readable(root / "sweep.yaml", "a sweep"):
+        spec = read_regular(root / "sweep.yaml").decode()
     columns = [(name, title) for name, title in _columns(table) if any(table.columns.get(name, []))]
     names = [*table.axes, *(name for name, _ in columns)]
     rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]
@@ -70,7 +73,7 @@ def sweep_page(root: Path) -> dict[str, object]:
             for i in [i for i, code in enumerate(table.columns["code"]) if code][:MOST_ROWS]
         ],
         "verb": summary.verb,
-        "spec": read_regular(root / "sweep.yaml").decode(),
+        "spec": spec,
         "provenance": provenance(summary.environment),
         "citations": cited,
     }
@@ -94,7 +97,8 @@ def _check_points(table: SweepTable, root: Path) -> None:
                 checked_run(root / run)
         except DataError as error:
             hint = "give the command of the sweep again: it computes this point anew"
-            raise DataError.because("run-unreadable", error.diagnostics[0].message, hint) from None
+            found = error.diagnostics[0]
+            raise DataError.because("run-unreadable", found.message, hint, "", found.location) from None
 
 
 def _columns(table: SweepTable) -> list[tuple[str, str]]:

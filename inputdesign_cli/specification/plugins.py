@@ -50,6 +50,11 @@ def install() -> None:
                 raise refused(points(f"idesign.{group}")[name], "has the name of a key that exists")
             _set_field(model, name, section | None, (section.__doc__ or name).splitlines()[0])
     alternatives, *choice = get_args(Spectrum)
+    taken = {own.phrase for own in get_args(alternatives)}
+    for name, section in sections["spectra"].items():
+        if section.phrase in taken or section.phrase != f"type: {name}":
+            what = f"is a Section of {section.phrase or 'no phrase'}, not of a new type called {name}"
+            raise refused(points("idesign.spectra")[name], what)
     wider: Plain = Annotated[(reduce(or_, sections["spectra"].values(), alternatives), *choice)]
     _set_field(Spec, "spectrum", wider | None, Spec.model_fields["spectrum"].description or "")
     for changed in (Control, ClosedLoopError, Accuracy, Spec):

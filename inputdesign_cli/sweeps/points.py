@@ -43,6 +43,7 @@ from inputdesign_cli.outcome.run_files import (
     environment,
     is_plain,
     locked,
+    readable,
     sync,
     unreadable,
 )
@@ -62,12 +63,10 @@ def checked_run(directory: Path, spec: str | None = None) -> dict[str, Any]:
         DataError: the run is not whole, or belongs to another point.
     """
     result = read_run(directory)
-    try:
+    with readable(directory / RUN_SPEC):
         written = digest(read_regular(directory / RUN_SPEC).decode("utf-8"))
-    except (OSError, ValueError) as error:
-        raise unreadable(directory / RUN_SPEC, str(error)) from error
     if result.get("spec_sha256") != written or (spec is not None and written != digest(spec)):
-        raise unreadable(directory, "it is not the run of this point, and has another spec")
+        raise unreadable(directory / RUN_SPEC, "it was changed, or is of another point")
     return result
 
 
@@ -97,12 +96,11 @@ class Layout:
         if (self.run(key) / RESULT).is_file():
             return checked_run(self.run(key), spec)
         path = self.failure(key)
-        try:
-            failure = json.loads(read_regular(path))
-        except (FileNotFoundError, NotADirectoryError):
-            return None
-        except (OSError, ValueError, RecursionError) as error:
-            raise unreadable(path, str(error)) from error
+        with readable(path):
+            try:
+                failure = json.loads(read_regular(path))
+            except (FileNotFoundError, NotADirectoryError):
+                return None
         if not (isinstance(failure, dict) and all(isinstance(failure.get(name), str) for name in _FAILURE)):
             raise unreadable(path, "it is not what idesign writes of a failure")
         return failure

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.questions.building.tables import read_columns, read_samples
-from inputdesign_cli.records import Preparation, read_log, read_sheet
+from inputdesign_cli.records import Preparation, read_log, read_logs, read_sheet
 from tests.support.refusals import refused
 
 U, Y = np.arange(20.0) % 7, np.arange(20.0) % 5
@@ -57,6 +57,8 @@ MOMENTS = [BEGAN + timedelta(seconds=30 * k) for k in range(20)]
         ("v,u,y\n1,2\n3,4\n", "data-not-a-number", 2, "another column"),
         ("a,b\n3,2\n1,4\n2,3\n", "data-missing-column", 1, '--columns "u1=1,y1=2"'),
         ("u,y,time\n1,2,0\n3,4,0\n5,6,1\n", "data-not-uniform", 3, "--sample-time"),
+        ("u,y,time\n1,2,0\n3,4,1\n5,6,9\n", "data-not-uniform", 2, "--sample-time"),
+        ("u,y,time\n1,2,0\n", "too-few-samples", 2, "more samples"),
     ],
 )
 def test_text_by_its_code_line_and_option(text, code, line, option, tmp_path):
@@ -168,6 +170,7 @@ def test_an_archive_that_unpacks_to_more_than_the_limit_is_refused_at_once(name,
         ({"s": {"u": U, "y": Y}, "z": {"u": 2 * U, "y": Y}}, "log.mat#s"),
         ({"u": U, "y": Y, "Ts": "soon"}, "sample time"),
         ({"u": U + 1j, "y": Y}, "u"),
+        ({"u": {"time": U, "a": U}, "y": {"time": Y, "a": Y}}, "same times"),
     ],
 )
 def test_arrays_that_are_no_columns_are_refused(arrays, said, tmp_path):
@@ -176,6 +179,34 @@ def test_arrays_that_are_no_columns_are_refused(arrays, said, tmp_path):
     assert said in f"{found.message} {found.hint}"
     if "z" in arrays:
         np.testing.assert_array_equal(read_log(tmp_path / "log.mat#z", Preparation()).u[:, 0], 2 * U)
+
+
+def test_structs_of_one_signal_each_are_columns_by_their_names(tmp_path):
+    """As Simulink logs them, with times of their own."""
+    structs = {x: {"time": np.arange(0.0, 10.0, 0.5), "a": {"b": s}} for x, s in (("u", U), ("y", Y))}
+    scipy.io.savemat(tmp_path / "log.mat", structs)
+    read = read_log(tmp_path / "log.mat", Preparation(detrend="none"))
+    assert (read.step, read.u[:, 0].tolist(), read.y[:, 0].tolist()) == (0.5, U.tolist(), Y.tolist())
+
+
+DIFFERENT = [
+    ((0.5, 1.0), ("time,u,y", "time,u,y"), 3, {"sample_time": 1.0, "resample": True}),
+    ((1.0, 0.5), ("time,u,y", "time,u,y"), 3, {"sample_time": 1.0, "resample": True}),
+    ((1.0, 1.0), ("time,u,y1", "time,u,y1,y2"), 1, {"columns": {"u1": "u", "y1": "y1"}}),
+    ((1.0, 1.0), ("time_s,u,y", "time_ms,u,y"), 3, None),
+    ((0.5, 0.5), ("time,u,y", "no,u,y"), 3, {"sample_time": 0.5}),
+]
+
+
+@pytest.mark.parametrize(("steps", "names", "line", "mended"), DIFFERENT)
+def test_files_that_differ_are_refused_with_the_line_and_what_mends_it(steps, names, line, mended, tmp_path):
+    rng, paths = np.random.default_rng(1), [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path, step, header in zip(paths, steps, names, strict=True):
+        table = np.column_stack([step * np.arange(40), rng.standard_normal((40, header.count(",")))])
+        np.savetxt(path, table, delimiter=",", header=header, comments="")
+    (found,) = refused(read_logs, paths, Preparation(), kind=DataError)
+    assert (found.code, found.location.file, found.location.line) == ("data-not-uniform", str(paths[1]), line)
+    assert not mended or read_logs(paths, Preparation(**mended)).step == mended.get("sample_time", 1.0)
 
 
 CELLS = st.sampled_from(

@@ -192,14 +192,15 @@ def test_what_was_looked_for_is_said_where_nothing_speaks_against_the_model(test
     assert [len(one) for one in looked] == [signs] * bool(signs)
 
 
-def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command():
+def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command(tmp_path):
     found = {"verdict": "undecided", "met": False, "undecided": ["Past inputs explain residuals."]}
     found |= {"causes": ["contradicted"], "next": "idesign explore a.csv"}
     result = {"assessment": found, "notes": ["Past inputs explain residuals.", "The residuals drift."]}
     told = summary(typed(result), "s", [])
     assert "next: idesign explore a.csv" in told
     assert told.count("Past inputs explain residuals.") == 1
-    assert "1 more in result.json" in told
+    assert "1 more with --json" in told
+    assert "1 more in result.json" in summary(typed(result), "s", [tmp_path / "result.json"])
     assert "The residuals drift." not in told
 
 

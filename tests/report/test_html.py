@@ -17,7 +17,7 @@ import pytest
 import scipy.stats
 
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
-from inputdesign_cli.errors import DataError
+from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.outcome.run_directory import read_curves, write_run
 from inputdesign_cli.report.render import bibtex_text, report_text
 from inputdesign_cli.report.run_page import command_of
@@ -311,3 +311,27 @@ def test_the_chart_of_the_error_says_what_gave_it(data, tmp_path):
 def test_the_page_of_an_explored_log_names_its_command(sources, command):
     explored = SimpleNamespace(exploration=SimpleNamespace(channels={"u1": "valve"}))
     assert command_of("identify", explored, sources) == command
+
+
+@pytest.mark.parametrize("left", [None, 0, 40, -40])
+def test_whatever_becomes_of_a_file_the_error_names_it(left, runs, unpictured, tmp_path, monkeypatch):
+    """Of a run and of a sweep; a page that needs nothing of the file may stand as it is."""
+    monkeypatch.setattr("inputdesign_cli.report.sweep_page.sweep_figures", lambda _: [])
+    run_sweep(runs / "open.yaml", ["experiment.samples=50,-1"], directory=tmp_path / "sweep")
+    shutil.copytree(runs / "open", tmp_path / "run")
+    python, refused_files = (
+        r"(?i)errno|__|error|object|index|none|char \d|argument|expect|\bkey\b|codec",
+        set(),
+    )
+    for file in sorted(path for path in tmp_path.rglob("*") if path.is_file() and path.name[0] != "."):
+        whole, root = file.read_bytes(), tmp_path / file.relative_to(tmp_path).parts[0]
+        _ = file.unlink() if left is None else file.write_bytes(whole[:left])
+        for read in (report_text, bibtex_text, read_curves):
+            try:
+                read(root)
+            except IdesignError as error:
+                said = str(error).replace(str(tmp_path), "")
+                assert (file.name in said, re.search(python, said)) == (True, None)
+                refused_files.add(file.name)
+        file.write_bytes(whole)
+    assert refused_files >= {"result.json", "spec.yaml", "sweep.csv", "sweep.json", "figures.json"}

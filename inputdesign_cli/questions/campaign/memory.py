@@ -26,10 +26,10 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome import OutcomeError, plain, read_plain
+from inputdesign_cli.outcome import plain, read_plain
 from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
-from inputdesign_cli.outcome.run_files import RESULT, SIGNAL, SPEC, load_result, locked, unreadable
+from inputdesign_cli.outcome.run_files import RESULT, SIGNAL, SPEC, load_result, locked, readable
 from inputdesign_cli.outcome.text_formats import csv_columns
 from inputdesign_cli.regular_file import read_regular
 
@@ -90,10 +90,8 @@ def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
                 f"the campaign in {directory} has version {campaign.get('version')}, not {VERSION}",
                 hint="go on with the version of idesign that began it: see environment in result.json",
             )
-        try:
+        with readable(directory / RESULT):
             found = read_plain(Campaign, campaign)
-        except OutcomeError as error:
-            raise unreadable(directory / RESULT, "its campaign is not what idesign writes") from error
         names = {name for name in result.get("files", ()) if _KEPT.fullmatch(name) or name in (SPEC, SIGNAL)}
         with output_errors(directory):
             files = {name: read_regular(directory / name) for name in sorted(names)}
