@@ -319,10 +319,7 @@ def test_whatever_becomes_of_a_file_the_error_names_it(left, runs, unpictured, t
     monkeypatch.setattr("inputdesign_cli.report.sweep_page.sweep_figures", lambda _: [])
     run_sweep(runs / "open.yaml", ["experiment.samples=50,-1"], directory=tmp_path / "sweep")
     shutil.copytree(runs / "open", tmp_path / "run")
-    python, refused_files = (
-        r"(?i)errno|__|error|object|index|none|char \d|argument|expect|\bkey\b|codec",
-        set(),
-    )
+    python, named = (r"(?i)errno|__|error|object|index|none|char \d|argument|expect|\bkey\b|codec", set())
     for file in sorted(path for path in tmp_path.rglob("*") if path.is_file() and path.name[0] != "."):
         whole, root = file.read_bytes(), tmp_path / file.relative_to(tmp_path).parts[0]
         _ = file.unlink() if left is None else file.write_bytes(whole[:left])
@@ -332,6 +329,6 @@ def test_whatever_becomes_of_a_file_the_error_names_it(left, runs, unpictured, t
             except IdesignError as error:
                 said = str(error).replace(str(tmp_path), "")
                 assert (file.name in said, re.search(python, said)) == (True, None)
-                refused_files.add(file.name)
+                named.add(file.name)
         file.write_bytes(whole)
-    assert refused_files >= {"result.json", "spec.yaml", "sweep.csv", "sweep.json", "figures.json"}
+    assert named >= {"result.json", "spec.yaml", "sweep.csv", "sweep.json", "figures.json"}
