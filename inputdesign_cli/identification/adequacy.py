@@ -31,8 +31,6 @@ _GROWTH = 1.35
 _FARTHEST = 400
 _AHEAD = 20
 _TRENDS, _WAVES = 3, 4
-# Deviations of a correlation: of past residuals that parameters explain up to less, nothing is known.
-_LEFT = 2.0
 # At most one direction per this number of residuals is tried.
 _SAMPLES_A_DIRECTION = 8
 
@@ -97,15 +95,12 @@ def score(white: White, columns: Array, means: Array) -> Score:
     regressors = white.unexplained(columns / norms)
     scores, mean = regressors.T @ white.residuals, white.mean_left(columns / norms, means / norms)
     left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
-    kept, expected = sizes > DEPENDENT, right @ mean
-    if np.any(means):
-        # They are right to first order: where parameters explain almost all, the second order is as large.
-        kept &= sizes >= np.minimum(sizes[0], _LEFT / np.sqrt(len(white.residuals)))
-    else:
-        # A mean that comes of the parameters alone is of first order. Where it exceeds the deviation of the
-        # score, too little of the regressors is left for it to hold.
-        expected[np.abs(expected) > np.sqrt(white.variance) * sizes] = 0.0
-    along = (right @ scores - expected)[kept] / sizes[kept]
+    kept, expected, along = sizes > DEPENDENT, right @ mean, right @ scores
+    # The part of a mean that comes of the parameters is right to first order. Where it exceeds the deviation
+    # of the score, too little of the regressors is left: nothing is known if the mean has another part.
+    coarse = np.abs(right @ (mean - means / norms)) > np.sqrt(white.variance) * sizes
+    expected[coarse] = along[coarse] if np.any(means) else 0.0
+    along = (along - expected)[kept] / sizes[kept]
     return Score(
         float(np.sum(along**2)) / white.variance,
         left[:, kept],
