@@ -89,12 +89,17 @@ def from_nominal(
     order = _nearest_order(nominal, estimate.theta, of_plant.tolist())
     values = nominal.theta[order]
     away = (values - estimate.theta)[of_plant]
+    # Other minima explain the data nearly as well: the nearest of them counts.
+    others = [(one.excess, (values - one.theta)[of_plant]) for one in estimate.search.rivals]
     covariance = estimate.covariance
     if nominal_covariance is not None:
         covariance = covariance + nominal_covariance[np.ix_(order, order)]
     scale = np.sqrt(np.diag(covariance))[of_plant]
     correlation = covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
-    statistic = float((away / scale) @ np.linalg.lstsq(correlation, away / scale, rcond=None)[0])
+    statistic = min(
+        excess + float((x / scale) @ np.linalg.lstsq(correlation, x / scale, rcond=None)[0])
+        for excess, x in [(0.0, away), *others]
+    )
     apart = [one for error in errors for one in _apart(units, nominal, estimated, error, information, asked)]
     share, place, _ = max(apart, default=(0.0, "", False))
     deviations = np.abs(away) / scale

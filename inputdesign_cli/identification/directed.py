@@ -190,7 +190,8 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
     """Return the larger model that a search from here finds, and -2 log of the likelihood ratio.
 
     Both costs are with the unknown starts of the larger structure; that without the parameter is by one
-    step of Gauss and Newton from here.
+    step of Gauss and Newton from here. Where the parameter adds unknown starts, costs cannot be compared:
+    the ratio is zero.
     """
     theta: Array = model.theta
     found = minimise(RecordProblem((records,)), theta[None])
@@ -198,7 +199,8 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
     slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
     cost = point.cost - float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
     ratio = float(point.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
-    return model.at(found.theta[0]), ratio
+    alike = evaluate(records, found.theta[0]).unknowns == point.unknowns
+    return model.at(found.theta[0]), ratio if alike else 0.0
 
 
 @dataclass(frozen=True)

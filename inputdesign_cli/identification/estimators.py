@@ -213,8 +213,17 @@ def identify(
         return search(records, points, starts=begin.tried + (earlier is not None))
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
-    best = from_rest_or_free(records, False if ramp else rest, searched, start)
-    return concluded(best, parts, step, experiments=experiments or (len(outputs),), feedback=feedback)
+
+    def estimated(rest: bool | None, about: Array | None) -> Estimate:
+        best = from_rest_or_free(records, rest, searched, about)
+        return concluded(best, parts, step, experiments=experiments or (len(outputs),), feedback=feedback)
+
+    found = estimated(False if ramp else rest, start)
+    if rest is None and len(parts) > 1 and not found.start.free and found.tests.failed:
+        # Few records that do not begin at rest are lost among the unknowns of many.
+        free = estimated(False, found.theta)
+        return found if free.tests.failed else free
+    return found
 
 
 def with_larger_noise(

@@ -19,11 +19,24 @@ noise: {{variance: 1}}
 """
 
 
+def estimate_of(theta, names, rivals=()):
+    """An estimate with deviations of one, and with other minima: their excess, and their parameters."""
+    search = SimpleNamespace(rivals=[SimpleNamespace(excess=excess, theta=x) for excess, x in rivals])
+    return SimpleNamespace(theta=theta, covariance=np.eye(theta.size), names=names, search=search)
+
+
 @pytest.mark.parametrize(("lags", "deviations"), [((30.0, 4.0), 0.0), ((4.0, 30.0), 0.0), ((30.0, 9.0), 5.0)])
 def test_lags_that_changed_their_names_are_no_other_plant(lags, deviations):
     estimated = stated(TWO_LAGS.format(4.0, 30.0))
-    covariance = np.eye(estimated.theta.size)
-    estimate = SimpleNamespace(theta=estimated.theta, covariance=covariance, names=estimated.names)
-    found = from_nominal(UNITS, stated(TWO_LAGS.format(*lags)), estimated, estimate, [], covariance)
+    estimate = estimate_of(estimated.theta, estimated.names)
+    found = from_nominal(UNITS, stated(TWO_LAGS.format(*lags)), estimated, estimate, [], estimate.covariance)
     assert found.nominal.deviations == pytest.approx(deviations)
     assert bool(found.listed) == (deviations > 4.0)
+
+
+@pytest.mark.parametrize(("excess", "statistic"), [(0.2, 0.2), (6.0, 6.0), (50.0, 25.0)])
+def test_another_minimum_at_the_plant_of_the_spec_counts(excess, statistic):
+    nominal, estimated = (stated(TWO_LAGS.format(lag, 30.0)) for lag in (4.0, 9.0))
+    estimate = estimate_of(estimated.theta, estimated.names, [(excess, nominal.theta)])
+    found = from_nominal(UNITS, nominal, estimated, estimate, [], estimate.covariance)
+    assert found.nominal.statistic == pytest.approx(statistic)

@@ -299,3 +299,19 @@ def test_the_smallest_noise_is_taken_and_of_equal_ones_the_likeliest(coloured, p
         return SimpleNamespace(errors=power * errors, tests=tests, search=search), number
 
     assert with_larger_noise(first, estimated) == taken
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [9, 2, 3, 4, 7])
+def test_short_records_that_begin_anywhere_do_not_refute_their_model(seed):
+    """An F test of all starts keeps them at rest, as many unknowns explain little each."""
+    rng, parts = np.random.default_rng(seed), []
+    for _ in range(12):
+        u, e = np.repeat(rng.choice([-1.0, 1.0], 87), 4), 0.2 * rng.standard_normal(348)
+        plant = 0.7 * scipy.signal.lfilter([0, 0, 0, 0, 0.12, 0.07], [1.0, -0.905], u)
+        parts.append(np.stack([u, plant + scipy.signal.lfilter([1.0, 0.4], [1.0, -0.8], e)])[:, -50:])
+    u, y = np.concatenate(parts, axis=1)
+    B, one = np.array([0.0, 0.0, 0.0, 0.0, 0.084, 0.049]), np.ones(1)
+    F, C, D = (np.array([1.0, x]) for x in (-0.905, 0.4, -0.8))
+    model = PolynomialModel(((B,),), (one,), ((F,),), (C,), (D,), np.eye(1))
+    assert not identify(model, u[:, None], y[:, None], lengths=(50,) * 12).tests.failed

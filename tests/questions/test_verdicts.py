@@ -154,6 +154,7 @@ def test_a_far_estimate_contradicts_the_spec_by_its_statistic_where_something_is
     nominal = build_model(parse_spec("plant: {B: [0, 1], F: [1, -0.7]}\n", design=False))
     theta, covariance = nominal.theta + np.array([2.0, 0.0]), (2.0 / deviations) ** 2 * np.eye(2)
     estimate = SimpleNamespace(theta=theta, covariance=covariance, names=["b1", "f1"])
+    estimate.search = SimpleNamespace(rivals=())
     error = SimpleNamespace(
         grid=np.array([0.1]),
         entry=None,
