@@ -243,18 +243,18 @@ def _searched(request: RecordRequest, design: Design, record: Record) -> Record:
     """Return the best record of a few levels that a search finds, at the level that it needs."""
     search = level_search(request, design)
     samples = search.best(record.samples)
-    found = of_samples(search, record, samples)
+    found = of_samples(request, search, record, samples)
     kept = _few_moves(request.bounds, record)
     if design.problem.goal == "factor" or found.worst_ratio > MET:
         if kept and record.worst_ratio <= found.worst_ratio:
             return record
         return replace(found, met=design.problem.goal == "factor")
     if not request.bounds.quantisers:
-        level = least_level(lambda level: of_samples(search, record, level * samples).worst_ratio, 1.0)
-        found = of_samples(search, record, min(level, 1.0) * samples)
-    extra = search.cost(found.samples) / design_cost(design, request.cost) - 1.0
-    cheaper = not (kept and record.met) or extra < record.extra_power
-    return replace(found, extra_power=extra, met=True) if cheaper else record
+        of_level = partial(of_samples, request, search, record)
+        level = least_level(lambda level: of_level(level * samples).worst_ratio, 1.0)
+        found = of_level(min(level, 1.0) * samples)
+    cheaper = not (kept and record.met) or found.extra_power < record.extra_power
+    return replace(found, met=True) if cheaper else record
 
 
 def _few_moves(bounds: Bounds, record: Record) -> bool:
@@ -262,12 +262,13 @@ def _few_moves(bounds: Bounds, record: Record) -> bool:
     return bounds.shares(record.samples).get("moves", 0.0) <= MET
 
 
-def of_samples(search: LevelSearch, record: Record, samples: Array) -> Record:
-    """Return a record with the samples (n, r) that a search has found, and their worst ratio."""
+def of_samples(request: RecordRequest, search: LevelSearch, record: Record, samples: Array) -> Record:
+    """Return a record with the samples (n, r) that a search has found, their worst ratio and cost."""
     scores = [_score(scenario.requirements) for scenario in search.design.problem.scenarios]
     each = zip(search.plants(len(samples)), scores, strict=True)
     worst = max(ratio_at(plant, score, samples) for plant, score in each)
-    return replace(record, samples=samples, worst_ratio=worst)
+    extra = search.cost(samples) / design_cost(search.design, request.cost) - 1.0
+    return replace(record, samples=samples, worst_ratio=worst, extra_power=extra)
 
 
 def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:

@@ -242,7 +242,8 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
     if request.samples is not None or not searches(design, made.request.settings):
         return made
     search = level_search(made.request, design)
-    return replace(made, record=of_samples(search, made.record, search.shortest(made.record.samples)))
+    shortest = search.shortest(made.record.samples)
+    return replace(made, record=of_samples(made.request, search, made.record, shortest))
 
 
 def _first_fitting(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:
