@@ -52,8 +52,10 @@ def figure(results: Results, name: str) -> Figure:
     """Return a figure of a run, by its name ("bound"), as a matplotlib object to show or change.
 
     Raises:
-        KeyError: the run has no such figure.
+        ValueError: the run has no such figure.
     """
+    if name not in results.curves:
+        raise ValueError(f"this run has no figure {name!r}: there are {', '.join(results.curves) or 'none'}")
     return painted(painter(results.curves[name], results.time_unit))
 
 

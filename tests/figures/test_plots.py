@@ -292,6 +292,12 @@ def test_every_amplitude_of_a_trade_is_drawn():
     assert apart(list(drawn.values()))
 
 
+def test_a_figure_that_a_run_lacks_is_refused_with_the_names_of_the_others():
+    results = Results(typed({}), "", curves={name: CURVES[name] for name in ("bound", "signal")})
+    with pytest.raises(ValueError, match=r"'foo'.*bound, signal"):
+        figure(results, "foo")
+
+
 def test_the_sign_of_every_gain_is_seen(page):
     """Of G and of -G the magnitudes are the same, and the phases are half a turn apart."""
     panels = tuple(
