@@ -42,6 +42,12 @@ def solve(
         message = "--trade needs a spec on disc and a directory to write, and does not go with --keep-partial"
         raise typer.BadParameter(message)
     changes, came = changes.faster(fast), list[int]()
+    if trade:
+        with computing(spec, quiet=shown.quiet):
+            from inputdesign_cli.sweeps.plan import trade_plan
+
+            stated, words = read_spec(spec, changes), trade.split(",")
+            plan = trade_plan(spec, stated, words, changes.overrides or (), changes.confine)
     with ExitStack() as stack:
         if keep_partial:
             came = stack.enter_context(ending_early(stack.enter_context(stoppable())))
@@ -51,7 +57,7 @@ def solve(
         for line in instructions(results, str(place.directory / "spec.yaml")):  # with what `--set` changed
             typer.echo(line)
     if trade:
-        show_trade(spec, read_spec(spec, changes), trade.split(","), place.directory, changes, shown)
+        show_trade(plan, stated, words, place.directory, shown)
     if came:
         raise typer.Exit(128 + came[0])
 

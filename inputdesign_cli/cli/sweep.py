@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Shown, Workers
+from inputdesign_cli.cli.options import Shown, Workers
 from inputdesign_cli.cli.run import name_of, standard_input
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned, computing, status
 from inputdesign_cli.errors import STANDARD_STREAM
@@ -21,6 +21,7 @@ from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.specification import Spec
+    from inputdesign_cli.sweeps.plan import Plan
     from inputdesign_cli.sweeps.running import Listing, SweepRun
 
 
@@ -99,6 +100,8 @@ def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
             diagnostic = done.first_failure.diagnostics[0]
             lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
         lines.append(("files", str(done.directory)))
+        if done.replaced:
+            lines.append(("replaced", "the table of the same file with other values in the spec"))
         typer.echo("\n".join(aligned(lines, gap=3, wrap=True)))
     if done.statuses.get("error") or done.statuses.get("lost"):
         raise typer.Exit(EXIT_INTERNAL)
@@ -132,21 +135,18 @@ def pace(progress: SweepRun, seconds: float) -> str:
     return "  ".join(parts)
 
 
-def show_trade(
-    file: Path, spec: Spec, words: Sequence[str], run: Path, changes: Changes, shown: Shown
-) -> None:
+def show_trade(plan: Plan, spec: Spec, words: Sequence[str], run: Path, shown: Shown) -> None:
     """Sweep in a directory next to that of the run, draw the trade, and print its table."""
     quiet, directory = shown.quiet or shown.json_output, run.with_name(f"{run.name}-trade")
     file_type = shown.figure_format or spec.figures.format
     with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
         from inputdesign_cli.figures.sweep import draw_into, draw_trade
         from inputdesign_cli.figures.sweep_table import read_sweep
-        from inputdesign_cli.sweeps.plan import build_plan, trade_of, trade_settings
+        from inputdesign_cli.sweeps.plan import trade_of
         from inputdesign_cli.sweeps.running import SweepRun
 
-        settings = [*(changes.overrides or []), *trade_settings(spec, words)]
         SweepRun(
-            build_plan(file, settings, confine=changes.confine),
+            plan,
             directory,
             Workers(jobs=0).executor(quiet=quiet),
             figure_format=file_type,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from inputdesign_cli.cli.applying import instructions
-from inputdesign_cli.cli.options import TRADED, Changes, Into, Shown, refuse_existing
+from inputdesign_cli.cli.options import TRADED, Into, Shown, refuse_existing
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain, computing, status
 from inputdesign_cli.errors import OutputError, SpecError
@@ -89,9 +89,11 @@ def wizard(
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     with computing(file, quiet=quiet):
         from inputdesign_cli import load_spec, questions
+        from inputdesign_cli.sweeps.plan import trade_plan
         from inputdesign_cli.wizard.solving import verdict
 
         spec = load_spec(file)
+        plan = trade_plan(file, spec, TRADED, (), None) if trade else None
         results = questions.solve(spec)
     # Specs of the same name in several folders have runs of their own.
     name = f"{file.parent.name}_{file.stem}" if file.parent.name else file.stem
@@ -103,10 +105,10 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
         if not quiet:
             lines = ["", *found, *instructions(results, str(file)), f"files: {place.directory}"]
             typer.echo("\n".join(lines))
-    if trade:
+    if plan is not None:
         from inputdesign_cli.cli.sweep import show_trade
 
-        show_trade(file, spec, TRADED, place.directory, Changes(), Shown(quiet=quiet))
+        show_trade(plan, spec, TRADED, place.directory, Shown(quiet=quiet))
 
 
 def _result(spec: Spec) -> Result:

@@ -10,7 +10,7 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -112,14 +112,20 @@ def parse_settings(settings: Settings) -> tuple[list[str], list[SweepAxis]]:
     return fixed, list(axes.values())
 
 
-def build_grid(block: Sweep | None, axes: Sequence[SweepAxis], *, zipped: bool) -> Grid:
+def build_grid(
+    block: Sweep | None, axes: Sequence[SweepAxis], *, zipped: bool, single: Collection[str] = ()
+) -> Grid:
     """Return the grid of the spec's `sweep` block; axes of the command line replace or join them.
 
+    Args:
+        single: keys with one value on the command line, which are no axes.
+
     Raises:
-        SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`.
+        SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`, `sweep-twice`.
     """
     stated = {} if block is None else block.set
     merged = {key: SweepAxis(key, tuple(map(_text, values))) for key, values in stated.items()}
+    merged = {key: axis for key, axis in merged.items() if key not in single}
     merged |= {axis.key: axis for axis in axes}
     grid = Grid(tuple(merged.values()), zipped or (block is not None and block.zip))
     if not merged:
@@ -127,9 +133,11 @@ def build_grid(block: Sweep | None, axes: Sequence[SweepAxis], *, zipped: bool) 
         hint = "write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5"
         raise bad_spec("sweep-empty", message, hint=hint)
     for key in merged:
-        if inner := next((one for one in merged if one.startswith(f"{key}.")), None):
-            message = f"{inner} is swept, and so is {key}, which holds it"
-            raise bad_spec("sweep-twice", message, hint="sweep keys that do not overlap", key=key)
+        # A value inside a block that is swept would be lost: each point states the whole block.
+        within = (f"{key}.", f"{key}[")
+        if inner := next((one for one in (*merged, *single) if one.startswith(within)), None):
+            message = f"{key} is swept, and {inner}, which it holds, has values of its own"
+            raise bad_spec("sweep-twice", message, hint="leave one of them out", key=key)
     lengths = {axis.key: len(axis.values) for axis in grid.axes}
     if grid.zipped and len(set(lengths.values())) > 1:
         listed = ", ".join(f"{key} has {n}" for key, n in lengths.items())
@@ -248,10 +256,11 @@ class Plan:
             environment=environment(),
         )
 
-    def check_place(self, made_from: Sequence[str], root: Path) -> None:
+    def check_place(self, made_from: Sequence[str], root: Path) -> bool:
         """Refuse a directory with the sweep of another spec, of other keys, or of another command.
 
         The same spec file, or a spec that says the same, may go on with other values of the same keys.
+        Return whether the file said something else then.
 
         Raises:
             OutputError: `output-other-run`.
@@ -259,17 +268,18 @@ class Plan:
         try:
             there = read_content(root)
         except (OSError, ValueError, RecursionError):
-            return  # a sweep that was killed at its very start left nothing to compare
+            return False  # a sweep that was killed at its very start left nothing to compare
+        edited = there.asked_sha256 != digest(to_yaml(self.base))
         ours, keys = ([axis.key for axis in axes] for axes in (self.grid.axes, there.axes))
         same_file = there.made_from == tuple(made_from) != (STANDARD_STREAM,)
         if there.verb != self.verb:
             what = f"the command {there.verb}, not {self.verb}"
         elif set(keys) != set(ours):
             what = f"{', '.join(keys)}, not {', '.join(ours)}"
-        elif not same_file and there.asked_sha256 != digest(to_yaml(self.base)):
+        elif edited and not same_file:
             what = "another spec" + (f" ({there.made_from[0]} as seen from there)" if there.made_from else "")
         else:
-            return
+            return edited
         raise OutputError.because(
             "output-other-run",
             f"{root} holds the sweep of {what}, and would lose its table",
@@ -285,11 +295,13 @@ def build_plan(
     verb: Verb = "solve",
     confine: Path | None = None,
     text: str | None = None,
+    overrides: Sequence[str] = (),
 ) -> Plan:
     """Build the plan of a sweep from a spec and from settings as of `parse_settings`.
 
     Args:
         spec: the file, or with `text` where it would lie.
+        overrides: changes of the spec itself; settings may give other values to the same keys.
         confine: the folder outside of which the spec may name no files.
         text: the text of the spec, where it is in no file.
 
@@ -300,9 +312,10 @@ def build_plan(
         hint = "sweep with --verb solve"
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
-    draft = read_template(spec, fixed, confine=confine, text=text)
+    draft = read_template(spec, [*overrides, *fixed], confine=confine, text=text)
     source = Path(STANDARD_STREAM) if text is not None else spec
-    grid, first = build_grid(draft.sweep(), axes, zipped=zipped), None
+    single = [setting.partition("=")[0].strip() for setting in fixed]
+    grid, first = build_grid(draft.sweep(), axes, zipped=zipped, single=single), None
     # What is wrong as a whole (a misspelt key) is refused, rather than fail in every point.
     for index in dict.fromkeys(i * (len(grid) - 1) // _TRIED for i in range(_TRIED + 1)):
         try:
@@ -315,18 +328,33 @@ def build_plan(
     raise first
 
 
-def trade_settings(spec: Spec, words: Sequence[str]) -> list[str]:
-    """Return the settings of `sweep` for the best accuracy at several lengths and amplitudes.
+def trade_plan(
+    file: Path, spec: Spec, words: Sequence[str], overrides: Sequence[str], confine: Path | None
+) -> Plan:
+    """Return the plan of a sweep for the best accuracy at several lengths and amplitudes.
 
     Args:
+        file: that of the spec, as `overrides` and `confine`.
         spec: the experiment, tried at a quarter to twice its length and half to twice its amplitude.
         words: "samples", "amplitude" or both.
 
     Raises:
-        SpecError: `needs-limits` where an amplitude is to be varied that is not limited.
+        SpecError: `--trade` cannot be done: `needs-limits` where nothing limits the power or the amplitude.
     """
+    try:
+        return build_plan(file, _trade_settings(spec, words), confine=confine, overrides=overrides)
+    except SpecError as error:
+        (found, *_) = error.diagnostics
+        message = f"--trade looks for the best accuracy: {found.message}"
+        hint = f"{found.hint}, or " * (found.code == "needs-limits") + "leave out --trade"
+        # The user has typed no setting of the trade: the key counts, not its place in them.
+        raise spec.complain(found.code, message, hint=hint, key=found.key) from error
+
+
+def _trade_settings(spec: Spec, words: Sequence[str]) -> list[str]:
     lengths = ("limits.samples", "limits.duration", "signal.samples", "experiment.duration")
-    settings = {"objective": "best_accuracy", "solver.any_spectrum": "false"} | dict.fromkeys(lengths, "null")
+    settings = {"objective": "best_accuracy", "solver.any_spectrum": "false"}
+    settings |= dict.fromkeys((*lengths, "sweep"), "null")
     shares = _LENGTHS if "samples" in words else (1.0,)
     counts = dict.fromkeys(max(round(share * spec.experiment.samples), 1) for share in shares)
     settings["experiment.samples"] = ",".join(map(str, counts))
@@ -334,7 +362,7 @@ def trade_settings(spec: Spec, words: Sequence[str]) -> list[str]:
         stated = spec.limits.amplitude
         if stated is None or stated.input is None:
             message = "amplitude is to be traded, but no amplitude is limited"
-            raise bad_spec("needs-limits", message, hint="add limits.amplitude", key="limits")
+            raise bad_spec("needs-limits", message, hint="add limits.amplitude.input", key="limits")
         texts = [json.dumps((share * np.array(stated.input)).tolist()) for share in _AMPLITUDES]
         settings["limits.amplitude" if stated.output is None else "limits.amplitude.input"] = ",".join(texts)
     return [f"{key}={value}" for key, value in settings.items()]

@@ -135,6 +135,7 @@ class SweepRun:
         statuses: the number of points of each status, once it has run; `files` that were written then.
         passed: points that were done before or are now; `computed` and `failed` count in this call.
         damaged: why points of an earlier call were computed again.
+        replaced: whether the table there was of the same file with other values in the spec.
     """
 
     plan: Plan
@@ -154,6 +155,7 @@ class SweepRun:
     computed: int = field(default=0, init=False)
     failed: int = field(default=0, init=False)
     damaged: list[str] = field(default_factory=list, init=False)
+    replaced: bool = field(default=False, init=False)
     first_failure: IdesignError | None = field(default=None, init=False)
 
     @property
@@ -177,7 +179,7 @@ class SweepRun:
         with points.opened(directory) as self.layout:
             made_from = Origin([plan.source]).seen_from(Path(os.path.realpath(directory)))
             if not self.overwrite:
-                plan.check_place(made_from, directory)
+                self.replaced = plan.check_place(made_from, directory)
             if is_page(directory / PAGE):  # it is about what the sweep was before
                 (directory / PAGE).unlink()
             replace_text(directory / points.SUMMARY, json_text(plan.summary(made_from, {})))

@@ -203,6 +203,10 @@ def test_a_trade_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):
     for words in ("colour", "", "samples,"):
         code, _, err = run("solve", "small.yaml", "--trade", words)
         assert (code, "neither samples nor amplitude" in err) == (2, True)
+    (tmp_path / "free.yaml").write_text(spec.replace("limits: {amplitude: 2}\n", ""))
+    code, _, err = run("solve", "free.yaml", "--trade", "samples")
+    assert (code, "error[needs-limits] --trade" in err) == (2, True)
+    assert not (tmp_path / "runs" / "free").exists()
     drawn = {path.name for path in (tmp_path / "runs" / "small-trade").iterdir() if path.stem != "sweep"}
     assert {"trade.svg", "curves.svg"} <= drawn
     assert not any(name.endswith((".png", ".pdf")) for name in drawn)

@@ -108,15 +108,17 @@ def test_a_damaged_point_that_is_not_reached_has_no_row(spec, stub, tmp_path):
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize("change", ["spec", "keys", "more keys", "verb"])
+@pytest.mark.parametrize("change", ["spec", "title", "keys", "more keys", "verb"])
 def test_another_sweep_does_not_take_the_place_of_one(change, spec, stub, tmp_path):
     out = tmp_path / "out"
     run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     other = tmp_path / "other.yaml"
-    other.write_text(spec.read_text().replace("variance: 1", "variance: 2"))
+    changes = ("small", "large") if change == "title" else ("variance: 1", "variance: 2")
+    other.write_text(spec.read_text().replace(*changes))
     before = {name: (out / name).read_bytes() for name in ("sweep.csv", "sweep.yaml", "sweep.json")}
     arguments = {
         "spec": {"spec": other},
+        "title": {"spec": other},
         "keys": {"settings": ["spectrum.order=0,1"]},
         "more keys": {"settings": ["experiment.samples=10,20", "spectrum.order=0,1"]},
         "verb": {"verb": "analyse"},
@@ -137,7 +139,9 @@ def test_the_same_spec_goes_on_under_another_name_and_when_it_was_edited(spec, s
     shutil.copy(spec, copy)
     assert run_sweep(copy, ["experiment.samples=10,20,30"], directory=out).computed == 1
     copy.write_text(copy.read_text().replace("variance: 1", "variance: 2"))
-    assert run_sweep(copy, ["experiment.samples=10,20,30"], directory=out).computed == 3
+    for computed, replaced in ((3, True), (0, False)):
+        done = run_sweep(copy, ["experiment.samples=10,20,30"], directory=out)
+        assert (done.computed, done.replaced) == (computed, replaced)
 
 
 def command(spec, out, points):

@@ -7,6 +7,7 @@ import multiprocessing
 import pkgutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas
@@ -18,7 +19,7 @@ from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, Diagnostic, InfeasibleError, OutputError
 from inputdesign_cli.figures.sweep_table import SweepAxis, read_sweep
 from inputdesign_cli.specification import Sweep
-from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings
+from inputdesign_cli.sweeps.plan import Grid, build_grid, build_plan, parse_settings, trade_plan
 from inputdesign_cli.sweeps.points import Layout
 from inputdesign_cli.sweeps.running import row_of, scalars, table_lines
 from tests.support.processes import running
@@ -276,6 +277,7 @@ def test_values_of_a_setting(setting, values):
      ("a=0:1:1e-9", "bad-range"), ("a=nan:4:1", "bad-range"), ("a=0:.inf:1", "bad-range"),
      ("a=0:4:-Infinity", "bad-range"), ("a=1,,2", "bad-override"), ("a=1,2 a=3,4", "sweep-twice"),
      ("", "sweep-empty"), ("a=5", "sweep-empty"), ("title=x,y experiment.samples=1,2,3", "sweep-lengths"),
+     ('noise={"variance":1},{"variance":2} noise.variance=3', "sweep-twice"),
      ("title=0:1000:1 experiment.samples=1:1000:1", "sweep-too-large"), ("spectrum.ordr=1,2", "unknown-key"),
      ("verb=divine", "not-supported")],
 )  # fmt: skip
@@ -306,6 +308,20 @@ def test_the_block_of_a_spec_and_the_command_line():
     found = {axis.key: axis.values for axis in replaced.axes}
     assert found == {"a": ("7", "8"), "b": ("0", "0.1", "0.2"), "c": ("x", "y")}
     assert build_grid(Sweep.model_validate(grid.block()), [], zipped=False) == grid
+    text = SPEC + "sweep: {set: {spectrum.order: '2:4:2', experiment.samples: [10, 20]}}\n"
+    plan = build_plan(Path("x.yaml"), ["spectrum.order=3"], text=text)
+    assert plan.grid.axes == (SweepAxis("experiment.samples", ("10", "20")),)
+    assert plan.draft.spec(plan.grid.overrides(0)).spectrum.order == 3
+
+
+def test_a_trade_starts_from_the_changed_spec_and_pays_no_attention_to_its_sweep(tmp_path):
+    file, changes = tmp_path / "x.yaml", ["experiment.samples=8", "limits.input_power=1"]
+    file.write_text(SPEC + "sweep: {set: {spectrum.order: [2, 4]}}\n")
+    plan = trade_plan(file, load_spec(file, changes), ["samples"], changes, None)
+    assert plan.grid.axes == (SweepAxis("experiment.samples", ("2", "4", "8", "16")),)
+    for words in (["samples"], ["amplitude"]):
+        (found,) = refused(trade_plan, file, load_spec(file), words, (), None)
+        assert (found.code, found.key, found.location.file) == ("needs-limits", "limits", str(file))
 
 
 @pytest.mark.parametrize(
