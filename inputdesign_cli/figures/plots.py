@@ -52,10 +52,10 @@ def figure(results: Results, name: str) -> Figure:
     """Return a figure of a run, by its name ("bound"), as a matplotlib object to show or change.
 
     Raises:
-        ValueError: the run has no such figure.
+        KeyError: the run has no such figure; the message names all that it has.
     """
     if name not in results.curves:
-        raise ValueError(f"this run has no figure {name!r}: there are {', '.join(results.curves) or 'none'}")
+        raise KeyError(f"this run has no figure {name!r}: there are {', '.join(results.curves) or 'none'}")
     return painted(painter(results.curves[name], results.time_unit))
 
 

@@ -294,7 +294,7 @@ def test_every_amplitude_of_a_trade_is_drawn():
 
 def test_a_figure_that_a_run_lacks_is_refused_with_the_names_of_the_others():
     results = Results(typed({}), "", curves={name: CURVES[name] for name in ("bound", "signal")})
-    with pytest.raises(ValueError, match=r"'foo'.*bound, signal"):
+    with pytest.raises(KeyError, match=r"'foo'.*bound, signal"):
         figure(results, "foo")
 
 
