@@ -231,7 +231,7 @@ def proceed(
     directory: Path,
     data: Path | None = None,
     *,
-    withdraw: int | None = None,
+    withdraw: list[int] | None = None,
     as_applied: bool = False,
     regardless: bool = False,
     written: Written,
@@ -246,9 +246,9 @@ def proceed(
     the campaign goes on and when the data meet the target, and with 1 where it has ended without that. Exits
     with 5 where the data contradict the model or leave it open.
     """
-    if data is not None and withdraw is not None:
+    if data is not None and withdraw:
         raise typer.BadParameter("give a record, or withdraw one", param_hint="--withdraw")
-    if regardless and withdraw is not None:
+    if regardless and withdraw:
         raise typer.BadParameter("withdraw first, then say it without a record", param_hint="--regardless")
     with computing(directory, quiet=quiet):
         from inputdesign_cli import questions
@@ -259,10 +259,10 @@ def proceed(
 
     with held(directory):
         with computing(directory, quiet=quiet):
-            memory = read_memory(directory, withdrawing=withdraw)
+            memory = read_memory(directory, withdrawing=withdraw or ())
             stated = parse_spec(memory.spec, str(directory / SPEC), folder=memory.folder)
-            if withdraw is not None:
-                decide = partial(withdrawn, memory=memory, number=withdraw)
+            if withdraw:
+                decide = partial(withdrawn, memory=memory, numbers=sorted(set(withdraw)))
             else:
                 taken = replace(written.preparation(), operating_point=levels(operating_point))
                 decide = partial(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from inputdesign_cli.finding import DOUBT, NOTE, REFUTED, Finding, FindingKind, doubt, finding, note
+from inputdesign_cli.findings.places import argument
 
 PART_REPEATED = doubt(
     "part-repeated",
@@ -62,7 +64,8 @@ PART_BETWEEN_MINIMA = note(
     "well. The part excites the frequencies at which the two models differ.",
     "Apply the part.",
 )
-_NEARLY = 0.9  # a part of less than this share of its power is named
+NEARLY = 0.9
+"""A part of less than this share of its power is named."""
 
 
 @finding(NOTE, "record-withdrawn", "Nothing.")
@@ -146,10 +149,10 @@ def campaign_refuted(
         samples: applied, of at most `end`.
         records: the files that count.
     """
-    listed = " ".join(str(directory / name) for name in records)
+    listed = shlex.join(argument(str(directory / name)) for name in records)
     fact = f"see the other notes. {samples} of at most {end} samples were applied"
     remedy = f"Look for another structure with `idesign explore {listed}`, or continue with this one: "
-    remedy += f"`idesign next {directory} --regardless`."
+    remedy += f"`idesign next {shlex.quote(argument(str(directory)))} --regardless`."
     where, names = str(directory), list(records)
     return [kind.found(fact, where=where, remedy=remedy, samples=samples, end=end, records=names)]
 
@@ -171,16 +174,16 @@ def planned_otherwise(
         file: of the plan.
         why: the reason why there is no design; empty if there is one.
         capped: whether the plan meets less than is asked.
-        share: of its power that the part has.
+        share: power of the part over that of its plan.
         beyond: whether a sample costs more than the cap; it costs `part_cost`.
         fragile: whether a robust last part was wanted and not found.
         parts: whether it is to separate minima.
     """
-    percent, cost = f"{100 * share:.0f} % of the power of {file}", f"{part_cost:.4g} a sample"
+    percent, cost = f"{file} has {100 * share:.0f} % of the planned power", f"{part_cost:.4g} a sample"
     return [
         *PART_WITHOUT_DESIGN.when(why, why, where=file, why=why),
         *PLAN_CAPPED.when(capped, file, where=file),
-        *PART_SCALED.when(share < _NEARLY, percent, where=file, share=share),
+        *PART_SCALED.when(share < NEARLY, percent, where=file, share=share),
         *EARLIER_PARTS_COST.when(beyond, cost, where=file, cost=part_cost),
         *PART_NOT_ROBUST.when(fragile, file, where=file),
         *PART_BETWEEN_MINIMA.when(parts, file, where=file),

@@ -33,7 +33,7 @@ def explored_structures(log: Record, found: Found, loops: Sequence[tuple[int, fl
     ]
 
 
-@finding(NOTE, "structure-chosen", "Nothing; structures.png compares the structures.")
+@finding(NOTE, "structure-chosen", "Nothing; `exploration` in result.json compares the structures.")
 def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
     """A structure was chosen. Of structures that explain unseen data as well, the simplest wins."""
     said = []

@@ -49,7 +49,7 @@ BIASED = doubt(
 )
 
 
-@finding(NOTE, "response-without-model", "Compare it with the model in `frequency_response.png`.")
+@finding(NOTE, "response-without-model", "Compare it with the model in `frequency_response.csv`.")
 def response_note(kind: FindingKind, of: MeasuredLines) -> list[Finding]:
     """The frequency response was measured without a model. Even a right model misses 5 % of the discs."""
     outside, by = of.model_outside or 0.0, ", measured from the reference r" * (of.excitation == "r")

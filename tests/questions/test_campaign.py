@@ -122,6 +122,13 @@ def test_a_plan_that_ends_with_its_part_is_made_for_what_the_data_leave_open():
         assert plan.kind == last
         costs[last] = plan.cost
     assert costs["robust"] > costs["nominal"]
+    # A plan beyond the cap gets longer, and what follows its part may still be robust.
+    rules = build_rules(spec.with_(**{"campaign.power_cap": 1.0}))
+    plans = [at.plan(rules, known, 150, 5, cap) for cap in (sum(costs.values()) / 2, costs["nominal"] / 2)]
+    assert [(plan.kind, len(plan.record) > plan.take, plan.fragile) for plan in plans] == [
+        ("nominal", False, True),
+        ("nominal", True, False),
+    ]
 
 
 COLOURED = """

@@ -266,7 +266,7 @@ def _due(memory: Memory, given: str, table: Table) -> PlannedPart:
             "campaign-over",
             f"the campaign in {memory.directory} has ended: {campaign.state}",
             hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; "
-            "where tests refute the structure, --regardless without a record goes on as it is",
+            "where the data contradict the model, --regardless without a record goes on as it is",
         )
     for known in campaign.records:
         if memory.files[known.file] == csv_text(table).encode():

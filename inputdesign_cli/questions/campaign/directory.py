@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -23,11 +24,13 @@ from inputdesign_cli.findings.campaigns import (
     withdrawn_record,
 )
 from inputdesign_cli.findings.other_systems import contradictions, differences
+from inputdesign_cli.findings.places import argument
 from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PlannedPart, Round, State
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
 from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.run_files import SPEC
 from inputdesign_cli.outcome.text_formats import csv_text
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.assess import judge
@@ -90,7 +93,7 @@ def begun(task: Rounds, folder: Path, directory: Path) -> Results:
         rounds=(),
         digests={},
     )
-    return _decided(task, campaign, {}, Outcome(), judged(task, campaign, []))
+    return _decided(task, campaign, {}, Outcome(), judged(task, campaign, [], directory))
 
 
 def advanced(
@@ -107,7 +110,7 @@ def advanced(
     Args:
         given: the file of the user; `preparation`: what to do to it before.
         unlike: whether to take a record at another scale than its plan, like another plan, or like none.
-        regardless: whether to go on, from now on, where tests refute the structure.
+        regardless: whether to go on, from now on, where the data contradict the model.
 
     Raises:
         DataError: `campaign-over`; `data-repeated`, `record-copied`, `record-too-long`, `record-other-part`,
@@ -131,19 +134,22 @@ def advanced(
     return _again(task, memory, campaign, files, said, given)
 
 
-def withdrawn(task: Rounds, memory: Memory, number: int) -> Results:
-    """Return the results of the decision without a record, whose file stays; raise `record-unknown`."""
-    records = list(memory.campaign.records)
-    if not 1 <= number <= len(records) or records[number - 1].withdrawn:
-        left = [str(n) for n, record in enumerate(records, 1) if not record.withdrawn]
-        raise DataError.because(
-            "record-unknown",
-            f"there is no record {number} that could be withdrawn",
-            hint=f"the records that count are {', '.join(left)}" if left else "no record counts",
-        )
-    records[number - 1] = replace(records[number - 1], withdrawn=True)
+def withdrawn(task: Rounds, memory: Memory, numbers: Sequence[int]) -> Results:
+    """Return the results of the decision without some records, whose files stay; raise `record-unknown`."""
+    records, said = list(memory.campaign.records), Outcome()
+    left = [n for n, record in enumerate(records, 1) if not record.withdrawn]
+    for number in numbers:
+        if number not in left:
+            raise DataError.because(
+                "record-unknown",
+                f"there is no record {number} that could be withdrawn",
+                hint=f"the records that count are {', '.join(map(str, left))}"
+                if left
+                else "no record counts",
+            )
+        records[number - 1] = replace(records[number - 1], withdrawn=True)
+        said = said.saying(withdrawn_record(records[number - 1].file, number))
     campaign = replace(memory.campaign, records=tuple(records))
-    said = Outcome().saying(withdrawn_record(records[number - 1].file, number))
     return _again(task, memory, campaign, dict(memory.files), said)
 
 
@@ -171,7 +177,7 @@ def _again(
             return replace(one, message=renamed(one.message), location=place)
 
         try:
-            found = judged(task, campaign, [Path(folder, name) for name in counting])
+            found = judged(task, campaign, [Path(folder, name) for name in counting], memory.directory)
         except DataError as error:
             raise DataError([named(one) for one in error.diagnostics]) from error
     if found.refuted:
@@ -240,13 +246,13 @@ def _next_part(
     task: Rounds, campaign: Campaign, files: Mapping[str, bytes], found: Judged
 ) -> tuple[PlannedPart, Table, list[Finding]]:
     """Return the part to be applied next, its samples for signal.csv, and what is not as the spec asks."""
-    rules, done, number = task.rules, campaign.done, len(campaign.rounds) + 1
+    rules, done, number = task.rules, campaign.done, len(campaign.records) + 1
     units, seed = task.identification.header.units, rules.seed_of(number)
     applied = [signals_in(files[record.plan])[: record.samples] for record in campaign.records]
     before = np.concatenate(applied) - task.offsets if applied else None
     plan = task.planner.plan(rules, found.standing, done, seed, campaign.first_cost, before)
     part = PlannedPart(
-        file=f"plan_{len(campaign.records) + 1:02d}.csv",
+        file=f"plan_{number:02d}.csv",
         samples=plan.take,
         planned_samples=len(plan.record),
         power=plan.power,
@@ -267,7 +273,7 @@ def _next_part(
         share=plan.share,
         beyond=plan.beyond,
         part_cost=plan.part_cost,
-        fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal" and not plan.alone,
+        fragile=plan.fragile and plan.kind == "nominal",
         parts=plan.kind == "parting",
     )
     # The times of a part continue the times of the last one.
@@ -299,8 +305,11 @@ def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]
     }
 
 
-def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
+def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path], directory: Path) -> Judged:
     """Return how a campaign stands by the joint estimate of the records that count, and whether it ends.
+
+    Args:
+        paths: where the records are now; the `directory` keeps them under the same names.
 
     Raises:
         DataError: a record cannot be used.
@@ -313,6 +322,7 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
     try:
         taken = Preparation(operating_point=identification.operating_point)
         data = continued(read_data(paths, units, taken), units.sample_time)
+        data = replace(data, paths=tuple(str(directory / path.name) for path in paths))
         found = estimated(identification, data, paths[0], taken)
     except DataError as error:
         if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
@@ -341,13 +351,23 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path]) -> Judged:
     files, looks = [name for name, _ in data.files], rules.schedule.looks
     contradicted = bool(differences(estimate, files, looks) or contradictions(estimate, looks))
     # Faulty measurements can be mended, and users may go on as long as the data do not suffice.
-    ends = rules.refuted(estimate) and not mismeasured(identification, found)
-    ends = ends and (suffices or not campaign.regardless)
-    state = rules.state(done, verdict, refuted=contradicted or ends)
+    ends = contradicted or (rules.refuted(estimate) and not mismeasured(identification, found))
+    ends = ends and rules.stops and (suffices or not campaign.regardless)
+    state = rules.state(done, verdict, refuted=ends)
     if state == "running" and verdict == "undecided":
         findings += campaign_doubted()
     refuted = ends and done < rules.end and not (contradicted or campaign.regardless)
-    return Judged(state, stands, assessment.results, tuple(findings), refuted)
+    results = _naming(assessment.results, directory / SPEC)
+    return Judged(state, stands, results, tuple(findings), refuted)
+
+
+def _naming(results: Results, spec: Path) -> Results:
+    """Return an assessment whose next command names the spec."""
+    judged = results.outcome.assessment
+    if judged is None or judged.next is None:
+        return results
+    command = judged.next.replace(" SPEC ", f" {shlex.quote(argument(str(spec)))} ", 1)
+    return replace(results, outcome=replace(results.outcome, assessment=replace(judged, next=command)))
 
 
 def continued(data: Record, step: float) -> Record:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,11 +65,11 @@ class Memory:
         return self.directory / self.campaign.folder
 
 
-def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
+def read_memory(directory: Path, *, withdrawing: Collection[int] = ()) -> Memory:
     """Return the campaign in a directory.
 
     Args:
-        withdrawing: the number of a record that is about to be left out, whatever has become of it.
+        withdrawing: numbers of records that are about to be left out, whatever has become of them.
 
     Raises:
         DataError: `run-missing`, `run-incomplete`, `run-unreadable`; `campaign-missing`, it holds something
@@ -98,7 +98,7 @@ def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
         due = dict.fromkeys([RESULT, *(r.file for r in found.records), *(p.file for p in found.plans)], "")
         own = {SPEC: result.get("spec_sha256", ""), SIGNAL: result.get("signal_sha256")}
         known = due | dict(found.digests) | own
-        out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
+        out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n in withdrawing}
         now = {name: _sha256(content) for name, content in files.items()} | {RESULT: _decisions(campaign)}
         for name, digest in known.items():
             if digest is not None and name not in out and digest != now.get(name):

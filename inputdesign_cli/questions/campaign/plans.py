@@ -13,6 +13,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
+from inputdesign_cli.findings.campaigns import NEARLY
 from inputdesign_cli.findings.rivals import beyond
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
@@ -171,7 +172,9 @@ class Planner:
                 found = self._designed(model, replace(change, uncertainty="data"))
                 if found.cost <= cap * REACHED:
                     return found.planned
-        return self._affordable(model, change, cap, longest)
+        plan = self._affordable(model, change, cap, longest)
+        # A longer plan goes on after its first part, and a later part may be robust.
+        return replace(plan, fragile=robust and len(plan.record) - change.samples < self.block)
 
     def _pilot(self, rules: Rules, power: float, take: int, seed: int) -> Planned:
         """Return white noise of a power, even over the inputs."""
@@ -204,7 +207,7 @@ class Planner:
         record = more.samples[:take] + plan.record[:take]
         plant = FiniteRecord(experiment, take, self.step)
         u, y = (plant.signals(kind, record) for kind in ("input", "output"))
-        record /= max(1.0, *request.bounds.shares(u, y).values())
+        record /= max([1.0, *request.bounds.shares(u, y).values()])
         cost = self.cost_of(experiment, record)
         return replace(plan, record=record, power=power_of(record), cost=cost, kind="parting", claim=None)
 
@@ -269,7 +272,10 @@ class Planner:
         beyond = any(cost(at, applied) > most * REACHED for at, most in caps)
         record = np.concatenate([applied, plan.record[plan.take :]])
         part_cost = cost(caps[0][0], applied)
-        return replace(plan, record=record, share=scale**2, part_cost=part_cost, beyond=beyond)
+        # The samples of a part are stronger or weaker than those of its plan are on average.
+        weaker = scale**2 < NEARLY and plan.power > 0.0
+        share = power_of(applied) / plan.power if weaker else 1.0
+        return replace(plan, record=record, share=share, part_cost=part_cost, beyond=beyond)
 
     def cost_of(self, experiment: Experiment, record: Array, begin: int = 0) -> float:
         """Return the cost of a sample of a record (n, r), from the sample `begin` on, without any noise."""

@@ -86,7 +86,7 @@ class Rules:
     seed: int = 0  # of the signal, as the spec states it
 
     def seed_of(self, number: int) -> int:
-        """Return the seed of the record of the round with this number; each has its own."""
+        """Return the seed of the part with this number: each has its own, the same if it is planned again."""
         own = np.random.SeedSequence([self.seed, number])
         return int(own.generate_state(1)[0]) if self.seed else number
 
@@ -154,11 +154,13 @@ class Planned:
         capped: whether the cap or limits make it miss the accuracy that is asked.
         claim: returns what is proved of the design, whose first plan sets the cap; None for white noise.
         why: the reason why there is no design.
-        share: of its power that the next part has, which would cost more than the cap otherwise.
+        share: power of the next part over that of the plan, where it would cost more than the cap otherwise.
         part_cost: of a sample of the next part at the plant that it is planned for, with the effects of
             earlier parts.
         beyond: whether `part_cost` exceeds the cap, whatever is applied.
         alone: whether the part is planned without the data, which leave the model undecided.
+        fragile: whether a plan that ends with its part was to suffice at all plants that the data leave open,
+            and does at the estimate alone.
     """
 
     record: Array
@@ -173,6 +175,7 @@ class Planned:
     part_cost: float = 0.0
     beyond: bool = False
     alone: bool = False
+    fragile: bool = False
 
     @property
     def applied(self) -> Array:

@@ -92,6 +92,49 @@ def test_a_withdrawn_record_does_not_count_and_stays(taken, once, tmp_path):
     assert (code, "record-unknown" in err) == (2, True)
 
 
+def test_several_records_are_withdrawn_at_once(taken, once, tmp_path):
+    assert taken(applied(once, tmp_path / "r2.csv"))[0] == 0
+    code, result, _ = taken("--withdraw", 2, "--withdraw", 1)
+    gone = [one["figures"]["record"] for one in found(result, "record-withdrawn")]
+    assert (code, gone, result["campaign"]["rounds"][-1]["records"]) == (0, [1, 2], [])
+
+
+def test_what_is_decided_anew_by_the_same_data_plans_the_same_part(begun, taken, tmp_path):
+    """A plan may have been applied already."""
+    for number in (1, 2):
+        record, plan = applied(begun, tmp_path / f"r{number}.csv"), planned(begun)
+        assert taken()[0] == 0
+        assert np.allclose(planned(begun), plan, rtol=0.0, atol=1e-6)
+        assert taken(record)[0] == 0
+
+
+@pytest.mark.parametrize("never", [False, True])
+def test_records_that_differ_end_a_campaign_unless_it_goes_on(begin, taken, tmp_path, never):
+    directory, _, _ = begin("c", *(["campaign.stop=never"] * never))
+    assert taken(applied(directory, tmp_path / "a.csv"))[0] == 0
+    code, result, _ = taken(applied(directory, tmp_path / "b.csv", gain=-2.0, poles=(-0.5,)))
+    assert (code, result["assessment"]["next"].split()) == (
+        0 if never else 5,
+        ["idesign", "assess", "c/spec.yaml", "c/record_02.csv"],
+    )
+    assert found(result, "records-differ")
+    code, result, _ = taken("--regardless")
+    assert (code, result["status"]) == (0, "running")
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("cap", [0.2, 0.05])
+def test_the_power_of_a_part_is_compared_with_that_of_its_plan(begin, cap):
+    """A single part of the whole experiment lasts without data, so no robust plan is missed."""
+    directory, _, _ = begin("c", f"campaign.power_cap={cap}", "campaign.pilot=200", "campaign.block=200")
+    result = read_run(directory)
+    (weaker,), plan = found(result, "part-scaled"), result["campaign"]["rounds"][0]["plan"]
+    assert (
+        weaker["figures"]["share"] == pytest.approx(plan["part_power"] / plan["power"]) == pytest.approx(cap)
+    )
+    assert not found(result, "part-not-robust")
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize("scale", [0.5, 2.0, -1.0])
 def test_a_record_at_another_scale_is_refused(begun, taken, tmp_path, scale):

@@ -58,6 +58,8 @@ def test_the_part_tells_two_minima_apart(ratio):
     apart = [np.sum(predictions_apart(one, model.theta, other) ** 2) for one in white]
     assert told == pytest.approx(36.0, rel=0.35)
     assert told > np.mean(apart)
+    free = build_planner(parse_spec(COLOURED))  # without a limit
+    assert free.plan(rules, known, 140, 5, 1.0).kind == "parting"
     # Where tests alone leave it open, the part is planned as if without data.
     alone = at.plan(rules, Standing(model, known.information, 0.9, open=True), 140, 5, 1.0)
     assert (alone.kind, alone.alone) == ("nominal", True)
