@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 import yaml
+from threadpoolctl import threadpool_limits
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
@@ -382,9 +383,10 @@ def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
     Raises:
         InaccurateError: `beyond-precision`, `numerically-singular`.
     """
-    # Filters of warnings are common to all threads: one computes at a time.
+    # Filters of warnings are common to all threads: one computes at a time. Matrices are small: threads of
+    # the linear algebra would wait for each other.
     strict = np.errstate(over="raise", divide="raise", invalid="raise")
-    with _ALONE, strict, warnings.catch_warnings():
+    with _ALONE, strict, threadpool_limits(1, "blas"), warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         try:
             yield
