@@ -18,8 +18,6 @@ from inputdesign_cli.errors import IdesignError
 
 Answer = TypeVar("Answer")
 Seed = int | np.random.SeedSequence
-# A record that is drawn with the same seed must not return as the noise of a run.
-_OF_RUNS = 0x0B5
 
 
 def run_batches(
@@ -40,7 +38,7 @@ def run_batches(
     Raises:
         IdesignError: `worker-lost`; otherwise the errors of `function` and the executor.
     """
-    root = np.random.SeedSequence(seed, spawn_key=(_OF_RUNS,)) if isinstance(seed, int) else seed
+    root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
     batches = (
         (min(size, runs - start), np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index)))
         for index, start in enumerate(range(0, runs, size))

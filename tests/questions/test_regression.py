@@ -128,8 +128,8 @@ def test_estimates_are_least_squares():
     rng = np.random.default_rng(0)
     Phi, theta = rng.standard_normal((30, 4)), np.array([1.0, 2.0, 3.0, 4.0])
     regression = Regression(np.array([1.0, 0.0]), np.array([0.0, 1.0]), 1.0, 0.25)
-    found = run_experiments(regression, Phi, theta, runs=3, seed=np.random.SeedSequence(1))
-    noise = np.random.default_rng(np.random.SeedSequence(1).spawn(1)[0]).standard_normal((3, 30))
+    found = run_experiments(regression, Phi, theta, runs=3, seed=1)
+    noise = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(0,))).standard_normal((3, 30))
     for row, v in zip(found.theta, noise, strict=True):
         expected = np.linalg.lstsq(Phi[:, :2], Phi @ theta + 0.5 * v, rcond=None)[0]
         np.testing.assert_allclose(row, expected, rtol=1e-10)
