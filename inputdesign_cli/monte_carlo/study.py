@@ -16,7 +16,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.monte_carlo.batches import run_batches
+from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.plant import Model
 
@@ -129,7 +129,7 @@ def tried_on(
     excitation: Excitation,
     *,
     runs: int,
-    seed: int,
+    seed: Seed,
     step: float,
     executor: Executor | None = None,
 ) -> Trials:

@@ -35,6 +35,7 @@ from inputdesign_cli.questions.common.bound_curves import Informed
 from inputdesign_cli.questions.common.delivery import Delivered, with_study
 from inputdesign_cli.signal.kinds import kind_of
 
+_OF_RUNS = 0x0B5
 # Records that are searched from several starts, where those leave other minima.
 _SEARCHED = 10
 QUANTILES = (0.05, 0.5, 0.95)
@@ -210,7 +211,9 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     excitations = _excitations(plan, delivered, delivered.record)
     nominal = plan.nominal.with_samples(len(delivered.record))
     true = plan.on_truth(nominal, outcome.power.output or ())
-    trying = partial(tried_on, runs=plan.runs, seed=plan.seed, step=units.step, executor=executor)
+    # The children of its seed have drawn a record: they must not return as the noise that it meets.
+    seed = plan.seed if plan.renewed else np.random.SeedSequence(plan.seed, spawn_key=(_OF_RUNS,))
+    trying = partial(tried_on, runs=plan.runs, seed=seed, step=units.step, executor=executor)
     counted, simulated = outcome.samples, len(delivered.record)
     foretold = results.curves if counted == simulated else delivered.of_length(simulated)
     predicted = _predicted(plan, foretold, delivered.alpha, excitations[0].information(nominal))
