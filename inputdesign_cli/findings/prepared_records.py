@@ -23,7 +23,8 @@ JITTER_EVENED = note(
     "Times were made uniform. Outputs are interpolated linearly; inputs are held, so the nearest sample "
     "counts. Steps may differ by 25 % of the sample time, with `--resample` by more. A step beyond 1.5 "
     "sample times (3 with `--resample`) is a gap.",
-    "Nothing. Less jitter would give a more accurate estimate.",
+    "If only the written times jitter and the samples are regular, add `--columns time=none` and "
+    "`--sample-time`.",
 )
 INPUTS_MOVE_BETWEEN = doubt(
     "inputs-move-between-samples",
