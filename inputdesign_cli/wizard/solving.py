@@ -62,7 +62,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "sure": 100.0 * ((None if kept is None else kept.confidence) or DEFAULT_CONFIDENCE),
         "loop_kept": loop,
         "rivals": result.get("foreseen", {}).get("rivals"),
-        "few": _few(result),
+        "warnings": _warnings(result, "few-samples", "loop-moves-every-sample"),
     }
     return _said("verdict", facts, SECONDS[spec.time_unit])
 
@@ -82,9 +82,9 @@ def _scatter(result: Result) -> float:
     return max(1.0, float(foreseen.get("largest", 1.0)))
 
 
-def _few(result: Result) -> list[str]:
-    """Return the warning that errors of so short a record are larger than stated, if there is one."""
-    return [one["message"] for one in result.get("findings", ()) if one["code"] == "few-samples"]
+def _warnings(result: Result, *codes: str) -> list[str]:
+    """Return the messages of the findings with these codes."""
+    return [one["message"] for one in result.get("findings", ()) if one["code"] in codes]
 
 
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
@@ -105,7 +105,7 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
             result = solve(spec.with_(**changes))
         except IdesignError:
             result = {}
-        found, few = result.get("signal", {}).get("worst_ratio"), _few(result)
+        found, few = result.get("signal", {}).get("worst_ratio"), _warnings(result, "few-samples")
         if found is not None and (found := float(found) * _scatter(result)) <= 1.0 and not few:
             return int(result["signal"]["samples"])
         longer = _LONGER if found is None or few else float(np.clip(_ROOM * found**2, _ROOM, _LONGER))

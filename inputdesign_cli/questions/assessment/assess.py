@@ -19,7 +19,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import NOTE, Finding, reasons
 from inputdesign_cli.findings.designed_records import level_notes
-from inputdesign_cli.findings.designs import near_its_limit
+from inputdesign_cli.findings.designs import loop_not_held, near_its_limit
 from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal
 from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
@@ -114,6 +114,8 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
     first_of_all = leading(findings, found.estimate, found.data)
     against = {} if first_of_all is None else reasons(first_of_all.findings)
     verdict: Verdict = "undecided" if against else "met" if met else "missed"
+    if verdict != "undecided":
+        more += loop_not_held((one.loop for one in listed), task.hold)
     if verdict == "met":
         more += unseen(units, without)
     elif verdict == "missed":

@@ -65,6 +65,7 @@ def build_identification(spec: Spec) -> Identification:
         operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
+        hold=spec.signal.hold if isinstance(spec.signal.hold, int) else 1,
         controller=None
         if controller is None
         else controller_matrix(controller, spec.sample_time, (nominal.inputs, nominal.outputs)),

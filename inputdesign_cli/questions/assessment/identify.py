@@ -108,6 +108,7 @@ class Identification:
         operating_point: by channel, the levels in the spec that signals vary about.
         earlier: the prior as an estimate, which counts along; None if it has no values.
         has_prior: whether it states prior information.
+        hold: the samples for which a designed record holds each value.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
         knowledge: further knowledge of the parameters in the spec; None if there is none.
         foreseen: the plants that the design was made for; None if it was made for the plant of the spec.
@@ -123,6 +124,7 @@ class Identification:
     operating_point: Mapping[str, float]
     earlier: Earlier | None
     has_prior: bool
+    hold: int
     controller: TransferMatrix | None
     knowledge: Knowledge | None
     foreseen: Foreseen | None
