@@ -214,16 +214,28 @@ def identify(
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
 
-    def estimated(rest: bool | None, about: Array | None) -> Estimate:
+    def begun(rest: bool | None, about: Array | None) -> Estimate:
         best = from_rest_or_free(records, rest, searched, about)
         return concluded(best, parts, step, experiments=experiments or (len(outputs),), feedback=feedback)
 
-    found = estimated(False if ramp else rest, start)
-    if rest is None and len(parts) > 1 and not found.start.free and found.tests.failed:
-        # Few records that do not begin at rest are lost among the unknowns of many.
-        free = estimated(False, found.theta)
-        return found if free.tests.failed else free
-    return found
+    return _as_data_allow(begun, False if ramp else rest, start, len(parts))
+
+
+def _as_data_allow(
+    begun: Callable[[bool | None, Array | None], Estimate],
+    rest: bool | None,
+    start: Array | None,
+    records: int,
+) -> Estimate:
+    """Return the estimate of records that begin at rest or not; tests that refute rest try it without.
+
+    Of many records, few that do not begin at rest are lost among the unknown starts of all.
+    """
+    found = begun(rest, start)
+    if rest is not None or records == 1 or found.start.free or not found.tests.failed:
+        return found
+    free = begun(False, found.theta)
+    return found if free.tests.failed else free
 
 
 def with_larger_noise(
