@@ -38,7 +38,8 @@ _NOWHERE = np.zeros(0)
 # Where the weight vanishes the requirement is void; a large finite r_adm says so without an infinity.
 _NO_WEIGHT = 1e-12
 _TINY = np.finfo(float).tiny
-_SETTLED = 10_000  # samples in which a loop shows what noise does to its input
+# Samples in which a loop shows what noise does to its input, unless that still grows by this factor.
+_SETTLED, _STILL = 10_000, 1.005
 
 
 class AdmissibleError(Protocol):
@@ -160,16 +161,18 @@ class Sensitivity:
         """Return the margins of a loop, and the peak of |S| with the nominal plant and with every other.
 
         1 + L stays 1/|S| away from 0: a gain margin of |S|/(|S| - 1) and a phase margin of
-        2 asin(1/(2 |S|)), in degrees, follow. `input_deviation` is by noise, with the nominal plant.
+        2 asin(1/(2 |S|)), in degrees, follow. `input_deviation` is by noise, with the nominal plant; it is
+        left out where it has not settled, as under drifts that the controller does not remove.
         """
         peak = float(np.min(1.0 / np.abs(self.weight.at(w))))
         root = np.asarray(np.linalg.cholesky(self.loop.model.covariance), dtype=float)
+        early, late = (float(np.max(self.loop.input_deviation(root, n))) for n in (_SETTLED // 2, _SETTLED))
         return {
             "nominal_peak": float(np.max(self.nominal(w))),
             "max_sensitivity": peak,
             "gain_margin": peak / (peak - 1.0),
             "phase_margin": float(2.0 * np.degrees(np.arcsin(0.5 / peak))),
-            "input_deviation": float(np.max(self.loop.input_deviation(root, _SETTLED))),
+            **({"input_deviation": late} if late <= _STILL * early else {}),
         }
 
     @cached_property

@@ -275,4 +275,5 @@ def written_spec_refused(kind: FindingKind, refusal: Diagnostic | None) -> list[
     """The model does not fit what the given spec asks for. The spec that was written is refused."""
     if refusal is None:
         return []
-    return [kind.found(f"{refusal.message} ({refusal.hint})", where=refusal.key, error=refusal.code)]
+    fact = f"{refusal.message} ({refusal.hint})" if refusal.hint else refusal.message
+    return [kind.found(fact, where=refusal.key, error=refusal.code)]

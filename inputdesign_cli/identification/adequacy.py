@@ -96,8 +96,8 @@ def score(white: White, columns: Array, means: Array) -> Score:
     scores, mean = regressors.T @ white.residuals, white.mean_left(columns / norms, means / norms)
     left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
     kept, expected, along = sizes > DEPENDENT, right @ mean, right @ scores
-    # The part of a mean that comes of the parameters is right to first order. Where it exceeds the deviation
-    # of the score, too little of the regressors is left: nothing is known if the mean has another part.
+    # The part of a mean that comes of the parameters is right to first order only. Where it exceeds the
+    # deviation of the score, it is left out; if starts have a part in the mean too, so is the whole score.
     coarse = np.abs(right @ (mean - means / norms)) > np.sqrt(white.variance) * sizes
     expected[coarse] = along[coarse] if np.any(means) else 0.0
     along = (along - expected)[kept] / sizes[kept]

@@ -220,7 +220,8 @@ def explore(
             found = explore_log(_paths(data), prepared, structure, Asked.of(asked) if asked else None)
             results = found.results
             if asked is not None:
-                results = results.saying(written_spec_refused(_refusal(results.resolved_spec)))
+                refusal = _refusal(results.resolved_spec, asked.resolve_path("."))
+                results = results.saying(written_spec_refused(refusal))
             return replace(found, results=with_added(results))
     with _placed(model):
         found = judge(model_to_judge(model), build_header(model), _paths(data), prepared)
@@ -254,10 +255,10 @@ def _(model: Results) -> control.lti.LTI:
     return to_control(spec.with_(**{key: blocks[key] for key in ("plant", "noise") if key in blocks}))
 
 
-def _refusal(text: str) -> Diagnostic | None:
-    """Return the first reason why `solve` would refuse a spec, or None."""
+def _refusal(text: str, folder: Path) -> Diagnostic | None:
+    """Return the first reason why `solve` would refuse a spec with files in a folder, or None."""
     try:
-        build_task(parse_spec(text, "spec.yaml"))
+        build_task(parse_spec(text, "spec.yaml", folder=folder))
     except IdesignError as error:
         return error.diagnostics[0]
     return None

@@ -264,6 +264,19 @@ def test_a_spec_that_does_not_fit_the_model_of_the_log_is_said_so(tmp_path):
     assert found["unit-not-converted"]["figures"] == {"found": "cm", "stated": "m"}
 
 
+def test_a_written_spec_keeps_the_files_of_the_given_one(tmp_path):
+    log, folder = lag_log(tmp_path / "log.csv", samples=200), tmp_path / "specs"
+    folder.mkdir()
+    (folder / "adm.csv").write_text("frequency,r_adm\n0.001,0.2\n6,0.2\n")
+    (folder / "s.yaml").write_text(
+        f"sample_time: 0.5\ntime_unit: min\n{PLANT}noise: {{variance: 1}}\nexperiment: {{samples: 60}}\n"
+        "accuracy: {model_error: {table: adm.csv, band: [0.01, 5]}}\nspectrum: {type: white}\n"
+    )
+    spec = load_spec(folder / "s.yaml")
+    found = explore(log, asked=spec).results.outcome.findings
+    assert "written-spec-refused" not in {one.code for one in found}
+
+
 @pytest.mark.parametrize(
     ("head", "stated"), [("Valve [%]", ("Valve", "%")), ("u", None), ("level " * 8, None)]
 )

@@ -223,3 +223,9 @@ def test_the_margin_to_work_with_has_a_design(margin):
     stated, refused = refusal(margin)
     roomy = re.search(r"example (\w+: [\d.]+)", refused.hint)[1]
     assert solve(parse_spec(TEXT, overrides=[stated.replace(margin, roomy)])).result["status"] == "optimal"
+
+
+def test_where_noise_drifts_the_input_follows_it_without_end():
+    """As 1/G: no deviation is stated."""
+    found = solve(parse_spec(TEXT, overrides=["noise.drift=true", "solver.any_spectrum=false"])).result
+    assert "input_deviation" not in found["requirements"][0]["loop"]

@@ -35,7 +35,7 @@ from inputdesign_cli.questions.common.bound_curves import Informed
 from inputdesign_cli.questions.common.delivery import Delivered, with_study
 from inputdesign_cli.signal.kinds import kind_of
 
-_OF_RUNS = 0x0B5
+_OF_RUNS = 0x0B5  # the branch of a seed that runs have to themselves
 # Records that are searched from several starts, where those leave other minima.
 _SEARCHED = 10
 QUANTILES = (0.05, 0.5, 0.95)
