@@ -4,7 +4,7 @@ The chi-squared quantile makes |G(theta) - G| <= r_u hold at all frequencies for
 of that probability, and to first order only. Most estimates outside of that ellipsoid keep below r_adm as
 well: an ellipsoid has more dimensions than a frequency response has directions that matter. Here estimates
 are drawn from their asymptotic distribution, and the largest |G(theta) - G| / r_adm over the band is computed
-for each with the exact G. alpha is set so that the largest r_u / r_adm is the quantile of those.
+for each with the exact G. alpha is set so that the largest r_u / r_adm equals the quantile of these maxima.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from inputdesign_cli.accuracy.model_error import ModelError
 from inputdesign_cli.accuracy.requirement import Requirement, inverse_factor
 from inputdesign_cli.arrays import Array
 
-_POINTS, _AT_ONCE = 800, 256
+_POINTS, _AT_ONCE = 800, 256  # most frequencies of the grid; draws computed together
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Calibration:
     equally many draws estimates the coverage.
 
     Attributes:
-        excess: the quantile of estimates from such records over the quantile of the asymptotic draws.
+        excess: the quantile for estimates from simulated records over the quantile for asymptotic draws.
     """
 
     probability: float
@@ -57,17 +57,17 @@ class Calibration:
         return errors[0].alpha * reached / max(error.worst(information).ratio for error in errors)
 
     def corrected(self, errors: Sequence[ModelError], information: Array, estimates: Array) -> Calibration:
-        """Return the calibration with `excess` measured on estimates from such records.
+        """Return the calibration with `excess` measured on estimates from simulated records.
 
         Args:
-            information: (k, k) of the records, in the coordinates of the errors.
+            information: (k, k) of these records, in the coordinates of the errors.
             estimates: (n, k) in raw parameters, NaN where there is none.
         """
         found = self._quantile(largest_error(errors, estimates))
         return replace(self, excess=found / self._drawn(errors, information))
 
     def coverage(self, errors: Sequence[ModelError], information: Array, within: float = 1.0) -> Coverage:
-        """Count fresh draws with errors of at most `within` times r_adm; the best accuracy sets `within`."""
+        """Count fresh draws with errors of at most `within` r_adm; a best-accuracy design sets its ratio."""
         steps = self._steps(information, fresh=True)
         exact, linear = largest_error(errors, _raw(errors, steps)), _to_first_order(errors, steps)
         return Coverage(self.draws, int(np.sum(exact <= within)), int(np.sum(linear <= within)))
@@ -138,5 +138,5 @@ def _admissible(error: ModelError, w: Array) -> Array:
 
 
 def with_alpha(requirements: Iterable[Requirement], alpha: float) -> list[Requirement]:
-    """Return the requirements, with another alpha in all on the model error."""
+    """Return the requirements, with this alpha in all requirements on the model error."""
     return [replace(r, alpha=alpha) if isinstance(r, ModelError) else r for r in requirements]

@@ -1,4 +1,4 @@
-"""What a requirement is to a solver: cones, and the linear inequalities that they prove.
+"""Requirements as a solver handles them: cones, and the linear inequalities that they prove.
 
 Every cone here holds for M whenever it holds for a smaller M, and has the form h * constant + linear
 map of (M, auxiliary unknowns), with h = 1 for a plain requirement. A design that scales M by an
@@ -58,12 +58,12 @@ class ConcaveFunction:
 class Cut(Protocol):
     """A convex set of information matrices (k, k) that contains every admissible one.
 
-    `frequency` (rad/sample) is where the requirement needs it, None when it has no frequency.
+    `frequency`, in the unit of the experiment, is where the requirement needs it; None if it has none.
     """
 
     @property
     def frequency(self) -> float | None:
-        """Return the frequency (rad/sample) at which the requirement needs the cut, if it has one."""
+        """Return the frequency, in the unit of the experiment, at which the cut is needed, if it has one."""
 
     def transformed(self, congruence: Array) -> Cut:
         """Return the same set for K M K^T, K = `congruence` (k, k) nonsingular."""
@@ -357,8 +357,8 @@ class EllipsoidCut:
 
         Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0 for any nu. The
         solver's Z is made positive semidefinite first, and rounding may make tr(Z Q) slightly negative. Two
-        changes of Z mend that and keep it positive semidefinite: to shrink its last row and column, or to add
-        to Z_11 the direction in which Q_11 is largest. The first proves more, where it is possible.
+        changes of Z correct that and keep it positive semidefinite: to shrink its last row and column, or to
+        add to Z_11 the direction in which Q_11 is largest. The first proves more, where it is possible.
         """
         Z = positive_part(weight)
         missing = -float(np.sum(Z * self.form))

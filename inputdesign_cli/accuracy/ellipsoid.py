@@ -20,15 +20,15 @@ from inputdesign_cli.accuracy.requirement import Requirement
 from inputdesign_cli.arrays import Array, ComplexArray
 
 _BISECTIONS = 80
-_FLOOR = 1e-150  # its square is a number still
+_FLOOR = 1e-150  # its square does not underflow
 
 
 @dataclass(frozen=True, kw_only=True)
 class EllipsoidError(OnModelError):
     """The requirement for one entry of G that is a fraction affine in theta (`Model.bends`).
 
-    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. All
-    entries share the ellipsoid of the parameters.
+    The bound on the error is r_adm (`admissible`), or r_adm / |G_0| on the error relative to G(theta)
+    ("relative"). All entries share the ellipsoid of the parameters.
     """
 
     against: Literal["relative", "absolute"] = "relative"
@@ -47,7 +47,7 @@ class EllipsoidError(OnModelError):
         return z, below, part.denominator
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Return real and imaginary parts of z, then of c, over |c_0|, (n, 4, k)."""
+        """Return the real and imaginary parts of z / c_0, then of c / c_0, (n, 4, k)."""
         z, c, start = self._forms(w)
         turned = np.conj(start) / np.abs(start) ** 2  # c_0 becomes 1
         z, c = z * turned[:, None], c * turned[:, None]

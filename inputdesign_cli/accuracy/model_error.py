@@ -3,7 +3,7 @@
 [bombois-least-costly], (6), (10) and (12): r_u = alpha sqrt(lambda_max(T P T^T)) with T the real and
 imaginary parts of the gradient of the entry, equivalently M >= R_adm(w) = (alpha / r_adm)^2 T^T T. With the
 gradients of all entries in T, r_u bounds the Frobenius norm of the error of G over the confidence ellipsoid,
-to first order, and with it the largest singular value, which is what a sensitivity asks for.
+to first order, and with it the largest singular value, which a bound on the sensitivity function needs.
 
 Entries that are held to bounds of their own share the confidence factor alpha of all parameters of G, so
 that all of them hold at once with that probability.
@@ -35,10 +35,10 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Loop, Model, ScalarTransfer, local_maxima
 
 _NOWHERE = np.zeros(0)
-# Where the weight vanishes the requirement is void; a large finite r_adm says so without an infinity.
+# A requirement is void at zeros of the weight: there r_adm is large, but not infinite.
 _NO_WEIGHT = 1e-12
 _TINY = np.finfo(float).tiny
-# Samples in which a loop shows what noise does to its input, unless that still grows by this factor.
+# Samples after which the input of a loop has settled, unless their second half raises its deviation by more.
 _SETTLED, _STILL = 10_000, 1.005
 
 
@@ -113,7 +113,7 @@ class Table:
     At frequency zero, and below the first point if that stands at zero, the first value holds.
     """
 
-    frequency: Array  # (n,) ascending, rad/sample
+    frequency: Array  # (n,) ascending, in the unit of the experiment
     value: Array  # (n,) positive
     kept = None
     floored = None
@@ -161,8 +161,9 @@ class Sensitivity:
         """Return the margins of a loop, and the peak of |S| with the nominal plant and with every other.
 
         1 + L stays 1/|S| away from 0: a gain margin of |S|/(|S| - 1) and a phase margin of
-        2 asin(1/(2 |S|)), in degrees, follow. `input_deviation` is by noise, with the nominal plant; it is
-        left out where it has not settled, as under drifts that the controller does not remove.
+        2 asin(1/(2 |S|)), in degrees, follow. `input_deviation` is the largest standard deviation of an input
+        due to noise, with the nominal plant. It is left out if it has not settled, as under drifts that the
+        controller does not remove.
         """
         peak = float(np.min(1.0 / np.abs(self.weight.at(w))))
         root = np.asarray(np.linalg.cholesky(self.loop.model.covariance), dtype=float)
@@ -257,7 +258,7 @@ class Floored:
 
     def _both(self, w: Array) -> tuple[Array, Array]:
         """Return r_adm of the scenario, and its lower bound where r_adm is smaller, (n,) each."""
-        # The grid of a requirement is asked for again and again, a few points between its own once.
+        # The grid of a requirement is evaluated many times, points between its own only once.
         for grid, own, floor in self._on_grid:
             if np.array_equal(grid, w):
                 return own, floor

@@ -1,7 +1,7 @@
-"""What the design asks of a requirement: is it met, where not, and which cones would mend it.
+"""Requirements as a design uses them: whether they are met, where they are missed, and their cones.
 
-A requirement is one condition, or one at every frequency of a band. A grid sees everything there, and peaks
-are polished between its points.
+A requirement is one condition, or one at every frequency of a band. A grid resolves every resonance there,
+and peaks are refined between its points.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from inputdesign_cli.plant.frequencies import SLACK
 
 Entry = tuple[int, int]
 
-# The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
-# Slow plants and integrating controllers round the ratio there to about nine digits.
+# A peak nearer to frequency zero than this share of the band is at zero, if the ratio there is as large.
+# With slow plants and integrating controllers rounding leaves about nine digits of the ratio there.
 _BESIDE_ZERO, _FLAT, _ROUNDING = 1e-6, 1e-8, 1e-12
-# Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
+# Largest damping of a pole on the circle; shares of the band where rounding hides the ratio, and of its ends.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
-_GROWS = 5.0
-_STEP = 1e-5  # of a difference, relative to M
-_KEPT = 8  # sets of frequencies whose rows are remembered at a time
-# Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
-# rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
-_UNTOLD = 1e-12
+_GROWS = 5.0  # |G| grows by more than this, at a tenth of the distance from a pole
+_STEP = 1e-5  # step of a difference quotient, relative to M
+_KEPT = 8  # sets of frequencies whose rows are cached
+# In the coordinates of a design, smaller eigenvalues of the information, relative to the largest, are errors
+# of rounding. Compared with sixty digits, ratios are wrong by a thousandth there, and by any factor below.
+_SINGULAR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Requirement(ABC):
 
     @property
     def entry(self) -> Entry | None:
-        """Return the entry (output, input) of G that it concerns, from zero; None for G as a whole."""
+        """Return the entry (output, input) of G, counted from zero; None for G as a whole."""
         return None
 
     @property
@@ -130,15 +130,15 @@ class OneCondition(Requirement):
         return np.full(np.shape(frequencies), self.ratio(information))
 
 
-class _LastLook:
+class _LastResults:
     """Holds the last results of a requirement, since later calls often need them again."""
 
     def __init__(self) -> None:
-        self.looked: tuple[Array, Array, Array] | None = None  # an information matrix, and what it gives
+        self.looked: tuple[Array, Array, Array] | None = None  # M, K^T and the ratio on the grid
         self._rows: dict[bytes, NDArray[np.float64]] = {}
 
     def rows_at(self, w: Array, rows: Callable[[Array], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Return `rows` (w), kept since a search for a peak often begins at the same points."""
+        """Return `rows` (w), cached since a search for a peak often begins at the same points."""
         key = w.tobytes()
         if key not in self._rows:
             if len(self._rows) >= _KEPT:
@@ -162,7 +162,7 @@ class OverFrequency(Requirement):
 
     @property
     def of_the_norm(self) -> bool:
-        """Return whether no entry is named, of several."""
+        """Return whether no entry is named although there are several."""
         return self.entry is None and self.experiment.model.outputs * self.experiment.model.inputs > 1
 
     @property
@@ -202,7 +202,7 @@ class OverFrequency(Requirement):
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """Return real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k).
 
-        In memory they stand as `turned` has them.
+        In memory the frequencies stand side by side, as in `turned`.
         """
         return self._rows_of(self.experiment.model.plant_gradient(w))
 
@@ -238,9 +238,9 @@ class OverFrequency(Requirement):
 
     @cached_property
     def grid(self) -> Array:
-        """Return frequencies of the band that see every resonance of G, the requirement and the loop."""
+        """Return frequencies of the band that resolve every resonance of G, the requirement and the loop."""
         grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
-        # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
+        # At a pole that a weight cancels the ratio is 0/0, and next to it only rounding.
         if self.poles_on_the_circle.size == 0:
             return grid
         clear = np.all(np.abs(grid[:, None] - self.poles_on_the_circle) > _HIDDEN * self.band[1], axis=1)
@@ -264,8 +264,8 @@ class OverFrequency(Requirement):
         return self.rows(self.grid)
 
     @cached_property
-    def _last(self) -> _LastLook:
-        return _LastLook()
+    def _last(self) -> _LastResults:
+        return _LastResults()
 
     def ratios(self, information: Array, frequencies: Array) -> Array:
         """Return the ratio (n,) at given frequencies."""
@@ -311,7 +311,7 @@ class OverFrequency(Requirement):
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
 
     def most(self, information: Array) -> float:
-        """Bound the ratio by the grid: a peak between them stands no higher than `local_maxima` admits."""
+        """Bound the ratio from the grid: a peak between its points exceeds them by at most `SLACK`."""
         top = self.least(information)
         return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
 
@@ -390,7 +390,7 @@ def _largest(
 ) -> Callable[[Array], float]:
     def ratio(information: Array) -> float:
         eigenvalues = np.linalg.eigvalsh(information)
-        if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
+        if requirements and eigenvalues[0] <= _SINGULAR * eigenvalues[-1]:
             raise np.linalg.LinAlgError
         return max([of(requirement, information) for requirement in requirements], default=0.0)
 

@@ -58,7 +58,7 @@ class ConicSolution:
     iterations: int
 
 
-_MOST_ROWS = 20_000  # of semidefinite blocks: their factors fill up, to 8 bytes for each pair
+_MOST_ROWS = 20_000  # rows of semidefinite blocks: their factors are dense, 8 bytes for each pair of rows
 _STATUS: dict[str, Literal["solved", "almost_solved", "infeasible", "unbounded", "failed"]] = {
     "Solved": "solved",
     "AlmostSolved": "almost_solved",
@@ -76,8 +76,8 @@ def solve_conic(
 
     Args:
         q: (n,) linear cost.
-        tolerance: on the relative gap and the residuals; ask for more than the design needs,
-            the certificate decides what was reached.
+        tolerance: bound on the relative gap and the residuals, to be tighter than the design needs; the
+            certificate decides on the design.
 
     Raises:
         InaccurateError: `out-of-time`.

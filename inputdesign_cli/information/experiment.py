@@ -1,4 +1,4 @@
-"""What an excitation does to a plant: gradients of the prediction, information per frequency, powers.
+"""The effect of an excitation on a plant: prediction gradients, information per frequency, and powers.
 
 The measure is (1 / 2 pi) dw over the circle (w in rad/sample) or the line (rad per time unit): the
 power of a signal is the integral of its spectrum, its mean square. In continuous time the N samples of
@@ -23,17 +23,17 @@ from inputdesign_cli.information.quadrature import Quadrature, Values, band_quad
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 
-_AT_ONCE = 2**13  # numbers of gradients, so that they stay in the cache of the processor
-_INTEGRATES = 1e-9  # a pole that fades no faster
-_ROUNDING = 1e-15  # shares of the largest gradient of an output
+_AT_ONCE = 2**13  # entries of gradients computed together, so that they stay in the cache of the processor
+_INTEGRATES = 1e-9  # a pole with no more damping is an integrator
+_ROUNDING = 1e-15  # gradients below this share of the largest of their output count as zero
 _RANK_TOLERANCE = 1e-11
-# Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.
+# A parameter takes part in a null space if its component reaches this share of the largest component.
 _TAKES_PART = 0.05
 
 
 @dataclass(frozen=True)
 class WeightedProducts:
-    """Holds by output, in parts of the frequencies, the parameters (c,) that matter and F^T (n, r, c)."""
+    """Holds the parameters (c,) that matter and F^T (n, r, c), by part of the frequencies and by output."""
 
     parts: list[list[tuple[NDArray[np.intp], ComplexArray]]]
 
@@ -75,9 +75,9 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
-"""The powers that results state; the power of the moves of u between samples is only limited."""
-# What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
-_NOTHING = 1e-13
+"""The powers that results state; the power of the moves of u between samples is limited, but not stated."""
+# An entry of a response up to this share of the largest entry is a zero with rounding.
+_NEGLIGIBLE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Experiment:
 
     @cached_property
     def evaluated(self) -> dict[tuple[object, ...], Array]:
-        """Return a memory, empty at first, of the information of records, by their digests."""
+        """Return a cache, empty at first, of the information of records, by their digests."""
         return {}
 
     @property
@@ -151,7 +151,7 @@ class Experiment:
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """Return F_x (n, k, p, r): the gradient of the prediction with respect to x, noise whitened to I.
 
-        F_u = H^-1 dG in open loop; in closed loop what x causes at y and u enters the prediction as well
+        F_u = H^-1 dG in open loop. In closed loop the responses of y and u to x enter the prediction as well
         ([bombois-least-costly], below (4) and (15), for one channel).
         """
         if self.loop is not None:
@@ -160,7 +160,7 @@ class Experiment:
         return self._whitened(self.model.prediction_gradient(w, None, u, None), self.noise_whitener)
 
     def disturbance_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return what e causes in the prediction, also around the loop, for raw parameters, (n, k, p, p)."""
+        """Return the prediction gradient due to e, also around the loop, for raw parameters, (n, k, p, p)."""
         if self.loop is not None:
             return self.loop.noise_gradient(w)
         e = np.eye(self.model.outputs, dtype=complex)[None]
@@ -271,7 +271,7 @@ class Experiment:
         return self.noise_information + self.prior_information
 
     def with_samples(self, samples: int) -> Experiment:
-        """Return the experiment with this number of samples: itself, with all it knows, if it has them."""
+        """Return the experiment with this number of samples: itself, with its caches, if it has as many."""
         return self if samples == self.samples else replace(self, samples=samples)
 
     def of_length(self, information: Array, samples: int) -> Array:
@@ -290,7 +290,7 @@ class Experiment:
         """Return the experiment in coordinates where M = I by this power, flat over the band.
 
         Args:
-            power: of all channels together, which share it evenly, or (r,) of each.
+            power: the total, shared evenly by the channels, or the powers (r,) of the channels.
 
         Raises:
             SpecError: `not-identifiable` when even that excitation does not identify all parameters.
@@ -410,7 +410,7 @@ def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
         return response
     row = response[..., channel : channel + 1, :]
     largest = np.abs(response).max(axis=(-3, -2, -1), keepdims=True, initial=0.0)
-    return np.where(np.abs(row) > _NOTHING * largest, row, 0.0)
+    return np.where(np.abs(row) > _NEGLIGIBLE * largest, row, 0.0)
 
 
 def information_of_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
@@ -418,7 +418,7 @@ def information_of_noise(gradients: Values, singularities: ComplexArray) -> NDAr
 
     Args:
         gradients: (n, S, k, p, p) at frequencies (n,): the gradient for white e of covariance I.
-        singularities: of all of them.
+        singularities: poles of all S plants, as points of the frequency plane.
     """
 
     def products(weights: NDArray, values: NDArray) -> NDArray:
@@ -427,7 +427,7 @@ def information_of_noise(gradients: Values, singularities: ComplexArray) -> NDAr
         rows = np.concatenate([flat.real, flat.imag], axis=2)
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
-    # Sums of a few hundred nodes, added up, round less than one of them all.
+    # Partial sums over a few hundred nodes lose less to rounding than one sum over all nodes.
     return integrate(gradients, None, singularities, sums=products, several=True)
 
 
@@ -435,7 +435,7 @@ def taking_part(names: Sequence[str], directions: Array) -> str:
     """Return the names of the parameters that take part in a space, for any vectors that span it.
 
     Args:
-        names: of the k parameters.
+        names: names of the k parameters.
         directions: (k, m), independent columns.
     """
     share = np.linalg.norm(np.linalg.qr(directions)[0], axis=1)
@@ -449,7 +449,7 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
 
     Args:
         rows: (number, k).
-        excitation: what excites, for the diagnostic ("excitation", "excitation within [0, 2]").
+        excitation: its name in the diagnostic ("excitation", "excitation within [0, 2]").
 
     Raises:
         SpecError: `not-identifiable`, with the names of parameters that are not identifiable.

@@ -14,15 +14,14 @@ from inputdesign_cli.information.experiment import Experiment, PowerKind
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
 
-# e^-32 is below rounding; a plant that remembers longer than this many samples is cut there.
-_FORGOTTEN = 32.0
-_LONGEST_MEMORY = 2**20
-# A longer memory than this many records is weighted down instead; rounding grows to e^8 of itself.
+_FORGOTTEN = 32.0  # a response that has decayed by e^-32 is below rounding
+_LONGEST_MEMORY = 2**20  # samples; the memory of a plant is cut there
+# The longest transform, in records. A longer memory is damped by weights, which raise rounding by up to e^8.
 _RECORDS = 4
-# A delivered record is evaluated for its search, its accuracy, its curves and its start.
+# Cached records: a delivered record is evaluated for its search, its accuracy, its curves and its start.
 _RECENT = 4
 _FREQUENCIES_AT_ONCE = 16384
-# Frequency responses of more numbers than this are computed anew for each record.
+# Gradients with more entries than this are computed anew for each record, a part at a time.
 _KEPT = 2**22
 Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 
@@ -31,9 +30,9 @@ Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 class RecordTransforms:
     """Filters records of `samples` samples by FFT, padded past the memory of the plant or its loop.
 
-    In discrete time a long memory is forgotten within a padding of three records: samples are weighted with
-    e^(-rho t), what they cause with e^(rho t). In continuous time the plant is driven by the band-limited
-    interpolation of the samples, `step` apart, and its outputs are read at the same instants.
+    In discrete time, and with integrators, a long memory decays within a padding of three records: samples
+    are weighted with e^(-rho t), responses with e^(rho t). In continuous time the plant is driven by the
+    band-limited interpolation of the samples, `step` apart, and its outputs are read at the same instants.
 
     Several experiments share the transforms: their channels stand one after the other.
     """
@@ -78,7 +77,7 @@ class RecordTransforms:
         return np.fft.rfft(record * self._weights[:, None], self._length, axis=-2)
 
     def _back(self, transform: ComplexArray, behind: int) -> NDArray[np.float64]:
-        """Return samples of a transform of weighted ones, with `behind` axes behind the frequencies."""
+        """Return the samples of a transform, freed of their weights; `behind` axes follow the frequencies."""
         found = np.fft.irfft(transform, self._length, axis=-1 - behind)
         first = np.moveaxis(np.moveaxis(found, -1 - behind, 0)[: self.samples], 0, -1 - behind)
         return first / self._weights.reshape(-1, *(1 for _ in range(behind)))
@@ -102,7 +101,7 @@ class RecordTransforms:
 
     @property
     def _integrates(self) -> bool:
-        """Return whether there is no response at frequency zero."""
+        """Return whether some plant or loop has a pole at frequency zero, where responses are infinite."""
         distances = [np.min(np.abs(one.singularities), initial=1.0) for one in self.experiments]
         return float(min(distances)) < 1e-9
 
@@ -142,7 +141,7 @@ class RecordTransforms:
 class RecordFilters:
     """Filters records of one channel in q^-1 by difference equations; `model` is the experiment's model.
 
-    They are the same answers as of `RecordTransforms`, in a tenth of the time.
+    The responses equal the ones of `RecordTransforms`, in a tenth of the time.
     """
 
     experiment: Experiment
@@ -162,7 +161,7 @@ class RecordFilters:
         return filtered(numerator, denominator, record, axis=-2)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
-        """Return the transpose of `signals` (n, 1); a filter run backwards in time is its own."""
+        """Return the transpose of `signals` (n, 1): the same filter, run backwards in time."""
         return self.signals(of, weights[::-1])[::-1]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
@@ -266,15 +265,15 @@ class FiniteRecord:
         return np.asarray(np.mean(self.signals(of, record) ** 2, axis=-2))
 
     def plants_with_own(self, of: PowerKind) -> int:
-        """Return the number of plants with signals of their own: one if the record itself has them."""
+        """Return the number of plants whose signals differ: one if the signal is the record itself."""
         return 1
 
     def signals_of_each(self, of: PowerKind, record: Array) -> Array:
-        """Return `signals` at every plant, side by side, or once if the record itself has them."""
+        """Return `signals` at every plant, side by side, or once if the signal is the record itself."""
         return self.signals(of, record)
 
     def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
-        """Return the powers (plants, channels) at every plant, or once if the record itself has them."""
+        """Return the powers (plants, channels) at every plant, or once if the signal is the record itself."""
         powers = np.mean(self.signals_of_each(of, record) ** 2, axis=0)
         return np.asarray(powers.reshape(self.plants_with_own(of), -1))
 
@@ -321,7 +320,7 @@ class FiniteRecords(FiniteRecord):
         return [FiniteRecord(plant, self.samples, self.step) for plant in plants]
 
     def signals_of_each(self, of: PowerKind, record: Array) -> Array:
-        """Return `signals` at every plant, side by side, or once if the record itself has them."""
+        """Return `signals` at every plant, side by side, or once if the signal is the record itself."""
         if self._is_record(of):
             return record
         return np.concatenate([one.signals(of, record) for one in self._together], axis=1)
@@ -335,7 +334,7 @@ class FiniteRecords(FiniteRecord):
         return np.asarray(sum(one.adjoint(of, part) for one, part in each))
 
     def plants_with_own(self, of: PowerKind) -> int:
-        """Return the number of plants with signals of their own: one if the record itself has them."""
+        """Return the number of plants whose signals differ: one if the signal is the record itself."""
         return 1 if self._is_record(of) else 1 + len(self.others)
 
     @cached_property

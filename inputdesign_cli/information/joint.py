@@ -21,9 +21,9 @@ from inputdesign_cli.plant import (
     noise_gradients,
 )
 
-# Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
+# Entries of all plants of an integral at one node; more would leave the cache of the processor.
 _AT_A_NODE = 256
-# Frequencies of all plants that are looked at in one go, for the same reason.
+# Frequencies computed together, over all plants, for the same reason.
 _AT_ONCE = 2**13
 
 Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array], NDArray] | None], NDArray]

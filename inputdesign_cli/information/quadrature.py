@@ -23,12 +23,12 @@ RELATIVE_ERROR = 1e-11
 # Twenty nodes integrate cos(a x) over [-1, 1] to rounding up to about a = 10.
 _PHASE_PER_PANEL = 16.0
 _MAX_REFINEMENTS = 4
-_ROUNDING = 1e-7
-_NO_PART = 1e-15  # a share of the largest gradient of an output
+_ROUNDING = 1e-7  # a smaller change, relative, that halving does not reduce is rounding
+_NEGLIGIBLE = 1e-15  # gradients up to this share of the largest of their output count as zero
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
-_AT_ONCE, _AT_ONCE_OF_SEVERAL = 2048, 256  # nodes
-_NUMBERS_AT_ONCE = 2**14  # of values that may be large: they stay in the cache of the processor
+_AT_ONCE, _AT_ONCE_OF_SEVERAL = 2048, 256  # nodes computed together, the second for large values
+_NUMBERS_AT_ONCE = 2**14  # entries of large values computed together: they stay in the cache
 
 Values = Callable[[Array], NDArray]
 """Values (n, ...) of an integrand at frequencies (n,)."""
@@ -95,7 +95,7 @@ def graded_quadrature(
     )
 
 
-# The integrals of one design ask for the same few rules again and again, at each of its plants.
+# The integrals of one design need the same few rules many times, at each of its plants.
 @lru_cache(maxsize=512)
 def _panels(
     singularities: bytes, knots: bytes, lo: float, hi: float, longest: float, refine: int
@@ -115,7 +115,7 @@ def integrand(density: Values, factor: Values | None, inputs: int) -> tuple[Valu
     """Return the values to compute at the nodes of a rule, and how to sum them against functions.
 
     The sums, of weighted functions (n, f) and of the values at n nodes, are sum_n weighted[n, f] D(node_n):
-    (f, ...), or (f, ..., r, r) for several inputs. With a `factor` F of D, D = F^* F, the values belong to F.
+    (f, ...), or (f, ..., r, r) for several inputs. These take values of the `factor` F, D = F^* F, if given.
     """
     return (factor, _summed_products) if factor is not None and inputs > 1 else (density, PRODUCTS)
 
@@ -123,14 +123,14 @@ def integrand(density: Values, factor: Values | None, inputs: int) -> tuple[Valu
 def _summed_products(weighted: NDArray, F: NDArray) -> NDArray:
     """Return the sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
 
-    Of an output only the parameters and inputs that matter to it take part.
+    Only the parameters and inputs that matter to an output enter its products.
     """
     n, k, p, r = F.shape
     half = np.zeros((weighted.shape[1], k * r, k * r), dtype=complex)
     for output in range(p):
         rows = F[:, :, output].reshape(n, k * r)
         size = np.abs(rows).max(axis=0)
-        used = np.flatnonzero(size > _NO_PART * size.max(initial=0.0))
+        used = np.flatnonzero(size > _NEGLIGIBLE * size.max(initial=0.0))
         rows = rows[:, used]
         for sums, weight in zip(half, weighted.T, strict=True):
             sums[np.ix_(used, used)] += (rows.conj() * weight[:, None]).T @ rows
@@ -158,9 +158,9 @@ def integrate(
     parameters are nearly indistinguishable.
 
     Args:
-        functions: against which the values are integrated, (n, f) at frequencies (n,); None: one (n, 1).
+        functions: the functions (n, f) at frequencies (n,) that multiply the values; None: the constant one.
         several: values may be large, as for several channels: these are computed at few nodes at a time.
-        unit: of the frequencies of `values` and `functions`; all other frequencies are divided by it.
+        unit: unit of the frequencies of `values` and `functions`; all other frequencies are divided by it.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:

@@ -153,9 +153,9 @@ class Coloured(Parametrised, Derived):
 
     @cached_property
     def _nearest(self) -> float:
-        """Return the frequency below which all is taken as constant; zero unless plant and noise integrate.
+        """Return the frequency below which responses are held; zero unless plant and noise integrate.
 
-        The prediction differences where the plant integrates: their product is finite at frequency zero.
+        The inverse noise filter has a zero where the plant has its pole: their product is finite.
         """
         near = np.abs(self.plant.singularities)
         if not self.integrates or np.all(near > INTEGRATES):
@@ -200,7 +200,7 @@ class Coloured(Parametrised, Derived):
         return np.concatenate([of_plant, own], axis=1)
 
     def below(self, letter: str, output: int) -> tuple[Array | None, float]:
-        """Return C or D of an output, and the sign of its gradient; None of a D that is held."""
+        """Return C or D of an output, and the sign of its gradient; None for a D that is held."""
         if letter == "c":
             return self._per_output(self.C)[output], 1.0
         return None if self._per_output(self.held)[output] else self._per_output(self.D)[output], -1.0

@@ -26,8 +26,8 @@ class ContinuousModel(WhiteNoise):
 
     `numerator` and `denominator` hold ascending coefficients, s^0 first; denominators are monic. With
     `common` all entries share one denominator and its parameters. `delay` holds a list of one dead time for
-    each entry, an empty one for entries that act at once; it is empty where all do. `entries` are the present
-    ones; if None, zeros of the numerators say so.
+    each entry, an empty list if it has none; it is empty if no entry has one. `entries` are the present
+    entries; if None, the ones whose numerator is not zero.
 
     Parameters are named after their power of s: `b0[2,1]` in the numerator, `a1[2,1]` in the denominator of
     entry (2, 1), `delay[2,1]` its dead time; common ones, and of one input and output, go without brackets.

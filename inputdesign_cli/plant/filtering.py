@@ -6,8 +6,8 @@ import numpy as np
 import scipy.linalg.blas
 from numpy.typing import ArrayLike, NDArray
 
-# Samples times coefficients beyond which it pays to load scipy.signal: that takes a third of the start. The
-# second number is for several rows, whose recursions take less time per sample if they are short.
+# Samples times coefficients beyond which it pays to load scipy.signal, which takes a third of the start-up.
+# The second number is for several rows, whose recursions take less time per sample if they are short.
 _LARGE, _LARGE_TOGETHER = 50_000, 200_000
 
 

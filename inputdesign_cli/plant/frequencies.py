@@ -11,14 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 
 _REFINEMENT = 6
-# Points and steps that narrow a bracket ten thousandfold: few peaks cost their steps, many their points.
+# Points and repeats that narrow a bracket about ten thousandfold: repeats cost most for few peaks, points for
+# many peaks.
 _ZOOM_FEW, _ZOOM_MANY, _FEW = (40, 3), (8, 6), 64
-# Beside a kink the value falls in proportion to the width: narrowed on until it falls by no more than this
-# share of it, or this number of times in all.
+# Next to a kink the value falls in proportion to the width of its bracket. It is narrowed until the fall is
+# at most this share of the value, or this number of times.
 _KINK, _MOST_ZOOMS = 1e-9, 16
 SLACK = 0.05
 """A peak between two grid points may stand this much higher than both, as a share of itself."""
-# Where values differ by less, the function is flat.
+# A function is flat if its values differ by less than this share.
 _FLAT = 1e-12
 
 
@@ -59,7 +60,7 @@ def graded_grid(
     return grid[(grid >= lo) & (grid <= hi)]
 
 
-# Every plant of a design asks for the same band.
+# All plants of a design have the same band.
 @lru_cache(maxsize=64)
 def _spaced(lo: float, hi: float, points: int) -> Array:
     grid = np.concatenate([np.linspace(lo, hi, points), np.geomspace(max(lo, hi * 1e-6), hi, points // 3)])
@@ -68,9 +69,9 @@ def _spaced(lo: float, hi: float, points: int) -> Array:
 
 
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
-    """Return one grid for several plants, everywhere about as fine as the finest of theirs.
+    """Return one grid for several plants, everywhere about as fine as the finest of their own grids.
 
-    Poles that lie side by side share their points, so that many plants do not need many times as many.
+    Poles that lie side by side share their points, so that many plants need few more points than one.
     """
     parts = [np.empty(0), *(graded_grid(singularities, lo, hi) for singularities in plants)]
     grid = np.unique(np.concatenate(parts))
@@ -79,7 +80,7 @@ def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
         steps = np.diff(own)
         middle = np.clip(np.searchsorted(own, 0.5 * (grid[1:] + grid[:-1])) - 1, 0, steps.size - 1)
         finest = np.minimum(finest, steps[middle])
-    # A point for each unit of sum of (gap / finest step there); gaps wider than that step do not occur.
+    # A point for each unit of the cumulative sum of gap / finest step; no gap is wider than that step.
     passed = np.floor(np.concatenate([[0.0], np.cumsum(np.diff(grid) / finest)]) * (1.0 - _FLAT))
     kept = np.concatenate([[True], np.diff(passed) > 0.0])
     kept[-1] = True
@@ -92,8 +93,9 @@ def local_maxima(
     """Return frequencies and values of the local maxima of `function` over [grid[0], grid[-1]], ascending.
 
     It maps frequencies (n,) to values (n,), and `values` are those on the grid. Around every grid maximum the
-    grid is refined once, which parts twin peaks in one bracket; then each bracket is narrowed by repeated
-    sampling, all at once. Only continuity is asked for (tables have kinks). Values <= `above` are left out.
+    grid is refined once, which separates twin peaks in one bracket; then each bracket is narrowed by repeated
+    sampling, all at once. The function need only be continuous (tables have kinks). Values <= `above` are
+    left out.
 
     Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum that
     differs only by rounding from the value at an end of the grid is at that end.
@@ -105,7 +107,7 @@ def local_maxima(
         index = np.flatnonzero((values >= padded[:-2]) & (values > padded[2:]) & (values > least))
         index = _distinct(values, index) if index.size > 1 else index
         if refined and np.isfinite(above):
-            # There the function has less room to rise, in proportion to the steps at least.
+            # In a refined cell a peak exceeds the grid points by less, at least in proportion to the step.
             slack = np.where(beside[index] & beside[index + 1], SLACK / (_REFINEMENT + 1), SLACK)
             index = index[values[index] > above - slack * abs(above)]
         if index.size == 0:
@@ -120,7 +122,7 @@ def local_maxima(
         first = around + _REFINEMENT * np.arange(around.size)
         beside = np.zeros(finer.size + 1, dtype=bool)
         beside[first[:, None] + np.arange(1, _REFINEMENT + 2)] = True
-        beside[[0, -1]] = True  # beyond the ends there is nothing
+        beside[[0, -1]] = True  # there is no cell beyond the ends
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
     points, repeats = _ZOOM_FEW if index.size <= _FEW else _ZOOM_MANY
@@ -149,7 +151,7 @@ def local_maxima(
 
 
 def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the peaks between which the values fall by more than rounding; of others the highest."""
+    """Return the highest peak of each group between which the values fall by no more than rounding."""
     dips, heights = np.minimum.reduceat(values, index)[:-1], values[index]
     lower = np.minimum(heights[:-1], heights[1:])
     if np.all(lower - dips > _FLAT * np.abs(lower)):
@@ -163,7 +165,7 @@ def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:
         elif height > last:
             kept[-1] = after
         else:
-            continue  # the fall since the last one counts on
+            continue  # the lowest value since the last kept peak still counts
         least = np.inf
     return index[kept]
 

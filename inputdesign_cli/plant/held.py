@@ -25,8 +25,8 @@ from numpy.polynomial import polynomial as ascending
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.model import DELAY
 
-# What is left of a state, far below rounding.
-_FORGOTTEN = 1e-20
+# A transition matrix with smaller entries has decayed, far below rounding.
+_DECAYED = 1e-20
 # A dead time this near a boundary between samples, in samples, lies on it.
 _ON_BOUNDARY = 1e-9
 
@@ -82,7 +82,7 @@ class HeldEntry:
 
     @property
     def direct(self) -> float:
-        """Return b / a at infinite frequency, the gain that acts without delay but the dead time."""
+        """Return b / a at infinite frequency, the gain that acts without delay except the dead time."""
         return float(self.numerator[-1])
 
     @cached_property
@@ -156,8 +156,8 @@ class HeldEntry:
         """Return the transition in triangular form, and its basis.
 
         The second copy of the states depends on the first, and integrators on the other states of their copy.
-        Only these are turned (into Schur's form), so that the ones of integrators stay ones. A state in which
-        they cancel is then free of them near frequency zero.
+        Only the other states are brought to Schur's form, so that eigenvalues of integrators stay exactly
+        one. A state in which integrators cancel then has no rounding of them near frequency zero.
         """
         n, m = self.order, integrators(self.denominator)
         turn = np.eye(n, dtype=complex)
@@ -185,14 +185,14 @@ class HeldEntry:
     def forgetting(self, responses: ComplexArray, z: ComplexArray, samples: int) -> ComplexArray:
         """Return responses (m, columns) at points z whose memory ends after this number of samples.
 
-        They are exact in a record that is no longer, whatever the poles: there is nothing older to remember.
+        They are exact in a record that is no longer, whatever the poles, since it begins from rest.
         """
         n = self.order
         left = samples - (0 if self.delay is None else self.lag + 1)
         if left <= 0:  # nothing arrives before the record ends
             return np.zeros_like(responses)
         lost = np.linalg.matrix_power(self.transition, left)
-        if np.all(np.abs(lost) < _FORGOTTEN):
+        if np.all(np.abs(lost) < _DECAYED):
             return responses
         kept, fade = responses.copy(), z[:, None] ** -float(left)
         blocks = [(slice(0, 2 * n), lost)]
@@ -282,7 +282,7 @@ def polynomial_roots(coefficients: Array) -> ComplexArray:
     return np.concatenate([np.zeros(zeros), others]).astype(complex)
 
 
-# Rounding grows by e to this power over a record.
+# Weights fall by e to this power over a record, and rounding grows as much.
 _DECAY = 4.0
 
 
@@ -303,7 +303,7 @@ class Intersample:
         angles = 2.0 * np.pi * np.arange(length // 2 + 1) / length
         if not integrators(entry.denominator):
             weights, w = np.ones(samples), angles.astype(complex)
-        else:  # they have no response at zero: signals are weighted with e^(-rho t)
+        else:  # integrators are infinite at frequency zero: signals are weighted with e^(-rho t)
             decay = _DECAY / samples
             weights, w = np.exp(-decay * np.arange(samples)), angles - 1j * decay
         z = np.exp(1j * w)

@@ -18,14 +18,14 @@ from inputdesign_cli.plant.model import Model, SampledPlant, prediction_gradient
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
-# A pole this near to z = 1 integrates. The loop is then read off this far from frequency zero, in shares of
-# the distance of its nearest pole: there all is as at zero, to the square of that share.
+# A pole this near to z = 1 integrates. Responses at frequency zero are then computed at this share of the
+# distance of the nearest pole: they differ by the square of that share.
 INTEGRATES, BESIDE = 1e-7, 1e-5
 _DELAY = (
     "give the plant its delay (a leading 0 in B; in s a numerator of lower order than the denominator) or "
     "the controller one (a leading 0 in its numerator)"
 )
-# What goes wrong most often in a controller, besides.
+# The most frequent other faults of controllers: of one channel, and of several.
 _ONE = "and that numerator and denominator of the controller are in q^-1, ascending"
 _SEVERAL = (
     "which output each column of the controller reads, and that entries of a row with the same poles share "
@@ -61,7 +61,7 @@ class Loop:
 
     @cached_property
     def _states(self) -> tuple[Array, Array, Array]:
-        """Return x(t + 1) = A x + B [y; u] + .. R H e with `instantaneous` [y; u] = C x + [R H e; r]."""
+        """Return A, B, C: x(t + 1) = A x + B [y; u] + .. R H e, `instantaneous` [y; u] = C x + [R H e; r]."""
         plant, controller = self.model.realisation, self.controller.realisation
         from_u = np.concatenate([plant.B, np.zeros((len(controller.A), self.model.inputs))])
         from_y = np.concatenate([np.zeros((len(plant.A), self.model.outputs)), controller.B])
@@ -132,7 +132,7 @@ class Loop:
 
     @cached_property
     def nearest(self) -> float:
-        """Return the frequency below which responses are taken from there, to avoid a pole at zero."""
+        """Return the least frequency at which responses are computed, to avoid a pole at zero."""
         if not self.integrates:
             return 0.0
         near = np.abs(logarithmic_distance(self.closed_poles))
@@ -173,8 +173,8 @@ class Loop:
     def check_delay(self) -> None:
         """Raise `SpecError` (`algebraic-loop`) where both plant and controller act at once.
 
-        Then u(t) holds e(t), and so does the gradient of the prediction of y(t): an estimate from u and y is
-        biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
+        Then u(t) contains e(t), and so does the gradient of the prediction of y(t): an estimate from u and y
+        is biased. [ljung-1999], Chapter 13, assumes a delay in one of them.
         """
         answers = self.instantaneous[self.model.outputs :, : self.model.outputs] != 0.0
         if np.any(self.model.at_once @ answers):

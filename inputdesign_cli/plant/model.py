@@ -35,7 +35,7 @@ def _inner(model: object) -> SampledPlant:
 class Model(Protocol):
     """A model y = G(theta) u + H(theta) e: p outputs, r inputs, k parameters, e of a full covariance.
 
-    What has a body here is so for a model that is made of another one, its `inner`, and derives from this.
+    The methods with a body serve models that are made of another model, their `inner`, and derive from this.
 
     Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
     plane are frequency + j damping (see `logarithmic_distance`).
@@ -80,7 +80,7 @@ class Model(Protocol):
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
-        """Return a mask (k,) in which all parameters act in the plant."""
+        """Return whether G depends on each parameter, (k,)."""
 
     @property
     def dead_times(self) -> NDArray[np.bool_]:
@@ -104,7 +104,7 @@ class Model(Protocol):
     def radius(self) -> float:
         """Return the modulus of the farthest pole of G, H and the predictor in z, below one if stable.
 
-        In continuous time exp of the largest real part in s.
+        In continuous time it is exp of the largest real part of a pole in s.
         """
         return _inner(self).radius
 
@@ -159,7 +159,7 @@ class SampledPlant(Model, Protocol):
 
     @property
     def noise_gain(self) -> Array:
-        """Return the gains by which R H e enters the states besides the way by the outputs, (states, p)."""
+        """Return the gains by which R H e enters the states other than through the outputs, (states, p)."""
         return _inner(self).noise_gain
 
     @property
@@ -191,7 +191,7 @@ class SampledPlant(Model, Protocol):
 
 
 class Derived(SampledPlant, Protocol):
-    """A model that is made of another one, and answers like that one unless it says otherwise."""
+    """A model that is made of another one, and has its properties unless they are defined anew."""
 
     @property
     def inner(self) -> SampledPlant:
@@ -273,13 +273,13 @@ def prediction_gradients(
 
 
 def input_gradients(models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return H^-1 dG/dtheta, what u causes in the predictions of models of one structure, (S, n, k, p, r)."""
+    """Return H^-1 dG/dtheta, the part of u in the predictions of models of one structure, (S, n, k, p, r)."""
     u = np.eye(models[0].inputs, dtype=complex)[None, None]
     return prediction_gradients(models[0], models, w, None, u, None)
 
 
 def noise_gradients(models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """Return H^-1 dH/dtheta, what e causes in the predictions of models of one structure, (S, n, k, p, p)."""
+    """Return H^-1 dH/dtheta, the part of e in the predictions of models of one structure, (S, n, k, p, p)."""
     e = np.eye(models[0].outputs, dtype=complex)[None, None]
     return prediction_gradients(models[0], models, w, None, None, e)
 
@@ -321,7 +321,7 @@ class Parametrised:
         return None
 
     def bends(self: Listed, output: int, input: int) -> NDArray[np.bool_]:
-        """Return a mask (k,) of all parameters: none is taken to enter an entry of G as in a `Fraction`."""
+        """Return a mask (k,) of all parameters: no entry of G is taken to be affine in them."""
         return np.ones(len(self.parameters), dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:

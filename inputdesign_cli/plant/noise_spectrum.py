@@ -11,9 +11,9 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.model import Model
 
-_FIRST, _LONGEST = 1024, 2**20
-# What the second half of an impulse response may hold of its energy.
-_FORGOTTEN = 1e-24
+_FIRST, _LONGEST = 1024, 2**20  # samples of an impulse response
+# Share of the energy of an impulse response in its second half up to which it has decayed.
+_DECAYED = 1e-24
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class NoiseSpectrum:
         """Compute the spectrum of H e of a model in discrete time.
 
         Raises:
-            InaccurateError: `integral-inaccurate` for noise that hardly forgets.
+            InaccurateError: `integral-inaccurate` if the impulse response decays too slowly.
         """
         p, length = model.outputs, _FIRST
         root = np.linalg.cholesky(model.covariance)
@@ -36,7 +36,7 @@ class NoiseSpectrum:
             e[:, 0] = root.T
             found = model.simulate(np.zeros((p, length, model.inputs)), e, 1.0)[1]
             late, all_ = np.sum(found[:, length // 2 :] ** 2), np.sum(found**2)
-            if late <= _FORGOTTEN * all_:
+            if late <= _DECAYED * all_:
                 return cls(found)
             length *= 4
         raise InaccurateError.because(
@@ -51,7 +51,7 @@ class NoiseSpectrum:
         return _power(self._folded(self.impulses, period)[:, harmonics])
 
     def averaged(self, period: int, harmonics: NDArray[np.int_], periods: int) -> Array:
-        """Return N times the mean square of the transform of N = `periods` periods, on average, as (L, p).
+        """Return the mean periodogram E|sum_t v(t) e^{-jwt}|^2 / N of N samples, `periods` periods, (L, p).
 
         It is Phi_v through the window of a finite record, which Fejer's kernel describes.
         """

@@ -38,7 +38,7 @@ class PolynomialModel(Parametrised):
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
     are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
     common coefficients go without: `a1`. An absent entry B_ij has no parameters. `delays` (p, r) are the
-    powers of the first free coefficients of B, or its lengths if absent; if None, zeros of B say so.
+    powers of the first free coefficients of B, or its lengths if absent; if None, numbers of leading zeros.
     """
 
     B: Rows
@@ -102,7 +102,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def first(self) -> tuple[tuple[int, ...], ...]:
-        """Return `delays`, also where zeros of B say them, (p, r)."""
+        """Return `delays`, or where they are None the numbers of leading zeros of B, (p, r)."""
         if self.delays is not None:
             return self.delays
         return tuple(tuple(b.size - np.trim_zeros(b, "f").size for b in row) for row in self.B)
@@ -116,7 +116,7 @@ class PolynomialModel(Parametrised):
 
     @property
     def memory(self) -> float:
-        """Return the samples after which inputs are forgotten: the longest polynomials in a row."""
+        """Return the sum of the lengths of the longest polynomials, see `Model`."""
         rows = (self.A, self.C, self.D, *self.B, *self.F)
         return float(sum(max(p.size for p in row) for row in rows))
 
@@ -286,7 +286,7 @@ class PolynomialModel(Parametrised):
 
     @property
     def noise_gain(self) -> Array:
-        """See `SampledPlant`: the first state of an output meets the noise, where R reads the output."""
+        """See `SampledPlant`: the noise adds to the first state of an output, which R feeds back."""
         return self.realisation.A @ self.realisation.C.T
 
     def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
@@ -346,7 +346,7 @@ def _values_of_each(
 
 
 def _powers(q: ComplexArray, parameters: Sequence[Parameter]) -> ComplexArray:
-    """Return the powers of q (n,) that stand before these parameters, from q^0 on, (number, n)."""
+    """Return the powers of q (n,) from q^0 to the highest of these parameters, (number, n)."""
     return np.asarray(polyvander(q, max((p.power for p in parameters), default=0)).T, dtype=complex)
 
 

@@ -18,7 +18,7 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
 from inputdesign_cli.plant.model import Derived, Fraction, Model, SampledPlant, Signals
 
-# Number of recent parameter values that are kept with their coefficients.
+# Number of recent parameter values that are cached with their coefficients.
 _RECENT = 4
 
 
@@ -103,7 +103,7 @@ class Parametrisation:
         return evaluated(self.terms, self.symbols, self.values)
 
 
-# Where in the words of a spec the value of a parameter stands.
+# The path to the value of a parameter in a spec as written.
 Place = Sequence[str | int]
 
 

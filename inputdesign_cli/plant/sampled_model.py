@@ -16,7 +16,7 @@ from inputdesign_cli.plant.held import HeldEntry, Intersample, integrators
 from inputdesign_cli.plant.model import Parameter, WhiteNoise
 from inputdesign_cli.plant.transfer import Drive, StateSpace
 
-_KEPT = 2**14  # points of the unit circle whose responses are kept
+_KEPT = 2**14  # responses at more points of the unit circle are not cached
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class SampledModel(WhiteNoise):
         return SampledModel(self.continuous_plant.at(theta, covariance), self.sample_time)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """Return the outputs that u (.., n, r), held between samples, and e itself cause."""
+        """Return the response (.., n, p) to u (.., n, r), held between samples, and e itself."""
         return self.continuous_plant.driven(u, Intersample(self.sample_time, hold=True)), e
 
     @cached_property
@@ -88,8 +88,8 @@ class SampledModel(WhiteNoise):
     def repeated_integrators(self) -> int:
         """Return the excess of the integrators of single entries over the integrators of the plant.
 
-        The plant has as many simple ones as their gains have rank. No feedback moves the others, for they
-        take no part in G.
+        The number of simple integrators of the plant is the rank of their gains. Feedback does not move the
+        others, which take no part in G.
         """
         gains, simple = np.zeros((self.outputs, self.inputs)), 0
         for (i, j), entry in self._entries.items():
@@ -174,7 +174,7 @@ class SampledModel(WhiteNoise):
     def _responses(self, z: ComplexArray) -> dict[tuple[int, int], ComplexArray]:
         """Return the responses (n, columns) of each entry at points z of the unit circle.
 
-        A loop asks for G and its gradient at the same points, one after the other: the last ones are kept.
+        A loop needs G and its gradient at the same points, one after the other: the last ones are cached.
         """
         key = z.tobytes()
         if key not in self._latest:

@@ -6,7 +6,7 @@ x^(t + 1) = (A - K C) x^ + (B - K D) u + K y has the gradient
     dx^(t + 1) = (A - K C) dx^ + (dA - K dC) x^ + (dB - K dD) u + dK e ,   dy^ = C dx^ + dC x^ + dD u ,
 
 stable with A - K C, whatever A is. Matrices in continuous time are sampled by a matrix exponential, with the
-derivatives in its off-diagonal block ([van-loan-1978]); K is that of the samples.
+derivatives in its off-diagonal block ([van-loan-1978]); K is the gain of the sampled model.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from inputdesign_cli.plant.held import whole_samples
 from inputdesign_cli.plant.model import DELAY, Parameter, Parametrised, Signals
 from inputdesign_cli.plant.transfer import Drive, StateSpace
 
-# This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.
+# Nearer to a pole at z = 1 than this, in rad/sample, the response at this distance is taken.
 _BESIDE = 1e-8
 _INTEGRATES = 1e-7
 
@@ -139,7 +139,7 @@ class StateSpaceModel(Parametrised):
 
     @property
     def direct_lag(self) -> int:
-        """Return the samples by which the direct gain is late."""
+        """Return the delay of the direct gain, in samples."""
         return self.lag + (self._split[1] > 0.0)
 
     @cached_property

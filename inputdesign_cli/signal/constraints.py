@@ -77,7 +77,7 @@ def compressed(values: Array, peak: float) -> Array:
     for _ in range(_ROUNDS):
         if least <= peak:
             break
-        # Clipping below the goal gets there sooner.
+        # Clipping below the goal reaches it sooner.
         transform = np.fft.rfft(np.clip(record, -0.95 * peak, 0.95 * peak))
         size = np.abs(transform)
         direction = np.where(size > 0, transform, 1.0) / np.where(size > 0, size, 1.0)
@@ -95,7 +95,7 @@ def restrained(values: Array, constraints: tuple[SignalConstraint, ...], *, retu
     more (a quasi-Newton method). The record is scaled down at the end so that the bounds hold exactly.
 
     Args:
-        returns: whether its last value is zero, as that of `values` then is.
+        returns: whether the last value stays zero, as it is in `values`.
     """
     record = values
     if peak_ratio(record, constraints) > 1.0:

@@ -22,10 +22,10 @@ _COARSE = 1e-3
 _WIDER = 1.5
 _GROWTH = 1.2
 _MOST_GROWTH = 40.0
-# A level that keeps more than this share of the figure gains too little; the second number may do so.
+# A level that leaves more than this share of the figure gains too little; this many in a row end a search.
 _WORTH = 0.998
 _PATIENCE = 4
-_NOTHING, _PLENTY = 1e-9, 1e30
+_LOWEST, _HIGHEST = 1e-9, 1e30  # levels relative to the start
 
 
 def least_level(ratio: Callable[[float], float], start: float) -> float:
@@ -35,23 +35,23 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
     function of that square, and near a line; its root is computed.
 
     Raises:
-        LinAlgError: the ratio is not defined at any level, or at most one at none: some parameter is not
+        LinAlgError: the ratio is defined at no level, or exceeds one at all levels: some parameter is not
             excited.
     """
     ratio = cache(ratio)
     level = start
-    for _ in range(2):  # exact at once when all that is known comes from the record
+    for _ in range(2):  # exact at once if all information comes from the record
         reached = ratio(level)
         if abs(reached - 1.0) <= 1e-12:
             return level
-        level *= min(reached, _PLENTY)
+        level *= min(reached, _HIGHEST)
     low = high = level
     while ratio(high) > 1.0:
         low, high = high, high * _WIDER
-        if high > _PLENTY * start:
+        if high > _HIGHEST * start:
             raise np.linalg.LinAlgError
     while ratio(low) <= 1.0:
-        if low <= _NOTHING * start:  # what is known without the record is enough
+        if low <= _LOWEST * start:  # the information without the record is enough
             return low
         low, high = low / _WIDER, low
 
@@ -68,8 +68,8 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
 def first_level(figure: Callable[[float], float], start: float) -> tuple[float, bool]:
     """Return the least of rising levels at which a `figure` is at most one, to a thousandth, and True.
 
-    Where limits are active, raising the level first helps, and at last changes nothing any more. When several
-    levels in a row gain too little, return the level of the least figure, and False.
+    Where limits are active, a higher level helps at first, and finally changes nothing. When several levels
+    in a row gain too little, return the level of the least figure, and False.
     """
     low, high = start / _GROWTH, start
     best, least, idle = start, np.inf, 0
@@ -119,8 +119,8 @@ class Target:
 
     Args:
         worst_ratio: maps an information matrix to the largest r_u / r_adm (or another figure, to be small).
-        meets: whether the level of the record is the lowest at which that is at most one; otherwise the
-            record has the power of the design.
+        meets: whether the level of the record is the lowest at which this ratio is at most one; otherwise
+            the record has the power of the design.
         cost: weights of the powers (of all channels together, or one weight a channel), to rank records
             that meet the target.
         designed: the cost of the design in the same weights; its power when not given.
@@ -146,7 +146,7 @@ class Evaluator:
 
     def ratio(self, samples: Array) -> float:
         """Return the worst ratio; infinite when the record does not excite every parameter."""
-        # The same record is asked for twice: when its level is found, and when it is ranked.
+        # A record is evaluated twice: when its level is found, and when it is ranked.
         if not self._latest or self._latest[0][0] is not samples:
             self._latest[:] = [(samples, self._ratio(samples))]
         return self._latest[0][1]

@@ -21,13 +21,13 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import FiniteRecord
 
 _RUNS = (1, 2, 3, 5, 8)
-_CLIMBS, _SHARE = 150, 0.1
-# How sharp the soft maximum is: at first and at the end of the climb, and for single changes.
+_CLIMBS, _SHARE = 150, 0.1  # steps of the climb; the largest share of values that one step changes
+# Sharpness of the soft maximum, at the start and the end of the climb, and for single changes.
 _SOFT, _SHARP = 20.0, 120.0
 _SHARPNESSES = (60.0, 200.0, 1000.0)
-_TRIED, _PAIRED = 40, 12
+_TRIED, _PAIRED = 40, 12  # the most promising changes are tried alone, and in pairs
 _BETTER = 1.0 - 1e-7
-_NEAR = 0.7  # of the largest ratio: local maxima beyond it are looked at while single values change
+_NEAR = 0.7  # local maxima above this share of the largest ratio count while single values change
 _KICKS = 3
 _STALE = 20  # changes in a row that lower a soft maximum, but not the largest ratio
 
@@ -76,7 +76,7 @@ class _Held:
 
     @cached_property
     def pulses(self) -> NDArray[np.float64]:
-        """Return what a first value of one at each input causes, (r, samples, k p)."""
+        """Return psi for a first value of one at each input, (r, samples, k p)."""
         samples, inputs = self.values * self.hold, self.goal.plant.experiment.inputs
         answers = []
         for channel in range(inputs):
@@ -116,7 +116,7 @@ class _Held:
         return back[: self.values * self.hold : self.hold]
 
     def changed(self, channel: int, first: int, steps: Array) -> Array:
-        """Return what psi changes by when values from `first` on change by `steps`, (samples, k p)."""
+        """Return the change of psi when values from `first` on change by `steps`, (samples, k p)."""
         samples = self.values * self.hold
         change = np.zeros((samples, self.pulses.shape[2]))
         for place, step in enumerate(steps, first):
@@ -151,7 +151,7 @@ class _Held:
 
 @dataclass
 class _Point:
-    """A record on the way: its values (n, r), what it causes at each plant, and its worst ratio."""
+    """A record of the search: its values (n, r), psi and M at each plant, and its worst ratio."""
 
     values: Array
     psis: list[Array]
@@ -193,7 +193,7 @@ class FlipSearch:
     Args:
         goals: the plants; the worst of them counts.
         letters: the levels of each input, (levels, r), the same number for every input.
-        allowed: says whether a record (samples, r) keeps to what else there is.
+        allowed: returns whether a record (samples, r) keeps to all other limits.
         most_moves: the largest number of changes of the inputs, from rest.
         returns: whether the last value is zero.
     """
@@ -210,7 +210,7 @@ class FlipSearch:
         returns: bool = False,
     ) -> None:
         self._held = [_Held(goal, values, hold) for goal in goals]
-        self._hardest = list(range(len(goals)))  # the plants, those that ended a look last first
+        self._hardest = list(range(len(goals)))  # the plants, the latest that excluded a record first
         self._letters, self._hold, self._allowed = letters, hold, allowed
         self._most_moves, self._returns = most_moves, returns
 
@@ -228,7 +228,7 @@ class FlipSearch:
         Args:
             starts: values (n, r), each improved on its own; the best is improved on.
             enough: ends the search once a ratio is as small.
-            over: says when time is over; it is looked at between changes.
+            over: returns whether time is over; it is called between changes.
             changes: the number of random changes of the best record that are tried at last.
         """
         best: _Point | None = None
@@ -272,7 +272,7 @@ class FlipSearch:
         return _Point(values, psis, informations, self._worst(informations, below))
 
     def _worst(self, informations: Sequence[Array], below: float) -> float:
-        """Return the largest ratio; if it is not under `below`, one that is not either."""
+        """Return the largest ratio, or if it is not under `below`, any ratio that is not."""
         largest = 0.0
         for place, number in enumerate(self._hardest):
             largest = max(largest, self._held[number].goal.worst(informations[number], below))
@@ -332,7 +332,7 @@ class FlipSearch:
         """Change runs one by one, and two by two, to lower ever sharper soft maxima of the ratios."""
         best = point
         for sharpness in _SHARPNESSES if np.isfinite(point.ratio) else ():
-            # The soft maximum is one of other places at each point: it may fall in a circle.
+            # Each point has a soft maximum at frequencies of its own, so that the search may go in a circle.
             stale = 0
             while stale < _STALE and not over() and best.ratio > enough:
                 places = [h.goal.places(M) for h, M in zip(self._held, point.informations, strict=True)]
@@ -438,7 +438,7 @@ def _more_moves(column: Array, steps: Array) -> Array:
 
 
 def with_few_moves(values: Array, most: int) -> Array:
-    """Return values (n, r) whose shortest runs have joined the run before them, until few moves are left."""
+    """Return values (n, r) whose shortest runs have joined the run before, until `most` moves are left."""
     for shortest in range(1, len(values) + 1):
         if moves_of(values) <= most:
             break

@@ -46,8 +46,8 @@ class SignalGenerator:
     def method(self) -> str:
         """Return the name of the kind that is made.
 
-        It is a multisine where noise was asked for, but the spectrum consists of sinusoids. So it is where no
-        spectral factor can be had to 1e-8 (a spectrum with deep zeros).
+        In place of noise it is a multisine if the spectrum consists of sinusoids, or if no spectral factor is
+        accurate to 1e-8 (a spectrum with deep zeros).
         """
         if self.settings.method != "filtered_noise":
             return self.settings.method
@@ -110,7 +110,7 @@ class SignalGenerator:
     def _hold_gain(self, block: int) -> Array:
         """Return the gain of holding each value k times on the powers of the harmonics, (block // 2 + 1,).
 
-        |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; the powers above are lost.
+        It is |sum_{i<k} e^{-jwi} / k|^2. `lines` compensates it up to pi / k; the powers above are lost.
         """
         w = 2.0 * np.pi * np.arange(block // 2 + 1) / (block * self.settings.hold)
         return np.abs(np.exp(-1j * np.outer(w, np.arange(self.settings.hold))).mean(axis=1)) ** 2

@@ -1,6 +1,6 @@
 """Choose the harmonics of a period at which a frequency response is measured, and the silent ones.
 
-An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones. Odd random grids
+Excited at odd harmonics, an even nonlinearity responds at even ones, an odd one at odd ones. Odd random grids
 ([pintelon-schoukens-2012], Section 4.3) leave out one of each group of odd harmonics at random.
 """
 
@@ -81,7 +81,7 @@ def harmonics_between(period: int, band: tuple[float, float], lines: int | None,
     wanted = np.geomspace(inside[0], inside[-1], lines)
     places = np.rint((wanted - inside[0]) / step).astype(int)
     ramp = np.arange(lines)
-    # Each at least one beyond the one before, and so early that the rest find places.
+    # Each is at least one place beyond its predecessor, and leaves places for the rest.
     places = np.maximum.accumulate(places - ramp) + ramp
     return inside[np.minimum(places, inside.size - lines + ramp)]
 

@@ -37,11 +37,11 @@ class SignalKind:
     """A kind of signal. Another package derives its own, and registers it (`signal/kinds.py`).
 
     Attributes:
-        few_levels: whether limits lower all values by one factor, which keeps them few; no ramp fades them.
+        few_levels: whether limits lower all values by one factor, which keeps the levels few, without ramps.
         flat: whether its spectrum is flat over the band, whatever is wanted: only powers count.
         slewed: whether it moves between two levels as fast as a limit on moves allows.
         off_grid: whether sinusoids of a record without periods keep frequencies between harmonics.
-        switched: whether better times to switch between its two levels are searched where it misses.
+        switched: whether better switching times of its two levels are searched if it misses the target.
         several: whether it serves several inputs at once.
     """
 

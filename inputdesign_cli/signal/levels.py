@@ -1,7 +1,7 @@
 """Signals of two or three levels with a wanted spectrum.
 
-A two-level signal cannot have any spectrum that one likes. These start from a multisine of the wanted line
-powers. Its phases make its fourth power small, so that its modulus hardly varies and little is lost by taking
+A two-level signal cannot have an arbitrary spectrum. These start from a multisine of the wanted line powers.
+Its phases make its fourth power small, so that its modulus hardly varies and little is lost by taking
 signs. Then they alternate between two projections: the nearest signal of these levels, and the nearest one
 with these line powers. Discrete-interval binary signals of specified line powers are due to
 [van-den-bos-krol-1979]. The loss against the designed spectrum is measured on the record's own information.
@@ -27,7 +27,7 @@ from inputdesign_cli.signal.multisine import multisine_record
 from inputdesign_cli.signal.phases import low_peak_phases
 from inputdesign_cli.signal.settings import SignalSettings
 
-# The 4-norm alone makes the modulus even.
+# The 4-norm alone makes the modulus most even.
 _EVEN, _EVEN_STEPS = (4,), 60
 _ROUNDS = 60
 
@@ -86,7 +86,7 @@ def few_levels(
 def _alternate(
     start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
 ) -> Array:
-    """Return the best signal of few levels that is met on the way between the two requirements."""
+    """Return the best signal of few levels among the iterates of the two projections."""
     levels = nearest(start)
     best, least = levels, np.inf
     for _ in range(_ROUNDS):

@@ -24,7 +24,7 @@ from inputdesign_cli.signal.settings import Quantiser, SignalSettings
 
 _ROUNDING = 1.0 + 1e-12
 _TRIES = 8
-_SILENT = 1e-300  # what signals that are zero use of their bounds, so that any factor will do
+_SILENT = 1e-300  # the share of a bound that a zero signal uses, so that any factor is within it
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Limiter:
             limited = np.clip(goal, -self._most, self._most)
             for channel in np.flatnonzero(np.isfinite(self._fastest)):
                 rate, column = float(self._fastest[channel]), limited[:, channel]
-                if self.settings.returns:  # in time to come back
+                if self.settings.returns:  # early enough to reach zero at the end
                     reach = rate * np.arange(len(column))[::-1]
                     column = np.clip(column, -reach, reach)
                 limited[:, channel] = follow(column, rate)
@@ -143,7 +143,7 @@ class Limiter:
                 tightened = tuple(replace(one, bound=shrink * one.bound) for one in self.constraints)
                 limited = restrained(limited, tightened, returns=self.settings.returns)
             record = self._converted(limited)
-            # Rounding may lift what the record causes over its bound by a little.
+            # Rounding may lift a response slightly above its bound.
             excess = peak_ratio(record, self.constraints)
             if excess <= 1.0:
                 break
@@ -161,9 +161,9 @@ class Limiter:
         return np.stack([one.step * one.steps(column) for one, column in columns], axis=1)
 
     def _levelled(self, goal: Array) -> Array:
-        """Return few levels as such: the limits bound their height, for all inputs by one factor.
+        """Return few levels that stay few: the limits lower all inputs by one factor.
 
-        With a converter the height is of whole steps, to the nearest or, at a limit, down.
+        With a converter the height is rounded to whole steps, to the nearest or, at a limit, down.
         """
         factor = self.factor(goal)
         if self.constraints:
@@ -194,7 +194,7 @@ def limited_responses(
 ) -> list[LimitedResponse]:
     """Return responses of each limited signal to sinusoids of the values, in steady state, and its bound.
 
-    `frequencies` (L,) are in rad per value. Of held values only the record itself has responses.
+    `frequencies` (L,) are in rad per value. If values are held, only the record itself has responses.
     """
     at, moving = frequencies / (step * hold), (1.0 - np.exp(-1j * frequencies))[:, None, None]
     found: list[LimitedResponse] = []

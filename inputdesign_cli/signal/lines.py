@@ -20,7 +20,7 @@ _END = 1e-12
 class Lines:
     """Sinusoids at `frequencies` (L,) in rad per step with power matrices (L, r, r), Hermitian.
 
-    `period` in steps when all lines lie on its grid; None for lines anywhere.
+    `period`, in steps, is given if all lines are its harmonics; it is None for lines anywhere.
     """
 
     frequencies: Array

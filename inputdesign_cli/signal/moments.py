@@ -43,7 +43,7 @@ def free_regressors(R: Array, samples: int, period: int) -> NDArray[np.float64]:
 
 
 def periodic_input(shares: Array, power: float, samples: int, period: int, rng: np.random.Generator) -> Array:
-    """Return cosines of random phases and the given mean square, of a period that divides it, (samples,).
+    """Return cosines of random phases and this mean square, of a period that divides `samples`, (samples,).
 
     Args:
         shares: (period // 2 + 1,) shares of the power on the lines 2 pi l / period.

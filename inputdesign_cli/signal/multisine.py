@@ -18,8 +18,8 @@ from inputdesign_cli.signal.lines import Lines, orthogonal_columns
 from inputdesign_cli.signal.phases import low_peak_phases, schroeder_phases
 from inputdesign_cli.signal.settings import LineVectors, SignalSettings
 
-_AT_ONCE = 1_000_000  # values of sinusoids
-# With more lines Schroeder's phases are nearly as good as optimised ones.
+_AT_ONCE = 1_000_000  # values of sinusoids computed together
+# For more lines Schroeder's phases are nearly as good as optimised ones.
 _OPTIMISED = 2000
 
 

@@ -12,10 +12,10 @@ from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.signal.lines import Lines, block_vectors
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
-# A frequency this near to a harmonic, in harmonics, is that one.
+# A frequency this near to a harmonic, in harmonic numbers, counts as on it.
 _ON_GRID = 1e-9
 
-# From the lines (L, r) to a signal, and the largest modulus that it may have.
+# The response of a signal to the lines (L, r), and its largest admissible modulus.
 LimitedResponse = tuple[ComplexArray, float]
 POWERS = (4, 8, 16, 32, 64, 128, 256, 512)
 STEPS = 150

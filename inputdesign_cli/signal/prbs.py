@@ -45,7 +45,7 @@ def register_length(samples: int) -> int:
 def shifted_sequences(bits: int, samples: int, inputs: int, rng: np.random.Generator) -> Array:
     """Return one sequence, for each input shifted by an equal part of its length, (samples, inputs).
 
-    Over a whole sequence the inputs are correlated by -1 over its length, but for lags at the shifts.
+    Over a whole sequence of length L the inputs have the correlation -1 / L, except at lags of the shifts.
     """
     shift = min((2**bits - 1) // inputs, samples)
     sequence = pseudo_random(bits, (inputs - 1) * shift + samples, rng)

@@ -15,7 +15,7 @@ from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.settings import SignalSettings
 
-# Of the largest line: smaller ones are rounding.
+# Lines below this share of the largest are rounding.
 _EXCITED = 1e-9
 _DIGITS = 13
 _MIDDLE = (0.05, 0.95)
@@ -46,11 +46,11 @@ def equal_lines(
 
 @dataclass(frozen=True)
 class Excites:
-    """Holds the excitation by a channel, its mean left out, if it goes on as it is.
+    """Holds the excitation by a channel without its mean, if the record repeats periodically.
 
     Attributes:
-        order: of persistent excitation, the lines of its spectrum on the whole circle ([ljung-1999],
-            Section 13.2).
+        order: the order of persistent excitation, the number of lines of its spectrum on the whole circle
+            ([ljung-1999], Section 13.2).
         band: the band in rad/sample, with 5 % of the power below and 5 % above.
     """
 
@@ -95,7 +95,7 @@ def scaled(u: Array, levels: Sequence[tuple[float, float]]) -> NDArray[np.float6
     """Return a record (N, r) from -1 to 1 scaled to a least and a largest value of each channel."""
     low, high = np.array(levels).T
     values = 0.5 * (low + high) + 0.5 * (high - low) * u
-    # Rounding in the last digits would be written, as 56.00000000000001.
+    # Rounding of the last digits would appear in files, as 56.00000000000001.
     digits = _DIGITS - np.ceil(np.log10(np.maximum(np.abs(low), np.abs(high)))).astype(int)
     rounded = [np.round(one, digit) for one, digit in zip(values.T, digits.tolist(), strict=True)]
     return np.asarray(np.clip(np.stack(rounded, axis=1), low, high))

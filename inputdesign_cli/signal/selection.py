@@ -16,24 +16,24 @@ from inputdesign_cli.signal.evaluation import MET, Evaluator, Target, first_leve
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.limits import Bounds, Limiter
 
-# Times the level that fits as it is: how much is clipped of the records that are tried.
+# Levels of the clipped records that are tried, in multiples of the largest level that needs no clipping.
 _CLIPPED = (1.0, 1.4, 2.0, 3.0)
-# Times the level that would do without limits: there they all bite.
+# A multiple of the level needed without limits; there all limits bind.
 _FAR = 40.0
-# So often at most the times of switching of ramps between two levels are changed.
+# The most changes of switching times that are tried in signals of two levels.
 _SWITCHINGS = 600
-# So many samples of candidates at most are drawn and compared at once.
+# The most samples, over all candidates, that are drawn and compared together.
 _AT_ONCE = 10_000
 LONG = 2000
 """Samples beyond which a record takes seconds to make, so that searches for a better one try less."""
-# Other phases hardly change the ratio of a record. Luck does not make up for a larger miss than this if the
-# record has enough samples, nor for one of more than some times what a few candidates differ by.
+# Other phases hardly change the ratio of a record. More candidates are hopeless if the ratio is larger than
+# this over enough samples, or if a few candidates miss by more than this multiple of their spread.
 _HOPELESS, _SAMPLES, _TRIES, _SPREADS = 1.15, 100, 3, 2.0
-# A record that costs more than the design by this share is worth more candidates.
-_LITTLE = 0.05
+# More candidates are tried while the best record costs more than this beyond the design, relative to it.
+_EXTRA_COST = 0.05
 _MOST_CHANGES = 3
 _SHIFTED = 0.6  # the share of the changes that shift a switch; the others add or remove one
-# After this number of tries, or a sixth of all: would the same gain, repeated, be enough?
+# After this number of tries, or a sixth of all, a search ends if its rate of gain would not be enough.
 _STRETCH, _STRETCHES = 100, 6
 
 
@@ -48,7 +48,7 @@ def better_switching(
 
     Args:
         figure: maps a signal of two levels to a number, to be small.
-        enough: ends the search; so does a pace that would not lead there. None: as small as it gets.
+        enough: ends the search, as does a rate of gain that would not reach it. None: use all tries.
     """
     best, least = values, float(figure(values))
     stretch = max(min(_STRETCH, tries // _STRETCHES), 1)
@@ -172,7 +172,7 @@ class _Candidates:
 
     def suffices(self, record: Record) -> bool:
         """Return whether the search may end: little is left to gain, or limits stand in the way."""
-        return not self.evaluator.target.meets or not self.limiter.plain or record.extra_power <= _LITTLE
+        return not self.evaluator.target.meets or not self.limiter.plain or record.extra_power <= _EXTRA_COST
 
     @property
     def together(self) -> int:
@@ -293,7 +293,7 @@ class _Candidates:
             return record(level), True
         kind = self.generator.kind
         if kind.few_levels and evaluator.ratio(record(_FAR * level)) > MET:
-            # More of the same levels is always better, and there is no more.
+            # A higher level is always better, and the limits allow no higher one.
             if kind.switched and switched:
                 values = self._switched(values, _FAR * level, rng)
                 record = self._at_levels(values)

@@ -58,7 +58,7 @@ class SignalSettings:
 
     Args:
         method: the name of a kind, see `kinds.py`.
-        phases: of a multisine. `orthogonal`: uniform, with vectors across the inputs that make the matrix
+        phases: for a multisine. `orthogonal`: uniform, with vectors across the inputs that make the matrix
             spectrum exact over as many periods as inputs; so do `schroeder` and `optimised`. `random`:
             uniform and independent in each input, exact on average only. `even`: optimised from Schroeder's.
         lines: harmonics of a period that are used.
@@ -68,11 +68,11 @@ class SignalSettings:
             after this time.
         ramp: samples over which the record fades in and out.
         returns: whether its last value is zero, the operating point.
-        bits: register of a pseudo-random sequence.
-        number: levels of steps.
+        bits: length of the register of a pseudo-random sequence.
+        number: number of levels of steps.
         level: (r,) the required peaks of the inputs, whatever accuracy follows.
-        candidates, most_candidates: up to the second number are tried while the best of the first costs more
-            than a twentieth beyond the design.
+        candidates, most_candidates: records to try; after the first number, up to the second while the best
+            costs more than a twentieth beyond the design.
     """
 
     method: str = "filtered_noise"

@@ -44,7 +44,7 @@ def spectral_factor(autocovariances: Array) -> SpectralFactor:
     m = c.size - 1
     lags = np.arange(m + 1)
     difference, total = lags - lags[:, None], lags + lags[:, None]
-    # One past the last tap stands a zero.
+    # Index m + 1 reads a zero behind the last tap.
     toeplitz = np.where(difference < 0, m + 1, difference)
     hankel = np.minimum(total, m + 1)
     taps = np.zeros(m + 1)

@@ -11,7 +11,7 @@ _LEVELS = 5
 
 
 class Steps(SignalKind):
-    """Even levels from -1 to 1, each for as long, in a random order of each input's own."""
+    """Equally spaced levels from -1 to 1, each held equally long, in a random order for each input."""
 
     flat = True
 

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 
-# From frequencies (n,) to values (n, ..) of one input, or Hermitian matrices (n, .., r, r) of several.
+# A map from frequencies (n,) to values (n, ..) for one input, Hermitian matrices (n, .., r, r) for several.
 Density = Callable[[Array], NDArray]
-# F (n, k, p, r) of a density of products, Re F_l^* F_m made symmetric in l and m: a shorter way to integrals.
+# A map to F (n, k, p, r), if the density is Re F_l^* F_m, symmetric in l and m: its integrals take less time.
 Factor = Callable[[Array], NDArray]
 
 
@@ -21,8 +21,9 @@ Factor = Callable[[Array], NDArray]
 class Functional:
     """A linear functional of the spectrum, (1 / 2 pi) integral of density(w) Phi(w) dw.
 
-    `vector` (n,) are its values on the n basis functions; `density` maps frequencies to (number,). A
-    `concentrated` functional also picks up Phi at single frequencies, which its density does not contain.
+    `vector` (n,) holds its values on the n basis functions; `density` maps frequencies (m,) to (m,), or to
+    (m, r, r) for several inputs. A `concentrated` functional also has a part at single frequencies, which is
+    not in the density.
     """
 
     vector: Array
@@ -52,7 +53,7 @@ def constant(level: NDArray) -> Density:
 
 
 def kept_on_grid(density: Callable[[Array], NDArray]) -> Callable[[Array], NDArray]:
-    """Return the function with a memory of its values at the last of the largest arrays."""
+    """Return the function with a cache of its values at the latest array of the largest size."""
     last: list[tuple[Array, NDArray]] = []
 
     def known(w: Array) -> NDArray:
@@ -79,7 +80,7 @@ class Face:
     """A part of the cone of spectra, small enough for a solver: x = columns y with y in a simple cone.
 
     `columns` is (size, number); `kind` says that y is a nonnegative vector or svec of a positive
-    semidefinite matrix of order `order`. `generators` is the basis' own record of the spectra that span it.
+    semidefinite matrix of order `order`. `generators` are the spectra that span it, in a form of the basis.
     """
 
     columns: Array
@@ -92,7 +93,7 @@ class Face:
 class Pricing:
     """The price of a dual point: `scale` is the largest s with price - s value >= 0 on the whole cone.
 
-    `directions` are the members of the cone (in the basis' own record) where the inequality is tightest. They
+    `directions` are the members of the cone (in a form of the basis) where the inequality is tightest. They
     are added to a face when the dual point came from a face alone.
     """
 

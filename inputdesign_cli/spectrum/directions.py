@@ -12,10 +12,10 @@ from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum.basis import Functional
 
 _SINGULAR = 1e-13
-# A price below this is none: its inverse would leave the range of double precision.
-_NOTHING = 1e-140
-_LEVEL = 1e-10  # ratios this near to each other, relative, are the same
-_BETWEEN = 200  # frequencies between two of a grid
+# A price below this counts as zero: its inverse would leave the range of double precision.
+_FREE = 1e-140
+_EQUAL = 1e-10  # relative difference up to which two ratios are equal
+_BETWEEN = 200  # frequencies searched between two points of a grid
 
 
 def matrices(density: NDArray) -> NDArray:
@@ -35,13 +35,13 @@ def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
     if price.ndim == 1:
         with np.errstate(divide="ignore", invalid="ignore"):
             quotient = value / price
-        # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
+        # Where the price vanishes (S at DC under integral action) only the neighbouring ratios count.
         ratios = np.where(price > 0, quotient, -np.inf)
         return ratios[:, None], np.ones((price.size, 1, 1), dtype=complex)
     each = np.einsum("naa->na", price).real
     size = each.sum(axis=1)
-    free = size <= _NOTHING
-    # Channel by channel: a share of the price of a dear one would be many times the price of a cheap one.
+    free = size <= _FREE
+    # Channel by channel: a small share of the largest price may exceed the price of a cheap channel.
     little = _SINGULAR * np.where(each > 0.0, each, size[:, None]) + free[:, None]
     P = price + little[:, :, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))
@@ -85,8 +85,8 @@ def _beside_free(
 ) -> float:
     """Return the largest frequency at which a `ratio` is as large as beside grid[0], which costs nothing.
 
-    Towards that frequency the ratio hardly changes, but the price loses its size: a sinusoid there would have
-    no unit. The grid may be coarse there, so that the interval in which the ratio falls is searched.
+    Below that frequency the ratio hardly changes while the price vanishes, and sinusoids could not be scaled
+    by their price. The grid may be coarse there, so that the interval in which the ratio falls is searched.
 
     Args:
         over_grid: the ratios on the grid.
@@ -94,7 +94,7 @@ def _beside_free(
     """
 
     def same(ratios: Array) -> NDArray[np.bool_]:
-        return np.abs(ratios - top) <= _LEVEL * np.abs(top)
+        return np.abs(ratios - top) <= _EQUAL * np.abs(top)
 
     beyond = int(np.searchsorted(grid, first, side="right"))
     fallen = np.flatnonzero(~same(over_grid[beyond:]))
@@ -113,7 +113,7 @@ def inverse_of(heights: Array) -> float:
 def first_directions(units: Array) -> ComplexArray:
     """Return directions (number, r) along each channel, and along pairs in phase and in counterphase.
 
-    Of a pair each takes part in proportion to its unit (r,); directions have length one.
+    The channels of a pair take part in proportion to their units (r,); directions have length one.
     """
     axes = np.diag(units)
     both = [axes[i] + sign * axes[j] for i in range(len(units)) for j in range(i) for sign in (1.0, -1.0)]

@@ -37,7 +37,7 @@ class FirBasis(GramBasis):
 
     @property
     def sizes(self) -> FaceSizes:
-        """See `GramBasis`; of one input few generators reach the optimum."""
+        """See `GramBasis`; for one input few generators reach the optimum."""
         return _OF_ONE_INPUT if self.inputs == 1 else super().sizes
 
     def spread(self, powers: Array) -> Array:
@@ -48,7 +48,7 @@ class FirBasis(GramBasis):
         return flat
 
     def moving_average(self, x: Array) -> Array | None:
-        """Return the autocovariances of one input."""
+        """Return the autocovariances of one input, None for several."""
         return x if self.inputs == 1 else None
 
     def of_order(self, order: int) -> FirBasis:
@@ -96,7 +96,7 @@ class FirBasis(GramBasis):
     def _functional(self, sums: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (size, ...) from the real parts (m + 1, r, r, ...) of the integrals of D(w) e^{-jwt}.
 
-        tr(D c_t e^{-jwt}) and its mirror image add up to twice the real part; D_ij meets c_ji.
+        tr(D c_t e^{-jwt}) and its mirror image add up to twice the real part; D_ij multiplies c_ji.
         """
         rows, columns, _ = svec_layout(self.inputs)
         mean = 0.5 * (sums[0] + sums[0].swapaxes(0, 1))

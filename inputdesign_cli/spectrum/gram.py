@@ -20,14 +20,14 @@ from inputdesign_cli.spectrum.directions import directed_scale
 from inputdesign_cli.spectrum.svec import smat
 
 _DIRECTIONS = 8
-# Share of the largest eigenvalue below which a generator is dropped. The cost is the trace. So small a share
-# of it is the solver's distance from the boundary of the cone, and further steps are spent on it.
+# A generator with a smaller eigenvalue, relative to the largest, is dropped. Its share of the cost, which is
+# the trace, is the solver's distance from the boundary of the cone; keeping it would cost further steps.
 _KEPT = 1e-10
 _SINGULAR_PRICE = 1e-12
 
 
 class FaceSizes(NamedTuple):
-    """Holds the order `whole` up to which a face is the whole cone; larger ones keep the first generators."""
+    """Holds orders: up to `whole` a cone is its own face; others get `first`, later `kept` generators."""
 
     whole: int = 28
     first: int = 16

@@ -1,7 +1,7 @@
 """Line spectra: sinusoids of free power, at given frequencies or wherever they pay.
 
 Each has a direction v across the channels; the power matrix of a line, Hermitian (r, r), is the sum over its
-directions of power v v^*. With free frequencies this is every spectrum whatever: an information matrix that
+directions of power v v^*. With free frequencies these stand for every spectrum: an information matrix that
 some spectrum reaches is reached by finitely many sinusoids (Caratheodory).
 """
 
@@ -25,18 +25,18 @@ from inputdesign_cli.spectrum.directions import (
 )
 
 _FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
-# New atoms a round: for each input, and in all. The best few get company (see `_around`).
+# New atoms a round, for each input and in all, and how many of them get neighbours (see `_around`).
 _NEW_EACH, _MOST_NEW, _MOST_ACCOMPANIED = 16, 64, 16
-# Beyond the first number of atoms, the second number stay, with the most power.
+# A face with more atoms than the first number keeps the second number, with the most power.
 _MOST_ATOMS, _KEPT_ATOMS = 320, 200
 _ATOMS_AT_ONCE = 256
 # Two atoms at one frequency are the same when their directions agree this closely.
 _SAME = 1e-12
-# An atom is in use from this share of the cost, and near another within this distance (band and turn).
+# Share of the cost from which an atom is in use; distance (in frequency and direction) of a neighbour.
 _USED = 1e-4
 _NEAR = 0.2
-# What hardly counts among limits that are not all there is to pay keeps a finite unit.
-_FREE = 1e-12
+# Least price, relative to the largest, by which an atom is scaled: some atoms are nearly free.
+_LEAST_PRICE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class LinesBasis:
     """The unknowns are the powers of atoms: sinusoids at `frequencies` (L,) along `directions` (L, r).
 
     Directions have length one, so that the power is the total over the channels; they are compared in
-    `units` (r,) of the channels. The basis grows by
-    the atoms that would pay: anywhere on the grid when `free`, else at `allowed` frequencies with any
-    direction. Prices then hold for every spectrum, or for every spectrum on those lines.
+    `units` (r,) of the channels. The basis grows by the atoms that would pay: anywhere on the grid when
+    `free`, else at `allowed` frequencies with any direction. Prices then hold for every spectrum, or for
+    every spectrum on the allowed lines.
     """
 
     frequencies: Array
@@ -97,7 +97,7 @@ class LinesBasis:
         return np.zeros((np.size(w), *shape))
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """Return zero, as the density."""
+        """Return zero, since the density is zero."""
         return np.zeros(self.size)
 
     @property
@@ -148,14 +148,14 @@ class LinesBasis:
     def _face(self, atoms: NDArray[np.intp], prices: Array) -> Face:
         """Return these atoms, each in units of its price; the generators are their numbers."""
         columns = np.zeros((self.size, atoms.size))
-        columns[atoms, np.arange(atoms.size)] = 1.0 / np.maximum(prices[atoms], _FREE * prices.max())
+        columns[atoms, np.arange(atoms.size)] = 1.0 / np.maximum(prices[atoms], _LEAST_PRICE * prices.max())
         return Face(columns, "nonnegative", atoms.size, atoms)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """Return the ratio over all allowed frequencies and directions, and new atoms (frequency, direction).
 
-        New atoms have all stationary directions of their frequency: the power matrix there may need them
-        together, and the best one a round would take as many rounds.
+        A frequency may get several of its stationary directions at once: the power matrix there may need
+        them together, and one direction a round would take more rounds.
         """
         scale, where = directed_scale(price, value, grid) if self.free else (None, self.allowed)
         ratios, directions = every_direction(price.density(where), value.density(where))
@@ -167,7 +167,7 @@ class LinesBasis:
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
         """Return the atoms so far and the new ones; x of the old basis is the head of x of the new.
 
-        Of very many atoms the faintest are dropped from the face. They come back when they pay.
+        A face with very many atoms loses the faintest. They come back when they pay.
         """
         number = face.generators
         power = np.zeros(self.size)
@@ -195,8 +195,8 @@ class LinesBasis:
     def _around(self, y: Array, atoms: NDArray) -> list[NDArray]:
         """Return atoms halfway from the nearest atom in use to each of the new ones, and as far beyond.
 
-        Each round moves the best frequencies and directions a little less than the round before; what lies
-        on both sides of a new atom saves a quarter of the rounds.
+        Each round moves the best frequencies and directions a little less than the round before. Atoms on
+        both sides of a new one save a quarter of the rounds.
         """
         used = np.flatnonzero(y > _USED * y.sum())
         span, found = max(float(np.ptp(self.allowed)), np.finfo(float).tiny), []

@@ -2,8 +2,8 @@
 
 [mohan-spectral], (8)-(9), with S = H H^T in place of the factor H: only S enters the information
 and the powers, which are linear in it. W = [p_0 I, .., p_m I], and the band is the half band [lo, hi]
-mapped to [-1, 1]: a polynomial on [-w_c, w_c] with real coefficients need not be an even spectrum,
-and what is not even is not the spectrum of any real signal.
+mapped to [-1, 1]: a polynomial on [-w_c, w_c] with real coefficients need not satisfy
+Phi(-w) = Phi(w)^T, as the spectrum of a real signal does.
 """
 
 from __future__ import annotations

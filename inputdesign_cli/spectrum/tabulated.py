@@ -1,4 +1,4 @@
-"""A spectrum that is given as a table, in any unit of frequency: nothing to design, but all to integrate."""
+"""A spectrum given as a table, in any unit of frequency: it is integrated, but not designed."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class TabulatedSpectrum(DensityFamily):
     def raised(self, share: float) -> TabulatedSpectrum:
         """Return the table with a `share` of its interpolation error added to all rows.
 
-        The error is found by interpolation from every second row to the others. It is taken by its size, so
-        that errors at different frequencies do not cancel.
+        The error is found by interpolation from every second row to the others. Its absolute value (as a
+        matrix) is added, so that errors at different frequencies do not cancel.
         """
         rows = np.unique([*range(0, self.frequency.size, 2), self.frequency.size - 1])
         missed = self.phi - TabulatedSpectrum(self.frequency[rows], self.phi[rows])._at(self.frequency)
         values, vectors = np.linalg.eigh(missed)
         size = np.einsum("nij,nj,nkj->nik", vectors, np.abs(values), vectors.conj())
-        around = size.copy()  # what is kept has no error of its own, and its neighbours have
+        around = size.copy()  # the kept rows have no error, and get the errors of both neighbours
         around[rows] = sum(size[np.clip(rows + step, 0, len(size) - 1)] for step in (-1, 1))
         return TabulatedSpectrum(self.frequency, self.phi + share * around)
 

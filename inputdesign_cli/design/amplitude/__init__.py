@@ -1,1 +1,1 @@
-"""The signals within an amplitude: what their autocovariances can be, and the best of them."""
+"""Signals within an amplitude: their possible autocovariances, and the best of them."""

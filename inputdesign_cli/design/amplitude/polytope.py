@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.amplitude.windows import Windows, weighted
 
-# Cycles that are tried in one search; a facet is found when no cycle exceeds it by the second number. Cycles
-# that exceed it by the third are taken at once.
+# Most cycles of one search. A facet is found when no cycle exceeds it by the second number; a cycle that
+# exceeds it by the third is taken without a search for the best one.
 _MOST_CYCLES, _CLOSE, _DEEP = 400, 1e-5, 1e-3
-_BOX, _SAME = 1e3, 1e-12
+_BOX, _SAME = 1e3, 1e-12  # largest entries of a form; largest difference between equal lags
 _FIRST = 60
 
 
 @dataclass(frozen=True)
 class Facet:
-    """A form (m, r, r) that exceeds one for no signal within the amplitude, and its value at some lags."""
+    """A form (m, r, r), at most one for all signals within the amplitude, and its value at some lags."""
 
     form: Array
     share: float
@@ -43,7 +43,7 @@ class LagPolytope:
     _values: Array | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Begin with a few cycles, which bound the forms that are looked for."""
+        """Begin with a few cycles, which bound the forms of a search."""
         letters, rng = self.windows.letters, np.random.default_rng(0)
         first = [letters[[i, j]] for i in range(len(letters)) for j in range(i, len(letters))]
         tried = letters[rng.integers(len(letters), size=(_FIRST, 2 * self.windows.length))]
@@ -59,7 +59,7 @@ class LagPolytope:
     def gauge(self, lags: Array) -> tuple[float, Facet]:
         """Return the least multiple of the polytope that contains lags (m, r, r), and a facet that shows it.
 
-        The multiple is that of the known cycles, so that it is an upper bound; the facet proves a lower one.
+        The multiple rests on the known cycles, so that it is an upper bound; the facet proves a lower one.
         """
         inputs, unit = self.windows.letters.shape[1], float(np.abs(self.windows.letters).max()) ** 2
         twice = weighted(np.ones_like(lags)).ravel()

@@ -15,7 +15,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 
-_BLOCKS, _STEPS, _FINE = 100, 32, 1e-6
+_BLOCKS, _STEPS, _FINE = 100, 32, 1e-6  # blocks of value iterations, steps of each, relative gap at the end
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Windows:
         return self.letters[digits]
 
     def _rewards(self, form: Array) -> Array:
-        """Return what each next letter adds to the form (m, r, r) at each state, (states, letters)."""
+        """Return the part of each next letter in the form (m, r, r) at each state, (states, letters)."""
         pull = np.einsum("kab,skb->sa", form[1:], self._past)
         own = np.einsum("la,ab,lb->l", self.letters, form[0], self.letters)
         return own + 2.0 * pull @ self.letters.T
@@ -68,10 +68,11 @@ class Windows:
     ) -> tuple[float, Array, Array]:
         """Return an upper bound of the largest mean of a form (m, r, r), a cycle of letters, and values.
 
-        The bound holds for any values (states,) v: no mean exceeds the largest T v - v.
+        The bound holds for any values v (states,): no mean exceeds the largest T v - v, with T the step of
+        dynamic programming.
 
         Args:
-            start: the values to begin with, as another form left them.
+            start: the values to begin with, for example the result for another form.
             enough: ends the search when a cycle has a mean beyond this.
         """
         rewards = self._rewards(form)
@@ -120,7 +121,7 @@ class Windows:
             choices.append(every.argmax(axis=1).astype(np.uint8))
             values = every.max(axis=1)
         for known in range(min(m - 1, samples) - 1, -1, -1):
-            # Before `known` letters there is rest: states of fewer letters.
+            # The record begins from rest: after `known` letters, states consist of these only.
             past = Windows(self.letters, known + 1)
             every = past._rewards(form[: known + 1]) + values.reshape(-1, size)
             choices.append(every.argmax(axis=1).astype(np.uint8))

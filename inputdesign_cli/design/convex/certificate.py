@@ -1,7 +1,7 @@
 """Lower bounds that we prove ourselves: dual points, evaluated and made exactly feasible.
 
 M' of a scenario is its information matrix (see `Problem`), s the factor or number of samples that is
-minimised, M_fixed + s M_scaled what M' has without a spectrum; "side" marks requirements on M' / s.
+minimised, M_fixed + s M_scaled the part of M' without a spectrum; "side" marks requirements on M' / s.
 
 Every cut gives tr(Y M') >= r for all admissible M' of its scenario; every limit a(z) <= b (times s) takes a
 weight w >= 0. With price = cost + sum w a over the upper limits and value = sum_s tr(Y_s M_s(.)) + sum w a
@@ -35,11 +35,11 @@ from inputdesign_cli.design.convex.problem import Problem, weighty_ones
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum import Functional, weighted_mean
 
-# Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs
-# the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
-# what only it prices would then set the scale: the largest share is tried last.
+# Every power limit gets this share of the weight of all limits in addition, so that no spectrum is free; the
+# bound falls by as much. The multiplier of a weak limit is below the accuracy of the solver, and spectra that
+# only this limit prices would then set the scale. The largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
-# A price that all but vanishes somewhere has a finite unit only with more for power: these are tried.
+# The price of forms of the lags nearly vanishes at some frequencies, and needs larger shares.
 _FORM_SHARES = (1e-4, 1e-3)
 _LIFT = 1e-12
 _TINY = np.finfo(float).tiny
@@ -173,9 +173,9 @@ def _grid(problem: Problem, weights: NDArray[np.float64], costs: Array) -> Array
 
 
 def _lifted(problem: Problem, price: Functional, grid: Array) -> tuple[Functional, float]:
-    """Return the price with so much for power that it is nowhere negative, and how much that is.
+    """Return the price plus a multiple of the power that makes it nowhere negative, and that multiple.
 
-    A form of the lags may fall below zero, where nothing would pay.
+    A form of the lags may be negative at some frequencies, where spectra would have a negative price.
     """
 
     def below(w: Array) -> Array:

@@ -18,15 +18,15 @@ from inputdesign_cli.spectrum import smat, svec, svec_layout
 
 Stack = NDArray[np.float64]  # matrices (number, d, d)
 
-# Products of all pairs of entries at once pay from this many matrices on, and fit up to this many pairs.
+# Products of all pairs of entries together pay off from this number of matrices, up to this number of pairs.
 _TOGETHER, _MOST_PAIRS = 4, 1 << 23
 
 
 class Entries:
     """Selects the entries of symmetric matrices (k, k) that may differ from zero, scaled as in svec, then s.
 
-    Matrices that fall into blocks keep few: products of all pairs of entries, which is what the linear system
-    costs, then concern the blocks alone.
+    Block-diagonal matrices keep few entries: the products of all pairs of entries, which dominate the cost of
+    the linear system, then concern the blocks alone.
     """
 
     def __init__(self, order: int, kept: NDArray[np.intp], *, with_s: bool) -> None:
@@ -74,7 +74,7 @@ class Entries:
         return total
 
     def _product(self, one: Array, first: NDArray[np.intp], other: Array, second: NDArray[np.intp]) -> Array:
-        """Multiply columns `first` of one by columns `second` of the other, in memory that is used again."""
+        """Multiply columns `first` of one by columns `second` of the other, in memory that is reused."""
         left, right = self._room
         np.take(one, first, axis=1, out=left, mode="clip")
         np.take(other, second, axis=1, out=right, mode="clip")
@@ -141,7 +141,7 @@ class Cone(ABC):
 
     @abstractmethod
     def lengths(self) -> tuple[float, float]:
-        """Return the largest step lengths along dS and dZ that stay in the cone, at most one."""
+        """Return the largest step lengths along dS and dZ that stay in the cone, infinite without a bound."""
 
     def gap_after(self, up: float, down: float) -> float:
         """Return the duality gap <S + up dS, Z + down dZ> after a step."""
@@ -193,7 +193,7 @@ class Orthant(Cone):
         return reach(self.S, self.dS), reach(self.Z, self.dZ)
 
     def multipliers(self) -> list[Array]:
-        """Return the multipliers of all inequalities: one array (n,)."""
+        """Return the multipliers of all inequalities: one array (l,)."""
         return [self.Z]
 
 
@@ -255,7 +255,7 @@ class Semidefinite(Cone):
         return self.aim
 
     def answer(self, dS: Stack) -> None:
-        """Return dZ for this dS."""
+        """Set dS, and the dZ that follows from it."""
         self.dS = dS
         self.dZ = self.aim - self.Z - self.scaled(dS)
 

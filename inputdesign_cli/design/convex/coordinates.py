@@ -26,7 +26,7 @@ from inputdesign_cli.spectrum import LinesBasis, flat_basis
 
 _EVEN = 1e-9
 _FAINT = 1e-9
-_UNSUITED = 1e8  # a condition beyond which coordinates do not suit
+_UNSUITED = 1e8  # the condition number beyond which coordinates are replaced
 
 
 def white_power(question: Question) -> float:
@@ -117,7 +117,7 @@ def _suited_to(problem: Problem, experiment: Experiment, information: Array, sta
 def _stated(question: Question, experiment: Experiment) -> Problem:
     """Return the problem without its requirements."""
     densities = tuple(question.densities)
-    # A limit holds at every plant; of the powers that are the same at all it stands there once.
+    # A limit holds at every plant. On a power that does not depend on the plant it is stated once.
     everywhere = [
         replace(limit, scenario=number)
         for limit in question.limits
@@ -138,11 +138,11 @@ def _stated(question: Question, experiment: Experiment) -> Problem:
 
 
 _POLISH = 3
-# Logarithms: an excitation so much stronger is as good as any, and a ratio that moves less stands still.
+# Logarithms: the rise of the power beyond which more is useless, and the least fall of a ratio that counts.
 _PLENTY, _STILL = 46.0, 1e-6
-_UNDERFLOW = -650.0  # below, powers underflow
+_UNDERFLOW = -650.0  # the logarithm of the least power, before powers underflow
 _EXACT = 1e-13
-_SUITED = 8.0  # how far from their own power coordinates serve
+_SUITED = 8.0  # coordinates serve powers whose logarithm differs by no more from their own
 
 
 def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
@@ -171,7 +171,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
             while excess(lo) <= 0:
                 lo -= 2.0
                 if lo < _UNDERFLOW:
-                    return 0.0  # nothing is asked
+                    return 0.0  # there is no requirement
         except np.linalg.LinAlgError:
             return 0.0  # the noise alone meets the requirement, and has no information on other parameters
         found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))

@@ -107,7 +107,7 @@ class Inequalities(Semidefinite):
         if self.form is None:
             return missed
         self.H_form = self.scaled(self.form)
-        # A dual condition that is the unknown's own: its price balances what the form weighs.
+        # The dual condition of nu_b: its multiplier and tr(form_b Z_b) add up to zero.
         unbalanced = np.abs(np.einsum("nab,nab->n", self.form, self.Z) + self.price)
         return max(missed, float(unbalanced.max()))
 

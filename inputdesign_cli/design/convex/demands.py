@@ -1,4 +1,4 @@
-"""What a design is asked: its question, the requirements of all scenarios, and which of them are missed."""
+"""The demands on a design: its question, the requirements of all scenarios, and which of them are missed."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from inputdesign_cli.information import Experiment, PowerKind, joint_noise
 from inputdesign_cli.spectrum import Basis
 
 RequirementFactory = Callable[[Experiment], Requirement]
-# This number of scenarios is enough for a next step: what serves the worst few serves most of the others.
+# This number of scenarios is enough for a next step: cuts for the worst few serve most of the others.
 FEW = 4
-# Maxima above this share of the level searched for are noted, so that a small step needs no other search.
+# Maxima above this share of the required level are noted, so that a small step needs no other search.
 _NEARLY = 0.99
 
 
@@ -137,7 +137,7 @@ class Demands:
 
         Args:
             side: look at the side requirements, not at the others.
-            few: stop after this number of scenarios with violations; the worst ones before are first.
+            few: stop after this number of scenarios with violations; the largest bounds come first.
         """
         if len(self.scenarios) == 1:
             return self._violated(0, informations[0], above, side)
@@ -164,7 +164,7 @@ class Demands:
     def _by_most(self, informations: NDArray[np.float64], side: bool, above: float) -> Iterator[int]:
         """Yield the scenarios that may have ratios above `above`, the largest first.
 
-        A scenario is looked at when no other may have more, so that most of them never are.
+        A scenario is evaluated when no other may have a larger ratio, so that most of them never are.
         """
         seen = self._seen[int(side)]
         looked, searched = seen.most(informations)
@@ -235,10 +235,10 @@ class Alternative:
 class Question:
     """A design question in raw parameters: requirements are made for the coordinates of a design.
 
-    The goal "factor" improves on `goal_requirements` (a criterion, or all requirements); `side` must also
+    The goal "factor" improves on `requirements` (one criterion, or several requirements); `side` must also
     hold. The other goals meet all of them. They hold at the nominal plant, which `experiment` has, and at
-    each of the `others`; `paid` is as in `Problem`. `anywhere` is the band of every spectrum, for a best
-    design only approached at an end of the experiment's band.
+    each of the `others`; `paid` is as in `Problem`. `anywhere` is the band of the bound over every spectrum,
+    if the best design is only approached at an end of the band of the experiment.
     """
 
     experiment: Experiment

@@ -1,7 +1,7 @@
 """The three designs, each with its white baseline and its bound over every spectrum.
 
 Least cost, best accuracy and the shortest experiment are one program in different unknowns (see
-`Problem`); what differs is what white excitation is worth and what stands for "nothing is needed".
+`Problem`). They differ in the white baseline, and in the design for the case that nothing is needed.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def _cheaper(problem: Problem, start: Array, even: Array) -> Array:
 
 
 def _begins_flat(basis: Basis) -> bool:
-    """Return whether its first function is the flat spectrum of power one, whose integrals are known."""
+    """Return whether the first function is the flat spectrum of power one, whose integrals are known."""
     return basis.has_density and basis.even[0] == 1.0 and not np.any(basis.even[1:])
 
 
@@ -159,7 +159,7 @@ def _white(question: Question, flat: Problem, power: float) -> Candidate:
         # Enough for the nominal plant; the others may take more.
         at = np.array([power])
         return scaled_up(flat, at, 1.0, []) if power > 0.0 and flat.others else flat.candidate(at, 1.0)
-    # From far below, since what meets the requirements with room to spare is not scaled down.
+    # From far below, since a spectrum that meets the requirements with room to spare is not scaled down.
     return scaled_up(replace(flat, floors_fixed=False), np.array([_FAR_BELOW * power]), 0.0, [])
 
 
@@ -227,7 +227,7 @@ def _check_reachable(problem: Problem, start: Array) -> None:
         )
 
 
-# Shares of the least eigenvalue of the information that lines may take with them.
+# Removed lines may change the information by this share of its least eigenvalue: with limits, and without.
 _ROUNDING, _FAINT = 1e-12, 1e-9
 
 
@@ -244,11 +244,11 @@ def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResu
     least = np.linalg.eigvalsh(found.informations)[:, 0]
     if least.min() <= 0.0:
         return found
-    samples = found.s if problem.goal == "samples" else 1.0  # of the information that was found
+    samples = found.s if problem.goal == "samples" else 1.0  # the samples that `found.informations` belong to
     shares = samples * found.x * np.max(np.linalg.norm(at.information_maps, axis=(2, 3)) / least, axis=1)
     order = np.argsort(shares)
     lost = np.cumsum(shares[order])
-    # Beside limits there is no room to make up for more than rounding.
+    # Under limits the remaining lines can make up for rounding only.
     tight = problem.scaled or problem.limits or problem.densities
     faint = lost <= (_ROUNDING if tight else _FAINT)
     if not np.any(faint):

@@ -1,10 +1,10 @@
-"""The exchange method: a finite conic program, enlarged by whatever it violates, until a proof closes.
+"""The exchange method: a finite conic program, enlarged by violated constraints until the gap is closed.
 
 Both the cone of spectra and most requirements hold infinitely many conditions, and each scenario has its own:
-a semi-infinite program ([hettich-kortanek-1993]). Each round solves with a finite selection, whose optimum is
-a relaxation, asks every piece for its worst violations, and adds those. Upper bound: the iterate, repaired
-until everything holds (`candidate`). Lower bound: its multipliers, made exactly dual feasible
-(`certificate`). Their distance is the proof.
+a semi-infinite program ([hettich-kortanek-1993]). Each round solves a finite selection, a relaxation, and
+adds the worst violations of every part. The upper bound is the iterate, repaired until everything holds
+(`repair`). The lower bound comes from its multipliers, made exactly dual feasible (`certificate`). Their
+distance is the proved gap.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from inputdesign_cli.spectrum import Basis
 
 MAX_ROUNDS = 60
 _STAGE_TOLERANCE = 1e-2
-# A finite program that is solved to the tolerance may leave a little more: it is solved to this share of it.
+# A program solved to the tolerance may end with a larger gap. It is then solved to this share of it.
 _FINER = 0.1
 _STAGE_ROUNDS = 10
-# Rounds without a tenth of progress after which rounding has the last word. A basis that still grows may
-# take several to find the sinusoids that pay.
+# Rounds without a gain of a tenth after which only rounding is left. A growing basis may take several rounds
+# to find the sinusoids that pay.
 _PATIENCE, _PATIENCE_GROWING = 6, 16
 
 Enough = Callable[[float, float], bool]
@@ -73,11 +73,11 @@ class ExchangeResult:
 
     @property
     def active_frequencies(self) -> Array:
-        """Return the frequencies (rad/sample) of the requirements that bind."""
+        """Return the frequencies, in the unit of the experiment, of the requirements that bind."""
         return np.array([w for _, w in self.active if w is not None])
 
     def active_at(self, index: int) -> Array:
-        """Return the frequencies (rad/sample) at which one requirement binds; side ones count last."""
+        """Return the frequencies at which one requirement binds, by its index in `Demands.asked`."""
         return np.array([w for i, w in self.active if i == index and w is not None])
 
     @property
@@ -105,7 +105,7 @@ def exchange(
             scaling cannot repair an iterate: limits or lower limits that do not scale, side requirements.
         tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
             when the solver makes no more progress: its `gap` says so.
-        enough: stop already when it says so of (objective, bound).
+        enough: maps (objective, bound) to whether to stop already.
         known: places that are likely to bind, for example from a similar design: cuts to begin with.
 
     Raises:
@@ -138,7 +138,7 @@ def exchange(
                 asked *= _FINER
                 continue
             if stalled and state.gap > goal and not state.dense:
-                # The dense method finds more digits of multipliers of very different sizes.
+                # The dense method is more accurate for multipliers of very different sizes.
                 state.dense = True
                 gaps.clear()
                 continue

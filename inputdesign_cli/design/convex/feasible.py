@@ -1,4 +1,4 @@
-"""Is there a design within the limits at all: a strictly feasible one, or a proof that there is none."""
+"""Feasibility within the limits: a strictly feasible design, or a proof that there is none."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
         return problem.basis, within if within is not None else start * (0.5 / least_scale(factor, start))
     found = exchange(factor, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
     if found.objective >= 1.0 > found.certificate.bound and problem.goal == "cost":
-        # Undecided: the limits alone leave some combination of the inputs free. With a cap on all it is not.
+        # Undecided: the limits leave some combination of the inputs free, which a cap on all prevents.
         most = scaled_up(replace(problem, limits=(), densities=()), start, 1.0, []).z
         total = problem.power("excitation").at(most)
         capped = replace(factor, limits=(*factor.limits, PowerLimit("excitation", _PLENTY * total)))
@@ -113,7 +113,7 @@ def _decided(objective: float, bound: float) -> bool:
     return objective < _ROOM or (bound > 1.0 and objective - bound < _TOLERANCE * bound)
 
 
-KEEPS = 1e-9
+KEEPS = 1e-9  # largest relative violation of limits that are kept
 
 
 def solve_limited(
@@ -153,7 +153,8 @@ def _within_limits(
     """Return the error with a design that keeps the limits, if one is known.
 
     Args:
-        free: of the problem without limits. It may keep them, or else even excitation; its bound holds.
+        free: the design of the problem without limits. Its bound holds; it, or else even excitation, may
+            keep the limits.
     """
     within = None if free is None else _known_within_limits(problem, start, free)
     if within is None:

@@ -1,8 +1,8 @@
 """The finite program in scaled numbers. Clarabel solves small ones, `interior` large ones.
 
-Clarabel takes each matrix inequality with all unknowns, and factors what comes of it anew in every iteration;
-the dense method sums the inequalities first. Below a certain size the first is faster, and it is what the
-second falls back on.
+Clarabel takes each matrix inequality with all unknowns, and factors the linear system in every iteration. The
+dense method sums the inequalities first. Below a certain size Clarabel is faster, and it takes over where the
+dense method fails.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from inputdesign_cli.spectrum import Face, svec, svec_length
 
 # Entries of matrix inequalities from which on the dense method is the faster one.
 _LARGE = 100
-# Up to how many it is worth waiting for Clarabel where the dense method stays this far from its tolerance.
+# Entries up to which Clarabel takes over, if the error of the dense method is this multiple of its tolerance.
 _MOST_WAITED_FOR, _STAYS = 5000, 1e3
-_USEFUL = 1e-4  # a multiplier this near the optimum is worth another round
+_USEFUL = 1e-4  # the error up to which multipliers are worth another round
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ class FiniteProgram:
 
 @dataclass(frozen=True)
 class FiniteSolution:
-    """Holds v (n,), the weights of the limits, and for each matrix what the multipliers of its cuts prove.
+    """Holds v (n,), the weights of the limits, and the proof of each cut (see `Cut.proof`), by matrix.
 
-    See `Cut.proof`.
+    `converged` is false if the solver failed to reach a useful accuracy.
     """
 
     v: Array
@@ -198,9 +198,9 @@ def by_interior(program: FiniteProgram, *, tolerance: float) -> tuple[FiniteSolu
 
 
 def _seen(program: FiniteProgram, matrix: MatrixPart) -> tuple[Seen, list[int]]:
-    """Return the cones of one matrix, the entries they see, and the cut that each multiplier belongs to.
+    """Return the cones of one matrix, as functions of its entries, and the cut of each multiplier.
 
-    The cones see s and the entries of M that some unknown may change or some cut may need.
+    The entries are the ones of M that may differ from zero, and s.
     """
     seen = np.abs(matrix.gains).max(axis=1) + np.abs(matrix.offset)
     kept = np.flatnonzero(seen > 1e-14 * seen.max())

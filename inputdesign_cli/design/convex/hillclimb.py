@@ -1,10 +1,10 @@
 """Spectra with a factor of few columns by the bilinear hill-climb of [mohan-spectral], Figure 3.
 
 Phi = 1/2 W H H^T W^T with H (n, c): M is quadratic in H. The source fixes one argument of the bilinear
-form M(X, Y) and climbs in the other, which need not climb (for E it can lose). Since M(X - Y, X - Y) >= 0,
-M(X) >= 2 M(X, Y) - M(Y): making the criterion best of the right-hand side, which is affine in X, never
-loses. What it reaches is a lower bound of the best over all spectra; it depends on the start, so there
-are several.
+form M(X, Y) and climbs in the other, which can lower the criterion (E). Since M(X - Y, X - Y) >= 0,
+M(X) >= 2 M(X, Y) - M(Y): to maximise the criterion of the right-hand side, which is affine in X, never
+lowers it. The result is a lower bound on the optimum over all spectra. It depends on the start, so that
+several are tried.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ class _Step:
         self._offset.value = (design.baseline - quadratic)[self._upper]
         try:
             with warnings.catch_warnings():
-                # An inaccurate step does no harm: only what it is found to attain counts.
+                # An inaccurate step does no harm: only the criterion that it attains counts.
                 warnings.simplefilter("ignore")
                 self._problem.solve(solver=cp.CLARABEL, time_limit=seconds_left())
         except cp.SolverError:

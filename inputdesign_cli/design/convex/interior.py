@@ -1,10 +1,10 @@
 """Solve the finite programs of the exchange by a primal-dual interior-point method on dense blocks.
 
 A program minimises q^T v subject to S_b(v) in its cone for every block b, with a multiplier Z_b each. The
-directions come from [helmberg-1996], with the corrector of [mehrotra-1992]. Many matrix inequalities hold the
-same M(v). Their part of the linear system is summed over them, as a matrix of the entries of M, and only then
-taken to the unknowns. A further inequality therefore costs next to nothing. A general solver takes all
-unknowns through each of them. Smooth concave functions of M (determinant, inverse trace) enter with their
+directions come from [helmberg-1996], with the corrector of [mehrotra-1992]. Many matrix inequalities contain
+the same M(v). Their part of the linear system is summed over them, as a matrix of the entries of M, and only
+then mapped to the unknowns. A further inequality therefore costs next to nothing. A general solver maps each
+of them to all unknowns. Smooth concave functions of M (determinant, inverse trace) enter with their
 curvature, not by matrix inequalities of twice the order.
 
 Its answer is a suggestion like any solver's: the bound is evaluated from the multipliers by `certificate`.
@@ -23,12 +23,12 @@ from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.cones import Cone
 
 _MOST_ITERATIONS = 100
-_NEAREST, _FURTHEST = 0.9, 0.09  # of the way to the edge of the cones
+_NEAREST, _FURTHEST = 0.9, 0.09  # a step goes 0.9 to 0.99 of the way to the boundary of the cones
 _REGULAR = 1e-16
 _REFINEMENTS = 2
-# Iterations without a smaller error, far from the optimum and where only rounding is left.
+# Iterations without a smaller error after which the method ends, far from the optimum and near it.
 _PATIENCE, _PATIENCE_NEAR = 8, 2
-_ROUNDING = 1e-5  # errors below this are as likely rounding
+_ROUNDING = 1e-5  # the error below which rounding may prevent progress
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _step(
     step = towards(sigma * gap / degree, corrected=True)
     up, down = _lengths(cones, _NEAREST + _FURTHEST * min(up, down))
     if any(cone.curved for cone in cones):
-        up = down = min(up, down)  # with a curvature the steps of both balance each other only as one
+        up = down = min(up, down)  # with curvature, primal and dual steps need the same length
     return (up, step), down
 
 

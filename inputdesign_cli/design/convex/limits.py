@@ -50,9 +50,9 @@ class PowerLimit:
 class DensityLimit:
     """A limit by which Phi(w) is at most (`upper`) or at least `level`(w) on [grid[0], grid[-1]].
 
-    Of several inputs so is v^* Phi(w) v for every direction v of length one: an eigenvalue condition,
-    Phi(w) <= level(w) I or Phi(w) >= level(w) I. `level` maps frequencies (n,) of the experiment to (n,);
-    `grid` is where to look for violations.
+    For several inputs the limit is on v^* Phi(w) v for every direction v of length one: an eigenvalue
+    condition, Phi(w) <= level(w) I or Phi(w) >= level(w) I. `level` maps frequencies (n,) of the experiment
+    to (n,); `grid` holds the frequencies at which violations are sought.
     """
 
     level: Callable[[Array], Array]

@@ -1,7 +1,7 @@
 """The finite program of one round: a face of the cone of spectra, finitely many cuts and rows.
 
 Unknowns: y (the spectrum on the face), svec(M') of the scenarios that have cuts, s where the goal has one,
-the largest cost where it is that of several, and the auxiliary unknowns of the cuts. Everything is scaled by
+the largest cost where there are several, and the auxiliary unknowns of the cuts. Everything is scaled by
 the best design so far: there each M' is the identity and the objective is one, so that whatever is active has
 multipliers and slacks of order one.
 """
@@ -26,10 +26,10 @@ from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
 _SOLVER_MARGIN = 1e-2
 _SOLVER_FLOOR = 1e-10
 _SINGULAR = 1e-14
-_AT_ONCE = 256  # basis functions
+_AT_ONCE = 256  # basis functions transformed together
 # Shares of a cost below this fraction of the largest are rounding errors.
 _NO_SHARE = 1e-9
-# Without a requirement that keeps M definite, weak directions are not blown up beyond this.
+# If no requirement keeps M definite, smaller eigenvalues, relative to the largest, are scaled like this one.
 _INDEFINITE = 1e-3
 
 
@@ -37,7 +37,8 @@ _INDEFINITE = 1e-3
 class Row:
     """A linear limit of the finite program: `functional` is at most (`upper`) or at least `bound`.
 
-    `limit` is the index of the power limit; `density` says where a density limit is looked at.
+    `limit` is the index of a power limit, `density` the place of a density limit, `form` (m, r, r) a form of
+    the lags of the excitation; the two that do not apply are None.
     """
 
     functional: Functional
@@ -72,8 +73,8 @@ class Proof:
     """Holds the multipliers of one round, in the problem's own units.
 
     `cuts` holds the inequality that each cut implies, valid for any multipliers. `rows` (number of rows,) are
-    nonnegative weights of the limits. `costs` are weights, with the sum one, of the costs of which the
-    largest is paid.
+    nonnegative weights of the limits. `costs` are weights, with the sum one, of the costs whose maximum is
+    minimised.
     """
 
     cuts: tuple[Implied, ...]
@@ -202,7 +203,7 @@ def _turned(
 ) -> tuple[Array, Array]:
     """Return svec of K M' K^T, K = `turn`, as gains (entries, unknowns) and offset of (y / worth, s)."""
     maps = problem.information_maps[:, scenario]
-    # Of a basis that grows, most functions have left the face.
+    # Most functions of a basis that has grown are not in the face.
     used = np.flatnonzero(columns.any(axis=1))
     gains = np.zeros((svec_length(len(turn)), columns.shape[1]))
     for start in range(0, used.size, _AT_ONCE):

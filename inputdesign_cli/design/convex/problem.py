@@ -3,8 +3,8 @@
 minimise an objective of the spectrum x, subject to x in the cone of spectra, M_s(x) = M0_s + sum_i x_i M_si
 meeting every requirement of every scenario s, and the powers and the density of x within their limits.
 
-A scenario is a plant that the true one might be. The nominal plant is the first, and most designs have no
-other; what is said of information below is then said of one matrix.
+A scenario is a plant that the true one might be. The nominal plant is the first of S scenarios; in most
+designs S is one.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Gradients:
 
     @cached_property
     def grid(self) -> Array:
-        """Return frequencies that see every resonance of the nominal plant's densities, over the band."""
+        """Return frequencies that resolve every resonance of the nominal plant's densities, over the band."""
         nominal = self.experiments[0]
         return graded_grid(nominal.singularities, *nominal.band)
 
@@ -83,7 +83,7 @@ class Gradients:
         known: list[NDArray] = []
 
         def density(w: Array) -> NDArray:
-            if w is grid and known:  # each price of the limits asks for it again
+            if w is grid and known:  # evaluated again for each share that `certify` tries
                 return known[0]
             total = self.zero_density(w)
             for number in weighty:
@@ -139,13 +139,13 @@ class Problem:
 
     `requirements` are made for the coordinates of `experiment`, which has the nominal plant. `side`
     requirements (goal "factor") must be met by M(x) itself. `others` are the other scenarios, of the same
-    structure and length: each M_s meets its own requirements. A spectrum causes other powers at each of them:
+    structure and length: each M_s meets its own requirements. The powers of a spectrum depend on the plant:
     limits name theirs, and `paid` selects the cost at the nominal plant, the mean over all, or the cost at
     the dearest.
 
-    A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
-    `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
-    they can be met. `finer` is a problem of the same experiment on the same or a larger basis; the
+    An upper density limit comes with the limit on the power that it implies (`limits.implied_power`). With
+    `floors_fixed` (goal "factor") lower limits do not scale: s is the least multiple of the upper limits
+    for which they can be met. `finer` is a problem of the same experiment on the same or a larger basis; the
     integrals of this basis are the first ones of its integrals. `seen` are the demands of an earlier
     problem, reused if both have the same requirements and plants.
     """
@@ -171,7 +171,7 @@ class Problem:
     @cached_property
     def demands(self) -> Demands:
         """Return the requirements at all S plants, the nominal one first."""
-        if self._smaller:  # with what has been seen of them
+        if self._smaller:  # with the ratios found so far
             return self._smaller[0].demands
         asked = Scenario(self.experiment, self.requirements, self.side)
         if self.seen is not None and self.seen.are_of(asked, self.others):
@@ -302,7 +302,7 @@ class Problem:
 
     @cached_property
     def price(self) -> Functional:
-        """Return the price of x: the mean of the costs, or where no cost is sought powers over limits."""
+        """Return the price of x: the mean of the costs, or for other goals the sum of powers over limits."""
         if self.goal == "cost":
             return self.costs[0] if len(self.costs) == 1 else self._cost_of(self.paying)
         parts = [self._limited(limit) * (1.0 / limit.bound) for limit in self.limits if limit.upper]
@@ -341,7 +341,7 @@ class Problem:
             return known
         plants, weights = [self.scenarios[n].experiment for n in scenarios], weights_of(self.cost)
         before = self._smaller[0]._costs.get(scenarios) if self._smaller else None
-        # Grown problems ask on the grid of the one before.
+        # Grown problems evaluate it on the grid of the problem before.
         density = kept_on_grid(lambda w: mean_cost(plants, weights, w)) if before is None else before.density
         near = np.concatenate([plant.singularities for plant in plants])
         vector = self._along(
@@ -356,7 +356,7 @@ class Problem:
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
         """Return the power of input, output or excitation (of one channel) as a functional."""
-        # Without this problem inside, which would keep the arrays of each that has grown beyond it.
+        # The density refers to the experiment only: with this problem it would keep all its arrays in memory.
         experiment = self.scenarios[scenario].experiment
         if kind == "input" and experiment.loop is None:
             kind = "excitation"  # the same signal
@@ -383,7 +383,7 @@ class Problem:
         for kind in POWER_KINDS:
             channels = self.experiment.model.outputs if kind == "output" else self.experiment.inputs
             of_each = [self.power(kind, channel, scenario).vector @ x for channel in range(channels)]
-            found[kind] = [max(float(one), 0.0) for one in of_each]  # zero may come out below by rounding
+            found[kind] = [max(float(one), 0.0) for one in of_each]  # rounding may make a zero negative
         return found
 
     def _limited(self, limit: PowerLimit) -> Functional:

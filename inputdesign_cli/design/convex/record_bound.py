@@ -1,4 +1,4 @@
-"""What no record within an amplitude can beat, whatever it is: proved for a finite number of samples.
+"""A bound that no record within an amplitude can beat, proved for a finite number of samples.
 
 The autocovariances of signals within an amplitude lie in a polytope (`design.amplitude`). A design over all
 spectra with such autocovariances has a certificate: price - value >= 0 at every frequency. One part of its
@@ -26,9 +26,9 @@ from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.spectrum.held import HeldLines
 
-# Windows grow by so many values until the bound gains less than the share.
+# Values of the first windows, and by which they grow until the bound gains less than this share.
 _FIRST, _MORE, _GAIN = 4, 4, 1e-3
-_MOST_BITS = 13  # of the number of states
+_MOST_BITS = 13  # the number of states is at most 2 to this power
 _ON_THE_CIRCLE = 1e-9
 _TOLERANCE = 1e-4
 _INPUTS = ("input", "excitation")
@@ -69,7 +69,7 @@ def bound_over_records(
 
     Args:
         free: the design over every spectrum, to begin with.
-        samples: of the records; for the goal "samples" it is not used.
+        samples: length of the records; not used for the goal "samples".
         windows: the longest windows.
         hold: the samples for which each value is held.
 

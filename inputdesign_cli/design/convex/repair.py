@@ -1,9 +1,9 @@
 """Make an iterate of the exchange meet all requirements and limits, by scaling or by mixing.
 
-The optimum of a relaxation violates a little the constraints that it does not contain. If scaling up only
-helps (no limits, or limits that scale along), the smallest sufficient factor repairs it. Otherwise it is
-mixed with a design that meets everything strictly. The violation is convex along the way. Its chord already
-leads to a design that is good enough, and a few steps find the best mixture.
+The optimum of a relaxation slightly violates constraints that it does not contain. If scaling up can only
+help (no limits, or limits that scale along), the smallest sufficient factor repairs it. Otherwise it is
+mixed with a design that meets everything strictly. The violation is convex along the line between them: a
+step of its chord already gives a feasible design, and a few steps find the best mixture.
 """
 
 from __future__ import annotations

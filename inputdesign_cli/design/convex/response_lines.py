@@ -40,7 +40,7 @@ class UnreachableError(IdesignError):
 class ResponseLines:
     """Holds G (L, p, r), the noise spectrum Phi_v (L, p) and r_adm (L, p, r) at L lines.
 
-    `share`: r_adm is this much of |G|; None if it does not depend on G.
+    `share` is r_adm over |G|; None if r_adm does not depend on G.
     """
 
     G: ComplexArray
@@ -85,8 +85,8 @@ class ResponseProblem:
     Attributes:
         needed: (n,) the power that just meets r_adm.
         price: (n,) the cost of a unit of power.
-        limits: on powers of inputs and outputs.
-        rows: (limits, n) what a unit of power adds to each.
+        limits: limits on powers of inputs and outputs.
+        rows: (limits, n) the part of a unit of power in each limited power.
     """
 
     needed: Array
@@ -125,7 +125,7 @@ class ResponseProblem:
 class ResponseDesign:
     """Holds powers (n,), and a value with the bound that multipliers of the limits prove for it.
 
-    The value is a cost, or s. Variances are then 1 / s of the admissible ones, and 1 / s of the samples is
+    The value is a cost, or s. With s, variances are 1 / s of the admissible ones, or 1 / s of the samples is
     enough.
     """
 
@@ -165,7 +165,7 @@ def cheapest(problem: ResponseProblem) -> ResponseDesign:
 def most_accurate(problem: ResponseProblem) -> ResponseDesign:
     """Return the powers of the largest s; variances are 1 / s of the admissible ones.
 
-    Some limit is from above.
+    At least one limit must be from above.
 
     Raises:
         UnreachableError: the limits contradict each other.

@@ -1,9 +1,9 @@
 """Bounds on the share of plants, not drawn, at which a design for drawn scenarios fails.
 
-A convex program in d unknowns with N constraints drawn independently has at most d of support: those without
-which the optimum would be another. Its solution violates a fresh constraint with a probability that itself
-depends on the draws. All statements here are about the distribution that was drawn from, and none about the
-true plant.
+A convex program in d unknowns with N constraints drawn independently has at most d support constraints, whose
+removal changes the optimum. Its solution violates a fresh constraint with a probability that itself depends
+on the draws. All statements here are about the distribution that was drawn from, and none about the true
+plant.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def samples_for(risk: float, beta: float, unknowns: int) -> int:
 
 
 def risk_before(scenarios: int, beta: float, unknowns: int) -> float:
-    """Return the violation that holds with probability 1 - beta before the design; one where nothing does."""
+    """Return the violation that holds with probability 1 - beta before the design; one for too few draws."""
     if scenarios <= unknowns:
         return 1.0
     return float(scipy.special.bdtri(unknowns - 1, scenarios, beta))

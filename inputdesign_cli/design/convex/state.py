@@ -19,7 +19,7 @@ from inputdesign_cli.design.convex.problem import Candidate, Problem
 from inputdesign_cli.design.convex.repair import Place, least_scale, mixed, scaled_up
 from inputdesign_cli.spectrum import Face, first_directions
 
-# A far-off iterate is not worth repairing: its upper bound would say nothing.
+# An iterate with a larger ratio is not worth repairing: its upper bound would be useless.
 _WORTH_REPAIRING = 1.5
 _FIRST_CUTS = 0.3
 _MORE_CUTS = 6
@@ -318,7 +318,7 @@ def on_basis(problem: Problem, row: Row) -> Row:
 
 
 def alike(problem: Problem, row: Row, place: DensityPlace) -> bool:
-    """Return whether the row is the same limit at nearly the same frequency."""
+    """Return whether the row is this limit at nearly the same frequency and direction."""
     if row.density is None or row.density.limit != place.limit:
         return False
     lo, hi = problem.experiment.band

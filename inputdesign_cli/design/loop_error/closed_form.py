@@ -54,7 +54,7 @@ def weight(T: ComplexArray, G: ComplexArray, entering: ComplexArray, noise: Comp
     frequency of tr(Z Phi^-T). C S = G^-1 T is finite where S has a zero and C a pole.
 
     Args:
-        entering: Phi_r + Phi_v, what drives the error of the loop.
+        entering: Phi_r + Phi_v, the spectrum that drives the error of the loop.
         noise: Phi_v.
     """
     S, CS = sensitivity(T), np.linalg.inv(G) @ T

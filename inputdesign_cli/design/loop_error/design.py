@@ -24,7 +24,7 @@ from inputdesign_cli.spectrum import LinesBasis
 _ALMOST = 100.0
 # Means over frequency that halving the panels moves by more than this are not trusted.
 _UNSETTLED = 1e-8
-# Beyond what is asked: the bound is compared with a value that is computed anew.
+# The design is solved to this share of the tolerance: its bound is compared with a value computed anew.
 _MARGIN = 0.1
 
 
@@ -34,8 +34,8 @@ class LoopInput:
 
     Attributes:
         frequencies: (K,) in rad/sample.
-        spectrum: (K, n, n) there.
-        weights: (K,) with which a sum over them is a mean over frequency; one for lines.
+        spectrum: (K, n, n) at these frequencies.
+        weights: (K,) weights of the mean over frequency; one for lines.
     """
 
     problem: LoopErrorProblem
@@ -67,11 +67,11 @@ class LoopErrorDesign(LoopInput):
 
     Attributes:
         value, lower_bound: N E||y - y0||^2 of the requested covariance, J_o included.
-        rule: of means over the band.
-        steps: of the dual, or rounds of the exchange.
+        rule: nodes and weights of means over the band.
+        steps: steps on the dual, or rounds of the exchange.
         noise_part: J_o, which no input changes.
-        multipliers: (p,) of the limits, which give the density at any frequency; None for lines.
-        scale: that brings this density into the limits.
+        multipliers: (p,) dual variables of the limits, which define the density; None for lines.
+        scale: the factor that brings this density within the limits.
         settled: relative change of the mean over frequency on halving the panels.
     """
 
@@ -131,7 +131,7 @@ def design_loop_error(
     """Design the best input for the closed-loop error, [rojas-asymptotic] Section VI.
 
     Args:
-        covariance: of the estimate, in the limit of a high model order or exact for the model structure.
+        covariance: the covariance of the estimate in the limit of a high model order, or for the structure.
         tolerance: relative gap to be proved.
 
     Raises:

@@ -67,7 +67,7 @@ class ControlLaw(ABC):
         Args:
             logarithmic: (K, k), d log det G = tr(G^-1 dG).
             relative_noise: (K, k, n, n), H^-1 dH.
-            rule: of means over [0, pi].
+            rule: nodes and weights of means over [0, pi].
         """
 
     @abstractmethod

@@ -18,7 +18,7 @@ _MAX_STEPS = 200
 _SETTLED = 1e-13
 # A multiplier may fall by this factor in one step: limits that do not bind fade out geometrically.
 _LEAST_SHARE = 0.02
-_SUFFICIENT, _SHORTEST, _ROUNDING = 1e-4, 1e-10, 1e-12
+_SUFFICIENT, _SHORTEST, _ROUNDING = 1e-4, 1e-10, 1e-12  # Armijo's constant, least step length, rounding
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class LimitedDesign:
     Attributes:
         spectrum: Phi (K, n, n) at the given frequencies.
         value: mean tr(A Phi^-1), recomputed from the spectrum.
-        lower_bound: the dual function at `multipliers`; no spectrum within the limits gets below.
+        lower_bound: the dual function at `multipliers`, a bound for all spectra within the limits.
         powers: mean tr(M_i Phi) (p,), each at most its limit.
     """
 
@@ -52,7 +52,7 @@ def design_within(A: ComplexArray, metrics: ComplexArray, limits: Array, weights
         A: Z^T (K, n, n), Hermitian and nonnegative.
         metrics: M_i (p, K, n, n), whose sum is positive definite at every frequency.
         limits: c (p,), positive.
-        weights: (K,) of the mean over frequency.
+        weights: (K,) weights of the mean over frequency.
     """
     scale = float(np.trace(A, axis1=1, axis2=2).real @ weights)
     # In units of the limits every multiplier is of order one and the limits are one.
@@ -78,7 +78,7 @@ def design_within(A: ComplexArray, metrics: ComplexArray, limits: Array, weights
 class _Point:
     """Holds the dual function, its derivatives and the spectrum it suggests, at multipliers `share` (p,).
 
-    It is greatest along these at `length` times them, where it bounds the spectrum within a relative gap.
+    In this direction the dual is greatest at `length` times them; `gap` is the relative gap there.
     """
 
     share: Array

@@ -4,7 +4,7 @@
 structure, [ljung-1999] Section 9.4.
 
 To first order in the error of the parameters, y - y0 = sum_l dtheta_l X_l (r - v) with
-X_l = S G dC_l S = -S dG_l G^-1 T + dT_l, where dT_l is how the loop that the law aims at errs with the model.
+X_l = S G dC_l S = -S dG_l G^-1 T + dT_l, where dT_l is the change of the intended loop with the model.
 Hence E||y - y0||^2 = tr(W P), W_lm = mean tr(X_l (Phi_r + Phi_v) X_m^*). The covariance P is the inverse of
 an information matrix that is affine in the input spectrum: a convex design like any other.
 """
@@ -21,7 +21,7 @@ from inputdesign_cli.accuracy.requirement import OneCondition
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Experiment
 
-_HELD = 1e-14  # shares of W below this are rounding
+_HELD = 1e-14  # smaller eigenvalues of W, relative to the largest, are rounding
 _REACH = 90.0
 _STEP = 0.02
 

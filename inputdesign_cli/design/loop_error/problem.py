@@ -1,4 +1,4 @@
-"""The question in one object: which plant, which control law, which reference, which limits."""
+"""The design problem in one object: plant, control law, reference and limits."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class LoopErrorProblem:
     """The error E||y - y0||^2 of the loop with the controller designed on the model, and the input limits.
 
     Attributes:
-        estimated: the model in what is estimated, with the G and H of `plant`. None stands for every
-            coefficient of `plant`.
-        reference_variance: (n,) of the white noise behind the reference, one for each output.
-        reference_filter: that colours it.
+        estimated: the model in the estimated parameters, with the G and H of `plant`. None if they are all
+            coefficients of `plant`.
+        reference_variance: (n,) variances of the white noise behind the reference, one for each output.
+        reference_filter: the filter that colours it.
         band: normalised frequencies inside which the input may have power. The asymptotic
             covariance is infinite outside, so there the error is counted inside only.
     """

@@ -17,7 +17,7 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound, box_limits
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
-# Boxes that take seconds; those of m >= 4 are many and dear, and more of them close little.
+# Most boxes of a proof, which take seconds. For m >= 4 a box takes longer, and more boxes hardly help.
 _NODES, _NODES_BEYOND = 400, 100
 
 
@@ -49,7 +49,7 @@ class BranchAndBound:
         level: Callable[[], float],
         suggest: Callable[[Array], None] = lambda _: None,
     ) -> bool:
-        """Split boxes until |b|^2 + kappa v >= level on all of them, or until the time or the boxes are over.
+        """Split boxes until |b|^2 + kappa v >= level on all of them, or until time or boxes run out.
 
         kappa must not fall and may rise: a bound at one energy holds for every smaller one. `suggest` is
         given the autocorrelations of each relaxed optimum below the level; it may improve the incumbent,
@@ -65,7 +65,7 @@ class BranchAndBound:
                 for box in (whole,) if found is None else self._halves(whole, found):
                     self._examine(bound, box, kappa(), level, suggest)
             except OutOfTimeError:
-                heapq.heappush(self.open, node)  # with its halves not all examined, its own bound counts
+                heapq.heappush(self.open, node)  # its own bound counts until both halves are examined
                 break
         return self.bound >= level()
 
@@ -85,14 +85,14 @@ class BranchAndBound:
         self.nodes += 1
         found = self.lift.bound(box, kappa, allowed)
         self.assumed |= allowed.assumed
-        # Shapes beyond the limit on u have at least the level; more than that is not known of them.
+        # Shapes beyond the limit on u have at least the level, so that no larger bound is proved.
         bound = max(min(found.bound, level()), least)
         if bound < level() and found.rho.size:
             suggest(found.rho)
         heapq.heappush(self.open, (bound, next(self._order), box, found))
 
     def _halves(self, box: Box, found: NodeBound) -> tuple[Box, ...]:
-        """Return the two halves of a box across the coordinate that its relaxation knows least of."""
+        """Return the two halves of a box across the coordinate in which its relaxation is least exact."""
         width = box[1] - box[0]
         if width.size == 0 or width.max() < 1e-9:
             self.closed = min(self.closed, found.bound)

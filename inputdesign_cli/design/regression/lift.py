@@ -30,10 +30,10 @@ from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from inputdesign_cli.spectrum import smat, svec, svec_layout
 
 SMALLEST_EIGENVALUE = 1e-6
-"""Assumed of R11 / r_0 where nothing better is known: for m >= 3 in boxes with singular R11."""
+"""A lower bound on the eigenvalues of R11 / r_0 that is assumed for m >= 3 in boxes with singular R11."""
 
 _TOLERANCE = 1e-9
-_NOTHING = 1e-28  # the square of rounding in a part of L1 that vanishes
+_VANISHING = 1e-28  # the squared norm, by rounding, of a part of L1 that vanishes
 _ROUNDING = 1e-12
 
 Box = NDArray[np.float64]
@@ -44,11 +44,11 @@ Box = NDArray[np.float64]
 class BoxLimits:
     """The bound |w|^2 <= limit, with u = D w, for all shapes of a box that matter (see `box_limits`).
 
-    The limit keeps the relaxation bounded and pays for the last digits of its dual point.
+    The limit keeps the relaxation bounded, and bounds the loss by residuals of its dual point.
 
     Attributes:
         least_v: no shape of the box has a smaller v; infinite if the box has none.
-        assumed: the limit takes the eigenvalues of R11 / r_0 to be above `SMALLEST_EIGENVALUE`.
+        assumed: whether the limit assumes that eigenvalues of R11 / r_0 exceed `SMALLEST_EIGENVALUE`.
     """
 
     D: Array
@@ -76,9 +76,9 @@ def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimit
         lowest = float(values[0]) - radius
         # |u|^2 is at most v / (smallest eigenvalue), and (v / |L1|)^2 where the part is one-dimensional.
         floor, single = largest_v / SMALLEST_EIGENVALUE, len(values) == 1
-        bounds = [largest_v**2 / max(weight, _NOTHING) if single else floor]
+        bounds = [largest_v**2 / max(weight, _VANISHING) if single else floor]
         bounds += [weight / lowest**2, largest_v / lowest] if lowest > 0.0 else []
-        square = min(bounds) if weight > _NOTHING else 0.0
+        square = min(bounds) if weight > _VANISHING else 0.0
         assumed |= not single and square == floor
         least_v += weight / max(float(values[-1]) + radius, 1e-300)
         if values[0] + np.abs(frame[:, 0]) @ change @ np.abs(frame[:, 0]) < 0.0:
@@ -154,7 +154,7 @@ class Lift:
         answer = solve_conic(q, blocks, tolerance=_TOLERANCE)
         if not all(np.all(np.isfinite(z)) for z in answer.multipliers):
             return NodeBound(-np.inf, *undecided)
-        # Whatever the solver says of its answer: the dual point is repaired, and its value is ours.
+        # Whatever the status of the solver, the dual point is repaired and evaluated here.
         value = scale * self._repaired(q, blocks, answer.multipliers, allowed.limit, 1.0 / scale)
         if answer.status not in ("solved", "almost_solved"):
             return NodeBound(value, *undecided)

@@ -40,7 +40,7 @@ class Regression:
         estimated: (m,) L1, weights of the estimated parameters.
         neglected: (n - m,) L2, weights of the neglected parameters.
         neglected_norm: alpha, the bound on the norm of the neglected parameters.
-        variance: sigma^2, of the white noise on the output.
+        variance: sigma^2, the variance of the white noise on the output.
     """
 
     estimated: Array

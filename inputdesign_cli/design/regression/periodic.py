@@ -28,8 +28,8 @@ def design_periodic(
 ) -> tuple[Array, float, bool]:
     """Return the shape rho on the lines of a period, or the nearest good design on them.
 
-    These are shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, the energy, and whether
-    the Gram matrix is the requested one.
+    The results are shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, the energy, and
+    whether the Gram matrix is the requested one.
 
     Args:
         target: the error to be met with the least energy; None: the energy stays, the error follows.

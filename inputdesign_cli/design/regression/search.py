@@ -18,9 +18,9 @@ from inputdesign_cli.design.regression.toeplitz import Goal, Shape, ToeplitzProb
 _MAX_STEPS = 60
 _STEP_TOLERANCE = 1e-10  # the relative gain below which a search ends
 _SMALLEST_RADIUS = 1e-9
-# Where the target cannot be met at the present energy, variance is made cheaper in these steps.
+# Weights of the variance, relative to the target, that are tried in turn from a start that misses it.
 _RELAXED = (1.0, 1e-2, 1e-4, 1e-6, 1e-9)
-_FAINT = 1e-5  # powers of lines below this share, in a design that is flat there
+_FAINT = 1e-5  # smaller errors of rho and smaller powers of lines do not count, since an optimum is flat
 
 
 @dataclass
@@ -55,7 +55,7 @@ class Search:
         return self._steps(shape, self.goal) if np.isfinite(self.goal.value(shape)) else shape
 
     def _steps(self, shape: Shape, goal: Goal) -> Shape:
-        """Return the last shape of a trust region; it ends early as another goal meets that of the search."""
+        """Return the last shape of a trust-region search, which ends early once it meets `self.goal`."""
         radius = 0.5
         for _ in range(_MAX_STEPS):
             if goal is not self.goal and np.isfinite(self.goal.value(shape)):

@@ -17,9 +17,9 @@ from inputdesign_cli.design.regression.search import Search
 from inputdesign_cli.design.regression.steps import Region, extend
 from inputdesign_cli.design.regression.toeplitz import Goal, Shape, ToeplitzProblem
 
-_STARTS = 8  # beside white
-# A target is out of reach if no energy up to this many n sigma^2 |L1|^2 / gamma is enough; the largest
-# of these for which the proof closes counts.
+_STARTS = 8  # random starts, in addition to white
+# A target is out of reach if no energy up to this multiple of n sigma^2 |L1|^2 / gamma is enough. The largest
+# multiple for which the proof closes counts.
 _PROVED_MULTIPLES = (1e6, 1e4, 1e2)
 
 
@@ -51,7 +51,7 @@ def design_toeplitz(
     Args:
         target: the error that is allowed; the energy is minimised. Or else
         energy: the trace of R; the error is minimised.
-        tolerance: the relative gap to be proved; larger gaps are proved where it cannot be.
+        tolerance: the relative gap to be proved; a larger gap is proved where this one cannot be.
         alternating: run the alternation of [eckhard-mse], Section 4.2, from white: its design is kept as it
             is, and only the bound comes from here. With R11 fixed the bias is least; with Z = R11^-1 R12
             fixed only the scale of R is free, so that the shape of R11 never changes. Without neglected
@@ -112,7 +112,7 @@ def _proved(search: Search, best: Shape, tolerance: float) -> tuple[float, Shape
         tree.prove(partial(float, goal.kappa), level, suggest)
         return max(tree.bound, 0.0), best, tree
     assert goal.target is not None
-    # Nothing beats the level if at that energy all errors exceed the target.
+    # No shape is better than the level if at that energy all errors exceed the target.
     if tree.prove(lambda: 1.0 / level(), partial(float, goal.target), suggest):
         return level(), best, tree
     # At any smaller energy the error has grown by the variance at least, and v >= L1_i^2 for all i.
