@@ -313,7 +313,7 @@ class _Candidates:
     def _best_within(self, values: Array) -> Array:
         """Return the most informative record between the highest that fits and one of the designed power.
 
-        A record clipped until it has that power may have lost its weaker lines: steps of two levels have one.
+        Clipping a record until it has that power may remove its weaker lines.
         """
         record = self._at_levels(values)
         strongest = self._of_designed_power(record)

@@ -125,7 +125,7 @@ def solve_master(
     columns = np.concatenate([face.columns, ray, largest], axis=1)
     inside = face.columns.shape[1]
     objective = best.objective
-    # The nominal plant where there are no cuts: a program without M is solved by no spectrum at all.
+    # Without cuts the nominal plant takes part alone: a program without M would be solved by no excitation.
     involved = sorted({placed.scenario for placed in cuts}) or [0]
     definite = problem.demands.definite
     turns = {plant: _congruence(best.informations[plant], definite=definite) for plant in involved}

@@ -167,7 +167,7 @@ class State:
         return replace(self, problem=problem, best=problem.candidate(z, self.best.s))
 
     def least_multiple(self) -> State:
-        """Return the state with the least s for its best design, which has room to spare if interior."""
+        """Return the state whose best design has the least s: an interior one exceeds its requirements."""
         if self.problem.goal != "factor":
             return self
         worst = self.problem.demands.largest(self.best.informations, default=1.0)
