@@ -1,7 +1,7 @@
 """The verbs take a spec and return results. A spec becomes a task once; the task does not know the spec.
 
-A question is imported when it is asked, so that a command waits for no other. Numbers beyond double
-precision become errors here, at the border of every task.
+The modules of a question are imported when it is asked, so that no command waits for others. Numbers beyond
+double precision become errors here, for every task.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ Files = str | Path | Sequence[str | Path]
 Stated = Spec | str | Path | Mapping[str, object]
 """A spec, the name of its file, or its content as `Spec.from_dict` takes it."""
 Verb = Literal["solve", "analyse", "simulate"]
-"""What makes results of a spec, by the names that commands, sweeps and golden files use."""
-# Numbers of a spec within this many powers of ten of one are not to blame.
-_USUAL = 6.0
+"""The verbs that make results of a spec, by their names in commands, sweeps and golden files."""
+# A number farther from one than this, in powers of ten, may be the cause of an overflow.
+_EXTREME = 6.0
 
 
 def solve(spec: Stated) -> Results:
@@ -96,7 +96,7 @@ def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:
     """Return the result of one run of a golden file, or the error that says why there is no design.
 
     Raises:
-        SpecError, DataError: the spec that the golden file names is not good: nothing can be compared.
+        SpecError, DataError: the spec that the golden file names cannot be used: nothing can be compared.
     """
     spec = load_spec(golden.spec_of(run), list(run.overrides))
     try:
@@ -119,9 +119,9 @@ def identify(
     Args:
         spec: its plant and noise; it need not ask for a design (`load_spec(.., design=False)`).
         data: a data file, or several, which are estimated jointly.
-        remove_means: whether to take the means of u and y away, file by file.
-        operating_point: what to take away from a channel, by name: {"u1": 40, "y1": 52.3}.
-        preparation: what else to do to the records before.
+        remove_means: whether to remove the means of u and y, file by file.
+        operating_point: levels to remove from channels, by name: {"u1": 40, "y1": 52.3}.
+        preparation: further preparation of the records.
         frequency_response: whether to measure the frequency response without a model instead, at the lines of
             `accuracy.frequency_response` where the spec has it.
 
@@ -199,10 +199,10 @@ def explore(
 
     Args:
         data: a data file, or several of the same experiment.
-        preparation: which column is which, and what to do to the record before.
-        model: to judge, as a spec (`load_spec(.., design=False)`).
+        preparation: the roles of the columns, and the preparation of the record.
+        model: the model to judge, as a spec (`load_spec(.., design=False)`).
         structure: the structure to take; None: the simplest that explains the log as well as any.
-        asked: a spec (`load_spec`), of which the next one keeps what it asks for.
+        asked: a spec (`load_spec`); the next spec takes over its sections on the design.
 
     Raises:
         SpecError: the model cannot be judged, or cannot be asked for this.
@@ -266,7 +266,7 @@ def _refusal(text: str, folder: Path) -> Diagnostic | None:
 
 def _known(spec: Stated, design: bool | None = True) -> Spec:
     """Return a spec as it is, or read it from the file that is named or from a mapping; see `load_spec`."""
-    if isinstance(spec, Spec):  # one that was read for `identify` alone has not passed the checks of designs
+    if isinstance(spec, Spec):  # a spec read for `identify` alone has not passed the checks of designs
         return spec.revised({}, design=True) if design and not spec.asks_for_design else spec
     if isinstance(spec, Mapping):
         return Spec.from_dict(spec, design=design)
@@ -299,7 +299,7 @@ def _in_time(spec: Spec, found: Callable[[], Results]) -> Results:
 
 @contextmanager
 def _placed(spec: Spec) -> Iterator[None]:
-    """Add to errors, of arithmetic too, the lines of the spec that they concern."""
+    """Add the lines of the spec to errors that concern them; errors of arithmetic are among these."""
     try:
         with sound_arithmetic(most_extreme(spec.content)):
             yield
@@ -376,7 +376,7 @@ _ALONE = RLock()
 
 @contextmanager
 def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
-    """Raise overflow, division by zero and singular matrices inside as errors of the spec.
+    """Turn overflow, division by zero and singular matrices into errors of the spec.
 
     Args:
         extreme: the key of the spec whose number is farthest from one, and how many powers of ten that is.
@@ -384,8 +384,8 @@ def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
     Raises:
         InaccurateError: `beyond-precision`, `numerically-singular`.
     """
-    # Filters of warnings are common to all threads: one computes at a time. Matrices are small: threads of
-    # the linear algebra would wait for each other.
+    # All threads share the filters of warnings, so that one computes at a time. Matrices are small, so that
+    # threads of BLAS would only wait for each other.
     strict = np.errstate(over="raise", divide="raise", invalid="raise")
     with _ALONE, strict, threadpool_limits(1, "blas"), warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
@@ -438,7 +438,7 @@ def most_extreme(data: object) -> tuple[str, float]:
 def _beyond(extreme: tuple[str, float], why: str) -> InaccurateError:
     key, far = extreme
     hint = "choose units in which the signals and the parameters are of the order of one"
-    if far > _USUAL:
+    if far > _EXTREME:
         hint = f"{key} is the most extreme number of the spec: {hint}"
     message = f"the numbers of this question leave the range of double precision: {why}"
-    return InaccurateError.because("beyond-precision", message, hint, key if far > _USUAL else "")
+    return InaccurateError.because("beyond-precision", message, hint, key if far > _EXTREME else "")

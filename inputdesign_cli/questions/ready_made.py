@@ -21,7 +21,7 @@ from inputdesign_cli.signal.ready_made import equal_lines, excites, scaled
 from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.specification.models.sizes import SIZES
 
-_USUAL = 1000
+_DEFAULT_SAMPLES = 1000
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,13 @@ class ReadyMade:
     """Describes the signal that is asked for."""
 
     kind: str
-    bits: int | None = None  # of the register of a prbs; None: enough for the samples without repetition
-    number: int | None = None  # lines of a multisine, levels of steps
+    bits: int | None = None  # register length of a prbs; None: enough for the samples without repetition
+    number: int | None = None  # number of lines of a multisine, or of levels of steps
     band: tuple[float, float] | None = None  # in rad per time unit; None: all frequencies
     samples: int | None = None  # None: one period, or 1000
     levels: tuple[tuple[float, float], ...] = ((-1.0, 1.0),)  # least and largest value of each input
     hold: int = 1  # samples for which each value stands
-    periods: int = 1  # equal ones
+    periods: int = 1  # number of equal periods
     odd: bool = False
     seed: int = 0
     sample_time: float = 1.0
@@ -87,7 +87,7 @@ def make_signal(asked: ReadyMade) -> Results:
 
 def _made(asked: ReadyMade) -> tuple[Array, int]:
     """Return the record (N, inputs) from -1 to 1, and its period."""
-    r, bits, period = asked.inputs, asked.bits, asked.samples or _USUAL
+    r, bits, period = asked.inputs, asked.bits, asked.samples or _DEFAULT_SAMPLES
     if asked.kind == "prbs":
         bits = bits or register_length(-(-period // asked.hold))
         period = asked.hold * (2**bits - 1)
@@ -110,7 +110,7 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
 
 
 def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
-    """Raise `SpecError` for what the kind cannot make of this many samples, in `whole` periods and blocks."""
+    """Raise `SpecError` if the kind makes no signal of these samples, or none of `whole` equal parts."""
     kind = kind_of(asked.kind)
     if asked.inputs > 1 and not kind.several:
         raise bad_spec(
@@ -141,7 +141,7 @@ def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
 
 
 def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> None:
-    """Raise `SpecError` (`too-large`) for records that would take long, or more memory than there is."""
+    """Raise `SpecError` (`too-large`) for records that would take too much time or memory."""
     size = SIZES["samples of a ready-made signal"]
     fit = size.most // inputs
     if samples <= fit:

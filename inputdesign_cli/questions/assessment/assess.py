@@ -1,7 +1,7 @@
 """Data -> does the real experiment meet the target, and if not, what is still to be done.
 
-A verdict holds for one estimate and its information. The information is that of all given records, and of the
-prior where the spec states its estimate. A prior without it counts for designs only.
+A verdict holds for one estimate and its information: from all given records, and from the prior if the spec
+states an estimate with it. A prior without an estimate counts for designs only.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from inputdesign_cli.questions.least_cost.outcome import requirement_met
 from inputdesign_cli.records import Preparation
 
 _ROUNDING = 1e-9
-# What a record that is rounded to a file may be off.
+# Rounding a record to a file raises its ratio by less than this share.
 _REACHED = 1e-6
 _MOST_EXPERIMENTS = 10**9
 
@@ -98,7 +98,7 @@ def judge(task: Identification, found: Identified, began: float, *, first: bool 
 
     Args:
         began: `time.perf_counter()` when the work began.
-        first: of an experiment in parts, whose plans rest on estimates, whether this is the first one.
+        first: whether a campaign has no earlier estimate; None: the data are of no campaign.
     """
     units, results = task.header.units, identification_results(task, found, began)
     listed, without, distance = _compared(task, found)
@@ -181,7 +181,7 @@ def _assessed(judged: Results, **more: Any) -> Results:
 
 
 def _without_model(judged: Results, units: Units, found: Identified) -> Results:
-    """Return the results with the response of the data alone beside the model, where it can be had."""
+    """Return the results with the response of the data alone beside the model, where it can be estimated."""
     tables, curves, lines = response_without_model(units, found.model, found.data)
     if lines is None:
         return judged
@@ -220,7 +220,10 @@ def _topped_up(
 
 
 def _experiments(question: ModelQuestion, both: Array) -> int | None:
-    """Return the number of experiments that the data lack; with one they have (k, k). None: too many."""
+    """Return the number of top-up experiments that the data lack; None: too many.
+
+    The information of the data and one such experiment is `both` (k, k), in raw parameters.
+    """
     data, most = question.information, 2
     more = question.experiment.whiten_matrix(both) - data
 

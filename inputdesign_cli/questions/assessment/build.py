@@ -77,10 +77,10 @@ def build_identification(spec: Spec) -> Identification:
 
 
 def _with_noise(spec: Spec, model: Model, more: Sequence[Noise]) -> Spec:
-    """Return the spec with the noise of a model, and of every output C and D more.
+    """Return the spec with the noise of a model, whose C and D are multiplied by further factors.
 
     Raises:
-        SpecError: `noise` cannot be that, as of a plant that is not sampled.
+        SpecError: the noise is known, or this plant cannot have it (one that is not sampled, say).
     """
     stated = blocks_of(model)["noise"]
     if "known" in stated:
@@ -105,7 +105,8 @@ def question_at(stated: Spec, model: Model, samples: int, factor: Array, source:
     """Return the question of a spec at a model, for data of some length and a factor of their information.
 
     Args:
-        factor: (k, k); `source` of the model is named in diagnostics.
+        factor: (k, k), a factor of the information of the data.
+        source: the name of the model in diagnostics.
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
@@ -115,11 +116,11 @@ def question_at(stated: Spec, model: Model, samples: int, factor: Array, source:
     experiment = replace(raw, factor=factor)
 
     def topped_up(levels: Mapping[str, float]) -> Results:
-        # With values it enters the estimate as well, when the spec is assessed with further records.
+        # With values, the prior also enters the estimate when the spec is assessed with further records.
         values = dict(zip(raw.model.names, raw.model.theta.tolist(), strict=True))
         prior = {"parameters": values, "information": factor @ factor.T}
         changes: dict[str, object] = {"experiment.prior": prior}
-        # The record gets the levels of the data, and intervals reach as far as the estimate.
+        # The record gets the levels of the data, and intervals are widened to contain the estimate.
         inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
         if not spec.closed_loop and spec.signal.offset is None and set(inputs) & set(levels):
             offsets = [levels.get(name, 0.0) for name in inputs]
@@ -132,7 +133,7 @@ def question_at(stated: Spec, model: Model, samples: int, factor: Array, source:
         task = build_convex(spec.revised(changes, file="top-up", design=True))
         if task.foresight is None:
             return task.solve()
-        # Both records are assessed together.
+        # The top-up will be assessed together with the data.
         earlier = Earlier(raw.model.theta, factor @ factor.T)
         return replace(task, foresight=replace(task.foresight, earlier=earlier)).solve()
 

@@ -63,12 +63,12 @@ class ModelQuestion:
     """Holds the requirements of a spec at one model.
 
     Attributes:
-        experiment: with that model and the loop, in the coordinates of the data: their information is I.
+        experiment: on that model, in its loop, in coordinates where the information of the data is I.
         confidence: the size of the confidence region of r_u.
         requirements: all that is asked, in these coordinates.
-        entries: the model errors of every entry of G, for r_u if no requirement has it.
-        top_up: designs what the model needs beside the data, with a record about the levels of the
-            inputs by name; None if the spec designs nothing.
+        entries: the model errors of every entry of G, for r_u if no requirement bounds one.
+        top_up: designs the experiment that the model still needs, with a record about these levels of the
+            inputs, by name; None if the spec designs nothing.
     """
 
     experiment: Experiment
@@ -103,18 +103,18 @@ class Identification:
 
     Attributes:
         nominal: the structure; its parameters are one of the starts.
-        nominal_covariance: (k, k), of its parameters, zero where the spec states none.
+        nominal_covariance: (k, k), covariance of its parameters, zero where the spec states none.
         assessable: whether any accuracy is asked for that data could meet or miss.
-        operating_point: by channel, the levels in the spec that signals vary about.
-        earlier: the prior as an estimate, which counts along; None if it has no values.
-        has_prior: whether it states prior information.
+        operating_point: the levels in the spec that signals vary about, by channel.
+        earlier: the prior as an estimate, combined with the data; None if it has no values.
+        has_prior: whether the spec states prior information.
         hold: the samples for which a designed record holds each value.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
         knowledge: further knowledge of the parameters in the spec; None if there is none.
         foreseen: the plants that the design was made for; None if it was made for the plant of the spec.
-        at: the question of the spec at another model with the given number of samples, the factor (k, k) of
-            whose information sets the coordinates; the text names the source of that model in diagnostics.
-        with_noise: the same, where the noise of every output has C and D more than a model.
+        at: returns the question of the spec at another model, for a number of samples. The factor (k, k) of
+            their information sets the coordinates, and the text names the model in diagnostics.
+        with_noise: returns this task with the noise of a model and further factors of C and D.
     """
 
     header: Header
@@ -140,9 +140,9 @@ class Identified:
         question: None if the requirement cannot be evaluated at this estimate; `unasked` says why.
         ruled_out: other minima, which knowledge of the plant rules out.
         loop_noted: whether a note says already that inputs answer the outputs.
-        noise_refuted: the probability of the residuals with the noise of the spec, where a larger one was
-            estimated in its place.
-        scatter: what simulated records say of the errors of the estimate.
+        noise_refuted: the probability of residuals as coloured under the noise model of the spec; None
+            unless a larger noise model replaced it.
+        scatter: the findings of simulated records on the errors of the estimate.
     """
 
     estimate: Estimate
@@ -176,8 +176,8 @@ def identified(
 ) -> tuple[Identification, Identified]:
     """Return the estimate from the data in `paths`, jointly, and the question that it answers.
 
-    The nominal parameters are one of the starts. Where the residuals refute the noise of the spec, a larger
-    one, C and D of small orders more, is estimated along. One short record in open loop is simulated many
+    The nominal parameters are one of the starts. Where the residuals refute the noise of the spec, further
+    factors of C and D, of small orders, are estimated too. One short record in open loop is simulated many
     times, which shows the errors of its estimate.
 
     Raises:
@@ -224,8 +224,8 @@ def estimated(
     """Return the estimate, and the question that it answers, from data that have been read.
 
     Args:
-        first: the file that an objection to the data names.
-        taken: how they were prepared.
+        first: the file that errors about the data name.
+        taken: the preparation of the data.
         start: an estimate (k,) of these data with another noise; None: there is none.
 
     Raises:
@@ -242,7 +242,7 @@ def estimated(
             start=start,
             feedback=units.closed_loop,
             lengths=data.lengths,
-            rest=False if len(data.lengths) > len(data.files) else None,  # behind a cut the plant moves
+            rest=False if len(data.lengths) > len(data.files) else None,  # after a cut it is not at rest
             earlier=task.earlier,
             experiments=[samples for _, samples in data.files],
             near=near,
@@ -272,7 +272,7 @@ def sentence_of(error: IdesignError) -> str:
 def findings_of(task: Identification, found: Identified) -> list[Finding]:
     """Return all findings for or against the data and the estimate."""
     units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
-    # Where an expression ends G may vanish, whatever the inputs do.
+    # At the end of the domain of an expression, G may vanish whatever the inputs are.
     at_ends = stopped_at_ends(model, estimate)
     rivals = (
         other_minima(units, model, estimate, question.asked, question.entries, question.information)
@@ -314,7 +314,7 @@ def mismeasured(task: Identification, found: Identified) -> list[Finding]:
 
 
 def identification_results(task: Identification, found: Identified, began: float) -> Results:
-    """Return the results that `idesign identify` writes; the work `began` at this `time.perf_counter()`."""
+    """Return the results that `idesign identify` writes; `began` is `time.perf_counter()` at the start."""
     header, question, estimate = task.header, found.question, found.estimate
     tables, curves = data_curves(header.units, found.data, estimate)
     bound = None
@@ -347,7 +347,7 @@ def identify(task: Identification, paths: Sequence[Path], preparation: Preparati
 
 @contextmanager
 def blaming_columns(path: Path, record: Record) -> Iterator[None]:
-    """Point at the column of the first file that an estimator objects to.
+    """Locate errors of an estimator at the column of the first file that they concern.
 
     Raises:
         DataError: in place of the estimator's `SpecError`.

@@ -44,10 +44,10 @@ from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.records import Preparation, Record
 from inputdesign_cli.specification import is_prior
 
-# Beyond a disc by more than this share of G.
+# A model is far outside a disc if it lies outside by more than this share of |G|.
 _FAR = 0.2
 
-# An output whose level is off by more than this share of its range shows deviations.
+# A figure shows deviations of an output if a level above this share of its range was removed.
 _LEVEL = 1e-3
 
 
@@ -136,9 +136,9 @@ def fit_of(
     """Return the columns of fit.csv with its figure, in which files follow each other.
 
     Args:
-        errors: (samples, p) of the prediction.
+        errors: prediction errors (samples, p).
         simulated: the fit of the simulation (or None) and its samples, for every output.
-        time: instants of the samples; None: the sample time makes them.
+        time: instants of the samples; None: multiples of the sample time.
     """
     even = units.sample_time * np.arange(len(data.y), dtype=np.float64)
     columns = {units.time_header: even if time is None else time}
@@ -230,9 +230,9 @@ def _pairs(units: Units, name: str, values: Array) -> dict[str, Array]:
 def response_without_model(
     units: Units, model: Model, data: Record, *, inputs: Sequence[int] | None = None, loop: bool = False
 ) -> tuple[dict[str, Table], dict[str, Curves], MeasuredLines | None]:
-    """Return the frequency response of the data alone beside a model; nothing where it cannot be had.
+    """Return the frequency response of the data alone beside a model; nothing where it cannot be estimated.
 
-    A reference counts if it is from outside and moves.
+    The reference is used where it differs from u and gives a response, else u alone.
 
     Args:
         inputs, loop: see `response_of_data`.
@@ -264,8 +264,8 @@ def response_of_data(
     """Return the table, its figure, and `frequency_response` of the result.
 
     Args:
-        model: the estimate that it stands beside.
-        by_reference: whether a reference from outside was used.
+        model: the estimate to compare with.
+        by_reference: whether the response was estimated from the reference.
         inputs: the inputs (from zero) of `found`; None: all.
         loop: whether the data come from a loop, which the spec need not state.
     """

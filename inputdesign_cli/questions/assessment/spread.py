@@ -2,8 +2,8 @@
 
 First-order theory states a covariance of the estimate. A short record may hold too little noise to average,
 and the likelihood may be no parabola. So records of the estimated model are simulated and estimated again.
-Their scatter is that of one plant. The likelihood of the record itself says how far other plants, which
-would have scattered more, may be.
+They show the scatter at one plant only. The likelihood of the record shows how far away other plants may be,
+whose estimates scatter more.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from inputdesign_cli.identification import Estimate, fit_batch
 from inputdesign_cli.identification.records import evaluate
 from inputdesign_cli.plant import Model
 
-# Runs, and the samples a parameter beyond which theory is good to a few per cent.
+# Number of runs, and the samples per parameter from which theory holds to a few per cent.
 _RUNS, _PLENTY = 200, 60
 _LEVEL = 0.95
-# Models drawn about the estimate, from Gaussian densities of these multiples of the deviations of theory.
+# Number of models drawn about the estimate, from Gaussian densities of these multiples of its deviations.
 _DRAWS, _REACH = 1000, np.array([1.0, 2.0, 4.0])
-# Smaller factors are luck of the runs; a record without an estimate as a rule has the largest.
+# Factors up to the first may be chance. A record that gives no estimate in most runs has the second.
 _LUCK, _MOST = 1.05, 1e4
-_SETTLED = 0.5
-_NEAR = 1e-4  # the square of the last step, in standard deviations: far below the luck of the runs
+_SETTLED = 0.5  # least share of runs with a usable estimate
+_NEAR = 1e-4  # the square of the last step, in standard deviations: far below the scatter of the runs
 _SINGULAR = 1e14  # condition number of the information, without units
-_NO_NUMBERS = (ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)  # of a plant far from any real one
+_NO_NUMBERS = (ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)  # at draws far from any real plant
 
 
 def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tuple[Estimate, list[Finding]]:
@@ -58,20 +58,20 @@ def as_simulated(model: Model, estimate: Estimate, u: Array, step: float) -> tup
 
 
 def reach(model: Model, estimate: Estimate) -> Array:
-    """Return by how much the likelihood of the data reaches beyond the region that theory states, (k,).
+    """Return the ratios (k,) of squared distances that the likelihood reaches and that theory states.
 
     Stable models are drawn about the estimate, with another plant or with another noise. Each counts by its
     likelihood over the density of the draws (importance sampling). The unknown size of the noise is
-    integrated over, as Student's t does.
+    integrated over, which gives Student's t.
     """
     rng, records, best = np.random.default_rng(1), estimate.search.records, estimate.search.point
     factors = np.ones(model.theta.size)
     for part in _parts(model):
-        # The other parameters follow as they do by theory, so that these draws are about as likely as any.
+        # The other parameters follow by linear regression on these, where the likelihood is largest.
         root = np.linalg.cholesky(estimate.covariance[np.ix_(part, part)])
         z = rng.choice(_REACH, (_DRAWS, 1)) * rng.standard_normal((_DRAWS, part.size))
         off = z @ np.linalg.solve(root, estimate.covariance[part])
-        # The others are integrated over, which costs freedom.
+        # Integration over the others takes degrees of freedom.
         left = max(best.freedom - factors.size + part.size, 1)
         exponents = -0.5 * np.sum(z**2, axis=1)[:, None] / _REACH**2 - part.size * np.log(_REACH)
         logarithms = np.full(_DRAWS, -np.inf)
@@ -90,7 +90,7 @@ def reach(model: Model, estimate: Estimate) -> Array:
 
 
 def _scatter(model: Model, u: Array, step: float, *, free: bool) -> Array:
-    """Return by how much simulated estimates scatter more than first-order theory states, (k,)."""
+    """Return the ratios (k,) of squared distances of simulated estimates and of first-order theory."""
     rng, unknown = np.random.default_rng(0), np.full(model.theta.size, _MOST)
     e = rng.standard_normal((_RUNS, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     caused, noise = model.simulate(u[None], e, step)
@@ -103,7 +103,7 @@ def _scatter(model: Model, u: Array, step: float, *, free: bool) -> Array:
     usable = found.converged & (np.linalg.cond(scaled) < _SINGULAR)
     if np.sum(usable) < _SETTLED * _RUNS:
         return unknown
-    # Without units: the covariance, and the distance from the model.
+    # The covariance and the distance from the model, free of units.
     spread, away = np.linalg.inv(scaled[usable]), (sizes * (found.theta - model.theta))[usable]
     factors = np.ones(model.theta.size)
     for part in _parts(model):

@@ -21,12 +21,12 @@ from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.spectrum import Basis
 
 _MOST_BYTES = 4 * 2**30
-_NODES = 2000  # of an integral, where poles are well damped
-_COPIES = 4  # of a record's gradient while its information matrix is formed
+_NODES = 2000  # nodes of an integral if poles are well damped
+_COPIES = 4  # copies of a record's gradient while its information matrix is formed
 # A round takes _STEPS steps of the solver. Each factors the matrices of _CUTS cuts, and sums the products of
 # all pairs of entries of the information matrix for _UNKNOWNS unknowns.
 _CUTS, _STEPS, _ROUNDS, _UNKNOWNS = 50, 15, 15, 250
-_CRITERION, _FACTORINGS = 4, 60
+_CRITERION, _FACTORINGS = 4, 60  # inequalities of a criterion, and k^3 operations of each inequality
 _PER_SECOND = 1e10  # multiplications
 _PROBES, _TRACE = 40, 1e-12
 _GENEROUS = 10  # hard plants take this many times as long as the first rounds
@@ -110,18 +110,18 @@ def longest_record(parameters: int, outputs: int) -> int:
     return min(_MOST_BYTES // (8 * _COPIES * parameters * outputs), most("signal.samples"))
 
 
-# Poles nearer to zero are poles at zero; poles of gradients are of no higher order.
+# Poles nearer to zero than this are at zero; the highest order of a pole of a gradient.
 _AT_ZERO, _HIGHEST = 1e-7, 8
-# With this number of points on half the distance to the next pole, the sums are exact to rounding.
+# Points on a circle at half the distance to the next pole, with which the sums are exact to rounding.
 _POINTS = 128
-_NONE = slice(20, 60)
+_TAIL = slice(20, 60)
 _ABOVE, _ROUNDING = 30.0, 1e-10
 # The share of the band that a hint proposes to leave out.
 _MARGIN = 0.01
 
 
 def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
-    """Return the experiment with a finite information matrix: its band starts at the lowest line.
+    """Return the experiment with finite information: if need be, its band starts below the lowest line.
 
     Near a pole at z = 1 outside a loop, gradient and information of any power have no bound. Raises
     `SpecError`: `infinite-information`, `infinite-output`.
@@ -177,13 +177,13 @@ def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]
     source = experiment.model if experiment.loop is None else experiment.loop
     distance = np.abs(source.singularities)
     nearest = float(np.min(distance[distance > _AT_ZERO], initial=experiment.band[1]))
-    # Far from the axis the sizes of late signals differ too much.
+    # On a larger circle, terms with dead times differ too much in size.
     radius = min(0.5 * nearest, 1.0 / max(source.memory, 1.0))
     turn = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
     around = response(radius * turn)
     powers: Array = np.abs(np.fft.ifft(around, axis=0)).max(axis=(2, 3))
-    # No pole has an order this high: these coefficients are rounding, as large as in all others.
-    rounding = np.maximum(_ABOVE * powers[_NONE].max(axis=0), _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
+    # No pole has an order this high: these coefficients are rounding errors, as large as in the others.
+    rounding = np.maximum(_ABOVE * powers[_TAIL].max(axis=0), _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
     return np.asarray(powers[1 : _HIGHEST + 1].max(axis=0) > rounding)
 
 

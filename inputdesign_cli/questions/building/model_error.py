@@ -27,7 +27,7 @@ from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 
 _KEY = "accuracy.model_error"
 _LOOP = "accuracy.loop"
-_GROWS = 5.0
+_GROWS = 5.0  # growth of the error over a decade towards a pole that makes it unbounded
 
 
 def confidence_factor(probability: float, parameters: int) -> float:
@@ -45,7 +45,7 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 
 def build_confidence(spec: Spec, nominal: Experiment) -> Confidence:
-    """Return the chi-squared alpha of r_u, and what calibrates it for `confidence: {exact: ..}`."""
+    """Return the chi-squared alpha of r_u, and its calibration for `confidence: {exact: ..}`."""
     alpha, error = model_error_alpha(spec, nominal.model), spec.accuracy.error
     stated = None if error is None else error.calibrated
     if stated is None or stated.exact is None:
@@ -104,7 +104,7 @@ def _on_entry(
 ) -> OnModelError:
     units, model = build_units(spec), experiment.model
     scenario = None if nominal is None else spec.uncertainty
-    # r_adm of a scenario is its own down to a floor, or that of the nominal plant.
+    # A scenario has its own r_adm, with a lower bound if stated, or r_adm of the nominal plant.
     fixed = scenario is not None and scenario.r_adm == "fixed"
     admissible = _admissible(spec, error, nominal if fixed and nominal is not None else model, band, entry)
     if scenario is not None and nominal is not None and not fixed and scenario.floor > 0.0:
@@ -140,7 +140,7 @@ def _on_entry(
     made = bound(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
     if nominal is None:
         check_bounded(spec, made, _KEY if spec.accuracy.loop is None else _LOOP)
-    # Otherwise it is positive since that of the nominal plant is.
+    # In all other cases r_adm is positive, since r_adm of the nominal plant is.
     if scenario is None or (not fixed and scenario.floor == 0.0):
         try:
             check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)

@@ -21,11 +21,11 @@ _PRIOR = {*SOURCES, "parameters"}
 class Change:
     """Describes how the design of a part differs from the design of the whole experiment.
 
-    The part has its own `samples` and `seed`. `information` (k, k) is of the data so far, in raw
-    parameters; None: as the spec states it. `uncertainty` says which plants the design must suffice for:
-    the estimate alone, as stated, or all that the data leave open. A `white` spectrum is flat. If another
-    part follows (`goes_on`), the record has the power of the design and does not make up for its own end.
-    `best` seeks the best experiment within limits that leave none that suffices.
+    The part has its own `samples` and `seed`. `information` (k, k) is that of the data so far, in raw
+    parameters; None: the prior of the spec. `uncertainty` selects the plants that the design must suffice
+    for: the estimate alone, as stated, or all that the data do not rule out. A `white` spectrum is flat. If
+    another part follows (`goes_on`), the record has the power of the design and is not scaled to meet the
+    accuracy. `best` seeks the most accurate experiment where none within the limits suffices.
     """
 
     samples: int
@@ -55,7 +55,7 @@ class Rebuild(Generic[Built]):
         stated, signal = self.sections.uncertainty, self.sections.signal
         yield from (("campaign", None), ("simulation", None), ("solver.any_spectrum", False))
         yield from (("experiment.samples", change.samples), ("signal.samples", None))
-        yield "signal.least_move", None  # which the part keeps, not the design
+        yield "signal.least_move", None  # the part keeps it, not the design
         yield "signal.seed", change.seed
         if self.sections.experiment.duration is not None:
             yield "experiment.duration", None

@@ -35,7 +35,7 @@ class AddedRequirement(Protocol):
 def build_requirements(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> list[RequirementFactory]:
-    """Return a maker for each requirement of `accuracy`, in the order of the contract.
+    """Return a maker for each requirement of `accuracy`, in the order of its `requirements`.
 
     Requirements over frequency are made entry by entry of G. On a scenario, `nominal` is the plant of the
     spec. Raises `SpecError`: a name that the model does not have, a matrix of the wrong size, a
@@ -96,9 +96,9 @@ def build_asked(
 
 
 def stated_bounds(spec: Spec) -> list[StatedBound]:
-    """Return the numbers of `accuracy` that bound errors in proportion to them, or to their powers.
+    """Return the numbers of `accuracy` that are proportional to a power of the admitted error.
 
-    There are none for a bound over the whole confidence ellipsoid: its error is not in proportion.
+    There are none for a bound over the whole confidence ellipsoid, whose error is not proportional to it.
     """
     accuracy = spec.accuracy
     if accuracy.error is not None and accuracy.error.region == "ellipsoid":

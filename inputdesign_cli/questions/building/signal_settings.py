@@ -16,14 +16,14 @@ from inputdesign_cli.signal.settings import Phases, Quantiser, SignalSettings
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.units import SECONDS
 
-# Shared by the inputs: each adds a period to a record, which then varies less and takes longer.
+# Number of candidate records, shared by the inputs, and the fewest: with more inputs records differ less.
 _CANDIDATES, _FEWEST = 20, 4
-_PATIENCE = 4  # times the number of candidates at most, if noise happens to fit badly
-# Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
+_PATIENCE = 4  # at most this many times the candidates are tried if noise fits badly by chance
+# Number of candidates with optimised phases: each takes 0.05 s or more, and their quality hardly differs.
 _OPTIMISED = 4
-# Signals whose times of switching are searched take seconds.
+# Number of candidates whose switching times are searched: each takes seconds.
 _SEARCHED = 2
-# Values in the slowest time constant, and in the record, where idesign chooses for how long they are held.
+# For `hold: auto`: values per slowest time constant, and the fewest values in a record.
 _VALUES, _FEWEST_VALUES = 10.0, 50
 
 
@@ -98,12 +98,12 @@ def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettin
 def chosen_hold(spec: Spec) -> int:
     """Return the samples for which values are held: as stated, or about a tenth of the slowest time constant.
 
-    A chosen number divides the length of the record, and leaves a tenth of it many values.
+    A chosen hold divides the length of the record, and gives it at least 50 values (or is 1).
     """
     stated = spec.signal.hold
     if stated is None or isinstance(stated, int):
         return stated or 1
-    # Noise may fade as slowly as it likes: the memory of the plant counts.
+    # The noise may decay slowly; only the memory of the plant counts.
     white = {"noise": {"variance": 1.0}}
     radius, samples = build_model(spec.revised(white)).radius, spec.signal_samples
     slowest = -1.0 / np.log(radius) if 0.0 < radius < 1.0 else np.inf if radius >= 1.0 else 0.0
@@ -200,7 +200,7 @@ def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array
 
 
 _STEPS_ROUNDING = 1e-12
-_LEAST_WINDOWS = 4
+_LEAST_WINDOWS = 4  # least `solver.windows` for a bound over all records
 
 
 def check_signal(spec: Spec) -> None:

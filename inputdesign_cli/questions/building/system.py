@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 # A pole this near to the unit circle is on it, but for rounding.
 _ROUNDING = 1e-9
 GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
-"""What a design varies, by its `objective` in the spec."""
+"""The quantity that a design optimises, by its `objective` in the spec."""
 
 
 def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> StateSpaceModel:
@@ -75,7 +75,7 @@ def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> 
         hint = "remove K, or C, D and drift"
         raise spec.complain("conflicting-keys", message, hint=hint, key="plant.state_space.K")
     away = np.abs(model.predictor_poles[:, None] - model.poles).min(axis=1, initial=np.inf)
-    own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # the poles that K makes
+    own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # poles that K has moved
     gained = np.any(np.abs(own) > 1.0 - _ROUNDING)
     for what, poles, wrong, hint in (
         ("predictor", model.predictor_poles, gained, "it needs a gain K with which A - K C is stable"),
@@ -96,7 +96,7 @@ _WITHIN = 0.95
 def build_model(spec: Spec) -> Model:
     """Return the model of `plant` and `noise`.
 
-    Raises `SpecError`: `not-supported` for a regression; what is wrong with known and with named parameters.
+    Raises `SpecError`: `not-supported` for a regression; the errors of `reparametrised`.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
     noise = spec.noise
@@ -136,7 +136,7 @@ def build_model(spec: Spec) -> Model:
 def polynomial_model(
     plant: PolynomialPlant, noise: NoiseShape, covariance: Array, D: Sequence[Array] | None = None
 ) -> PolynomialModel:
-    """Return the model of a plant in q^-1, with white noise of a covariance (p, p), and its own D if stated.
+    """Return the model of a plant in q^-1, with white noise of a covariance (p, p), and another D if given.
 
     A, C and D that are stated once are common to the outputs.
     """

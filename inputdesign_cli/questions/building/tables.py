@@ -13,11 +13,11 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
 
-_LARGEST = 1e40  # of a data file, as of other numbers in a spec
+_LARGEST = 1e40  # number in a data file, as elsewhere in a spec
 
 
 def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
-    """Return columns (n,) of a data file without gaps, by role; `wanted` is their header, or how that begins.
+    """Return columns (n,) of a data file without gaps, by role; `wanted` has the beginnings of their headers.
 
     Raises `DataError`: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
     """
@@ -36,7 +36,7 @@ def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
 
 
 def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
-    """Return the columns of a signal, of which no sample may be missing, nor a row between them.
+    """Return the columns of a signal, in which no sample and no row may be missing.
 
     Raises `DataError`: see `read_columns`; `beyond-precision`.
     """

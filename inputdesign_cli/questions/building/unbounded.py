@@ -1,8 +1,8 @@
 """Spec -> whether a design has a best value.
 
 It has no best value if some excitation informs about the parameters and is neither paid for nor limited.
-Combinations of the inputs may be free, and frequencies. At a pole of the plant on the unit circle, a loop
-takes all power of the input away. The power of the output there informs about the pole.
+A combination of the inputs may be free, or a frequency: at a pole of the plant on the unit circle, a loop
+leaves the input no power, while the power of the output informs about the pole.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from inputdesign_cli.spectrum import matrices
 PricedPower = tuple[PowerKind, int | None, float]
 
 
-# Where the price of directions is looked at, in shares of the band: away from what controllers favour.
+# Shares of the band at which directions are priced: frequencies at which controllers hardly have zeros.
 _PLACES = np.array([0.137, 0.293, 0.461, 0.618, 0.787, 0.911])
 _SINGULAR = 1e-12
 # A price this many decades below the typical one may be a zero between the points of a grid.
 _ZERO = 6.0
-# Distances to a free frequency at which the information is looked at, in units of the next pole's distance.
+# Distances to a free frequency at which the information is computed, in units of the next pole's distance.
 _DISTANCES = np.geomspace(1e-2, 1e-4, 9)
-# The information at unit price grows at least with the inverse square of the distance, from step to step.
+# Least growth of the information at unit price over one step (its square law gives 3.2), and steps compared.
 _GROWS, _EARLIER = 2.5, 4
 # Lines and poles nearer to a frequency than this share of the band are on it.
 _ON = 1e-6
-# The share of the band that is left out at a free end for the bound.
-_OFF = 1e-6
+# The share of the band that is left out at a free end, so that the bound exists.
+_MARGIN = 1e-6
 _OUTCOMES = {
     "cost": "with power ever nearer to it the accuracy costs as little as you like",
     "factor": "with power ever nearer to it the accuracy grows without end",
@@ -69,7 +69,7 @@ def check_every_direction_counts(spec: Spec, question: Question) -> None:
 
 
 def check_reach(spec: Spec, question: Question) -> Reach:
-    """Return the validity of a bound over every spectrum.
+    """Return whether every spectrum has a bound, and whether it is attained.
 
     Raises `SpecError` (`no-cost`, `needs-limits`): the family has no best spectrum.
     """
@@ -91,7 +91,7 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         others = f"{section}.input_power"
     elif "output" not in {kind for kind, _, _ in priced_powers(question) or []}:
         others = f"{section}.output_power or {others}"  # at a pole in the loop only outputs have power
-    off, avoid = 2.0 * _OFF * hi, "leave it out by limits.band"
+    off, avoid = 2.0 * _MARGIN * hi, "leave it out by limits.band"
     # Lines are kept off an end of the band; they close in on a frequency inside it from both sides.
     inside = goal == "factor" and any(lo + off <= w <= hi - off for w in frequencies)
     approached = "the best is approached with power ever nearer to it"
@@ -102,7 +102,7 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         raise spec.complain(code, message, hint=hint, key=section)
     if unbounded or inside:
         return Reach(bounded=False, note=f"{free}, so that {outcome}; with {others} there is one")
-    below, above = (_OFF * hi * any(abs(w - end) < off for w in frequencies) for end in (lo, hi))
+    below, above = (_MARGIN * hi * any(abs(w - end) < off for w in frequencies) for end in (lo, hi))
     note = f"{free}: {approached}, which no record can follow; add {others}, or {avoid}"
     return Reach(attained=False, band=(lo + below, hi - above), note=note if family.free else None)
 
@@ -110,9 +110,9 @@ def check_reach(spec: Spec, question: Question) -> Reach:
 def free_information(question: Question) -> tuple[tuple[float, ...], bool, bool] | None:
     """Return the frequencies of the band at which the information per unit of price has no bound.
 
-    Then whether power ever nearer to them meets all requirements at no price, or the criterion has no bound
-    (otherwise the best value is only approached there), and whether spectra of the family can have power
-    there. None without one, and for robust designs: the poles of other plants lie elsewhere.
+    The first flag says that power ever nearer to them meets all requirements at no price, or that the
+    criterion has no bound; otherwise the best value is only approached. The second says that the family can
+    have power there. None without such frequencies, and for robust designs: poles of other plants differ.
     """
     priced = priced_powers(question)
     if priced is None or question.others:
@@ -169,7 +169,7 @@ def price_density(experiment: Experiment, priced: list[PricedPower], w: Array) -
 
 
 def _gain(experiment: Experiment, priced: list[PricedPower], place: float) -> tuple[Array, Array] | None:
-    """Return the information (k, k) at unit price near a frequency, then nearer; None if it does not grow."""
+    """Return the information (k, k) at unit price near a frequency and nearer; None if it does not grow."""
     hi = experiment.band[1]
     distance = np.abs(experiment.singularities - place)
     scale = float(np.min(distance[distance > _ON * hi], initial=0.1 * hi))

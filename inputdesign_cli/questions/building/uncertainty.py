@@ -40,7 +40,7 @@ from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertaint
 from inputdesign_cli.spectrum import Basis
 
 _DEFAULT_SCENARIOS, _DEFAULT_RADIUS = 100, 0.998
-# The most draws for each plant that is asked for, and the most at least.
+# The largest number of draws per plant that is asked for; at least this many are allowed in all.
 _TRIES, _LEAST_TRIES = 20, 500
 # Fresh plants between two checks of the time limit.
 _AT_A_TIME = 50
@@ -73,7 +73,7 @@ class UncertainPlant:
 
     @cached_property
     def spread(self) -> Knowledge:
-        """Return the spread of the parameters: even over the box of all intervals, or normal.
+        """Return the distribution of the parameters: uniform over the box of all intervals, or normal.
 
         Its centre is (k,), and the covariance of normal draws is columns columns^T. Raises `SpecError`:
         `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, `wrong-estimate`.
@@ -213,7 +213,7 @@ class UncertainPlant:
     def listed(self, scenarios: Sequence[Mapping[str, float]]) -> Batch:
         """Return the plants that the spec lists."""
         thetas, plants = [], []
-        # A known integrator is one at every plant.
+        # A known integrator keeps its pole on the unit circle at every plant.
         farthest = max((self.experiment.loop or self.nominal).radius, 1.0 - _ON_CIRCLE)
         for number, values in enumerate(scenarios):
             key = f"{KEY}.scenarios[{number}]"
@@ -270,8 +270,8 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
     names = experiment.model.names
     if isinstance(stated.scenarios, tuple):
         return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
-    # A given excitation has no unknowns, and a risk takes as many plants as with one: all of them meet the
-    # accuracy by chance with probability (1 - risk)^plants. Length, factor or cost count as unknowns.
+    # A given excitation has no unknowns. A risk then takes as many plants as with one unknown: all meet the
+    # accuracy by chance with probability (1 - risk)^plants. A length, factor or cost counts as an unknown.
     unknowns: int | None = 1
     if basis is not None:
         others = spec.goal != "least_cost" or stated.cost == "worst"
@@ -368,7 +368,7 @@ def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
             moments = away.T @ away / len(listed)
         else:
             columns, off = plant.spread.columns, plant.spread.centre - theta
-            # The variance of even draws is a third of the squared half width.
+            # The variance of a uniform distribution is a third of its squared half width.
             moments = columns @ columns.T / (3.0 if plant.spread.box else 1.0) + np.outer(off, off)
         covariance[: len(moments), : len(moments)] = moments
     elif spec.estimate is not None:
@@ -390,7 +390,7 @@ def build_foresight(spec: Spec, nominal: Experiment) -> Foresight | None:
         return None
     names = ", ".join(f'"{name}"' if "[" in name else name for name in (model.names[i] for i in late))
     stated = spec.spectrum
-    # Filtered noise has power between the lines of a multisine, where other dead times differ.
+    # Filtered noise has power between the lines of a multisine, where models with other dead times differ.
     denser = "" if stated is None or stated.type == "fir" else " (spectrum: {type: fir, order: 12})"
     return Foresight(
         units=build_units(spec),

@@ -8,7 +8,7 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.specification import Spec
 
 ONE_PLANT = "remove uncertainty, or ask for a design with model_error, information or a criterion"
-"""What to do about `uncertainty` in a question of one plant."""
+"""The remedy for `uncertainty` in a question about one plant."""
 _OF_CAMPAIGNS = {"signal.least_move": "it is for the parts of a campaign"}
 
 

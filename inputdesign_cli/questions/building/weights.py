@@ -10,7 +10,7 @@ from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
 
-# A root this near to the stability limit is on it; this near to an end of the band (a share), it is inside.
+# A root this near to the stability limit is on it. A frequency this near to an end of the band is inside.
 _ON_THE_LIMIT, _EDGE = 1e-9, 1e-9
 
 

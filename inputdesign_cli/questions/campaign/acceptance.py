@@ -1,7 +1,7 @@
 """Compare a record with the plan of the part that is due, and decide whether it is taken.
 
 Loggers begin late or early and lose a sample, actuators clip, sensors round. Most of a record is in step with
-its plan nevertheless; a record of another experiment is not. All signals are compared about their levels.
+its plan nevertheless; a record of another experiment is not. Signals are compared without their levels.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ LIKE = 0.9
 """From this correlation on a record follows its plan; below it there is a finding."""
 UNLIKE = 0.5
 """Below it a record does not follow."""
-# How sure the scale of the plan must be, in standard deviations, since slow signals are alike by chance.
+# Least t-ratio of the plan in a record, in place and with shifted samples: slow signals are alike by chance.
 _SURE_IN_PLACE, _SURE_SHIFTED = 1.8, 5.0
-# Samples that a record may be shifted, and from where on another shift explains so much more.
+# Largest shift in samples, lags of a regression on the past, and a gain in correlation that counts.
 _SHIFTS, _PAST, _BETTER = 5, 2, 0.02
-# A scale is off by more than this, by this number of its standard deviations, and explains most of the error.
-_OFF, _SURE = 0.02, 3.0
+# A scale is wrong if it is off by more than this, by these standard deviations, and by most of the error.
+_SCALE_ERROR, _DEVIATIONS = 0.02, 3.0
 # An actuator that clips does so in samples beyond this share of half their range.
 _CLIPPED = 0.95
-# A channel is at rest in plans smaller than this share of the strongest; moved by half of that it is not.
+# Shares of the strongest plan: below the first a channel is to be at rest, above the second it has moved.
 _AT_REST, _MOVED = 0.02, 0.5
-# By how much rounding to five digits lowers the correlation of a copy.
+# Rounding to five digits lowers the correlation of a copy by no more than this.
 _COPY = 1e-10
 
-# So few samples are alike by chance.
+# Signals of this many samples, or fewer, are alike by chance.
 _FEW = 3
 _FORCED = "if it was really applied so, say --as-applied: the estimate uses what was recorded"
 
@@ -52,10 +52,11 @@ class Match:
 
     Attributes:
         begins: the sample of the plan that the record begins with.
-        likeness: the correlation of the channel that follows least, as recorded; `spliced`: with samples that
-            are shifted put in their places.
+        likeness: the correlation of the channel that follows least, as recorded; `spliced`: its correlation
+            with shifted samples put back in place.
         channel: its number from 1.
-        scale: at which the channel was applied whose scale is farthest off; `off`: that it is not one.
+        scale: the scale of the channel whose scale is farthest from one; `off`: whether
+            a scale of one is refuted.
         follows: whether it may be the record of the plan.
     """
 
@@ -99,7 +100,7 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
         spliced = max(spliced, shifted)
     scales = [_scale(due[:, j], applied[:, j]) for j in range(plan.shape[1])]
     off, _, scale = max((off, abs(scale - 1.0), scale) for scale, off in scales)
-    # Rows out of their places look like a smaller scale.
+    # Samples out of place look like a smaller scale.
     off = off and spliced <= abs(shares[least]) + _BETTER
     return Match(begins, shares[least], spliced, least + 1, scale, off, follows)
 
@@ -152,10 +153,10 @@ def _follows(alike: float, plan: Array, applied: Array, sure: float) -> bool:
 
 
 def _sureness(plan: Array, applied: Array) -> float:
-    """Return the t-ratio of a plan (m,) in a record, if the rest is noise of order two.
+    """Return the t-ratio of a plan (m,) in a record, if the rest is autoregressive noise of order two.
 
-    Unrelated slow signals are correlated over a few samples. They are not after a regression on the past of
-    both ([cochrane-orcutt-1949]).
+    Unrelated slow signals are correlated over a few samples. After a regression on the past of both they are
+    not ([cochrane-orcutt-1949]).
     """
     signals = _varying(plan, applied)
     past = [signal[_PAST - k : -k] for signal in signals for k in range(1, _PAST + 1)]
@@ -171,7 +172,7 @@ def _sureness(plan: Array, applied: Array) -> float:
 
 
 def _scale(plan: Array, applied: Array) -> tuple[float, bool]:
-    """Return the scale at which a plan (m,) was applied, and whether samples without clipping refute 1."""
+    """Return the scale at which a plan (m,) was applied, and whether samples without clipping refute one."""
     scale, off = _fitted(plan, applied)
     if not off or abs(likeness(plan, applied)) <= LIKE:
         return scale, False
@@ -181,19 +182,19 @@ def _scale(plan: Array, applied: Array) -> tuple[float, bool]:
 
 
 def _fitted(plan: Array, applied: Array) -> tuple[float, bool]:
-    """Return the scale of a plan (m,) in a record, and whether it explains it better than one by chance."""
+    """Return the scale of a plan (m,) in a record, and whether it differs from one by more than chance."""
     plan, applied = _varying(plan, applied)
     size = float(plan @ plan)
     if size == 0.0:
         return 1.0, False
     scale = float(plan @ applied) / size
     rest = float(np.sum((applied - scale * plan) ** 2)) / size
-    least = max(_OFF, _SURE * np.sqrt(rest / max(len(plan) - 2, 1)), np.sqrt(rest))
+    least = max(_SCALE_ERROR, _DEVIATIONS * np.sqrt(rest / max(len(plan) - 2, 1)), np.sqrt(rest))
     return scale, bool(abs(scale - 1.0) > least)
 
 
 def table_of(units: Units, data: Record) -> Table:
-    """Return the record of a part as it is kept: times, inputs, outputs and, in a loop, the reference."""
+    """Return the table in which a record is kept: times, inputs, outputs and, in a loop, the reference."""
     signals = {"u": data.u, "y": data.y} | ({} if data.r is None else {"r": data.r})
     columns = {f"{kind}{j + 1}": x for kind, values in signals.items() for j, x in enumerate(values.T)}
     return Table({units.time_header: data.time, **columns})
@@ -205,7 +206,7 @@ def accepted(
     """Return the entry of a record, compared with the part that is due, and its findings.
 
     Args:
-        kind: of the excitation: "u", or "r", the reference of a loop.
+        kind: the letter of the excitation: "u", or "r", the reference of a loop.
         given: the name of the user's file; `table`: its `data` in the form that is kept.
         unlike: whether to take a record of something else.
 
@@ -280,9 +281,9 @@ def _due(memory: Memory, given: str, table: Table) -> PlannedPart:
 
 
 def _check_answers(given: str, kind: str, columns: Mapping[str, Array]) -> None:
-    """Raise `DataError` (`record-copied`) where an output is what was applied.
+    """Raise `DataError` (`record-copied`) where an output is a copy of the excitation.
 
-    In a loop that is the reference: without one, a controller without dynamics makes a copy of y of u.
+    In a loop that is the reference: a static controller without a reference makes u a copy of y.
     """
     outputs, inputs = ([name for name in columns if name.startswith(letter)] for letter in ("y", kind))
     for output, name in itertools.product(outputs, inputs):
@@ -306,7 +307,7 @@ def _renamed(applied: str, other: str) -> str:
 def _check_applied(
     given: str, due: str, kind: str, match: Match, other: str | None, found: tuple[int, str, float] | None
 ) -> None:
-    """Raise `DataError` (`record-unlike`, `record-other-part`, `record-other-scale`) for what is no plan."""
+    """Raise `DataError` (`record-unlike`, `record-other-part`, `record-other-scale`) for an unlike record."""
     code, hint, loop = "record-unlike", f"give the record of {due}; {_FORCED}", kind == "r"
     if found is not None:
         own = f"{kind}{found[0]}"
@@ -319,7 +320,7 @@ def _check_applied(
         code = "record-other-scale"
         wrong = f"{given} was applied at {match.scale:.4g} times the scale of {due}"
         hint = f"mend the column if it is in another unit; {_FORCED}"
-    # A reference is computed: no actuator clips it. The input of the loop only follows it.
+    # No actuator clips a reference, which is computed. It must follow the plan closely.
     elif not match.follows or (loop and match.spliced <= LIKE):
         wrong = f"what was applied in {given} is not {due}: {kind}{match.channel} has a correlation of "
         wrong += f"{match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted)"

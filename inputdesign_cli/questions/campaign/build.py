@@ -30,7 +30,7 @@ _TENTH, _LONGEST, _CAP = 10, 3, 10.0
 
 
 def build_rules(spec: Spec) -> Rules:
-    """Return the rules of the campaign; raise `SpecError` if there is none, or none that goes in parts."""
+    """Return the rules of the campaign; raise `SpecError` if there is none, or it cannot go in parts."""
     stated = spec.campaign
     if stated is None:
         raise spec.complain(
@@ -58,7 +58,7 @@ def build_rules(spec: Spec) -> Rules:
 
 def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
     samples, has = spec.experiment.samples, "has"
-    if pilot is not None and pilot.power is not None:  # what is known before the experiment begins
+    if pilot is not None and pilot.power is not None:  # a pilot of its own power goes before
         samples, has = samples + pilot.samples, "and its pilot have"
     most = stated.max_samples or max(spec.limits.samples or _LONGEST * samples, samples)
     tenth = max(spec.experiment.samples // _TENTH, 1)
@@ -125,9 +125,9 @@ def build_planner(spec: Spec) -> Planner:
     """Return the planner of the parts; it raises as `build_experiment` and `farthest_radius` do."""
     nominal, inputs = build_experiment(spec), spec.plant.inputs
     peak = stated_peaks(spec)[0]
-    converter = spec.signal.quantisation is not None  # other scales are none of its values
+    converter = spec.signal.quantisation is not None  # a converter has no values at other scales
     sections = spec
-    if spec.signal.hold == "auto":  # for the plant of the spec, once and for all
+    if spec.signal.hold == "auto":  # chosen once, for the plant of the spec
         sections = spec.revised({"signal.hold": chosen_hold(spec)})
     return Planner(
         nominal=nominal,
@@ -162,7 +162,7 @@ def build_campaign(spec: Spec) -> CampaignTask:
 
 
 def build_rounds(spec: Spec, *, begins: bool = False) -> Rounds:
-    """Return all that the rounds of a real campaign need, which may begin; see `build_rules`.
+    """Return the objects for the rounds of a real campaign, a new one if it `begins`; see `build_rules`.
 
     Raises:
         SpecError: `not-supported` for keys of `signal` that do not apply to parts.

@@ -43,9 +43,9 @@ from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.signal.selection import power_of
 
-# Data that say nothing yet; more of them will.
+# Errors of data that are too few for an estimate; more data will do.
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
-# Records whose times differ by one sample time, give or take this share of it, are one.
+# Records are joined if one begins a sample time after the other ends, to within this share of it.
 _CONTINUES = 0.1
 
 
@@ -68,7 +68,7 @@ class Judged:
     """Describes how a campaign stands after its records.
 
     Attributes:
-        standing: the model that is built on; None while the data say too little.
+        standing: the model that plans rest on; None while the data are too few.
         assessed: the estimate and its accuracy; None as long as there is no estimate.
         refuted: whether the campaign ends before its time since tests refute the structure.
     """
@@ -105,7 +105,7 @@ def advanced(
     unlike: bool = False,
     regardless: bool = False,
 ) -> Results:
-    """Return the results of the next decision, with a new record or with those at hand.
+    """Return the results of the next decision, with a new record or with the known ones.
 
     Args:
         given: the file of the user; `preparation`: what to do to it before.
@@ -161,7 +161,7 @@ def _again(
     said: Outcome,
     given: Path | None = None,
 ) -> Results:
-    """Return the results of a decision by all records that count; `said` is what to say of a new one."""
+    """Return the results of a decision by all records that count; `said` holds findings on a new one."""
     counting = [record.file for record in campaign.records if not record.withdrawn]
     # The new record is not in the directory yet; errors about it name the file that was given.
     with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
@@ -193,7 +193,7 @@ def _decided(
 ) -> Results:
     """Return the results of a decision, with the next part where the campaign goes on.
 
-    What was `said` before comes first. Raises `IdesignError` if no part can be planned.
+    The findings of `said` come first. Raises `IdesignError` if no part can be planned.
     """
     header, outcome = task.identification.header, Outcome(title=task.identification.header.title, timing_s={})
     tables, curves, said = dict[str, Table](), dict[str, Curves](), said.saying(found.findings)
@@ -245,7 +245,7 @@ def _stood(campaign: Campaign, found: Judged) -> Round:
 def _next_part(
     task: Rounds, campaign: Campaign, files: Mapping[str, bytes], found: Judged
 ) -> tuple[PlannedPart, Table, list[Finding]]:
-    """Return the part to be applied next, its samples for signal.csv, and what is not as the spec asks."""
+    """Return the next part to apply, its samples for signal.csv, and findings where it is not as asked."""
     rules, done, number = task.rules, campaign.done, len(campaign.records) + 1
     units, seed = task.identification.header.units, rules.seed_of(number)
     applied = [signals_in(files[record.plan])[: record.samples] for record in campaign.records]
@@ -350,7 +350,7 @@ def judged(task: Rounds, campaign: Campaign, paths: Sequence[Path], directory: P
         verdict = "missed"
     files, looks = [name for name, _ in data.files], rules.schedule.looks
     contradicted = bool(differences(estimate, files, looks) or contradictions(estimate, looks))
-    # Faulty measurements can be mended, and users may go on as long as the data do not suffice.
+    # Faulty measurements can be mended, and a user may go on `regardless` while the data do not suffice.
     ends = contradicted or (rules.refuted(estimate) and not mismeasured(identification, found))
     ends = ends and rules.stops and (suffices or not campaign.regardless)
     state = rules.state(done, verdict, refuted=ends)

@@ -8,8 +8,8 @@
     .lock                  held by the process that decides
     result.json            under `campaign` all decisions, and digests of the files that they rest on
 
-A decision replaces the directory as a run replaces another: whatever kills the writer, it holds the state
-before or after.
+A decision replaces the directory as a run replaces another: if the writer is killed at any moment, the
+directory holds the state before or after.
 """
 
 from __future__ import annotations

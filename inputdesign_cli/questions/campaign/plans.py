@@ -33,20 +33,20 @@ from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.signal.selection import power_of
 from inputdesign_cli.spectrum import FlatBasis, TabulatedSpectrum
 
-# A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
+# A length within the cap is near enough to the shortest by this factor, or if it costs this share of the cap.
 _CLOSE, _MOSTLY = 1.1, 0.5
 _LONGER = 4.0  # a length grows at most by this factor at once
-# Cost of a part at the plant of the spec in units of the cap, if costs depend on the plant. Likewise cost of
-# the first plan after a pilot, in units of the design for that plant.
+# At the plant of the spec a part may cost this multiple of the cap, if costs depend on the plant. The first
+# plan after a pilot may cost this multiple of the design for that plant.
 _ELSEWHERE = 10.0
-# A minimum beside the estimate counts up to this excess of -2 log likelihood: a hundredth of its weight. A
-# part that separates minima makes one of them this much less likely, on average.
+# A minimum beside the estimate counts up to this excess of -2 log likelihood: it is a hundredth as likely. A
+# part that separates minima raises -2 log likelihood of one of them by the second number on average.
 _LIKELY, _APART = 9.0, 36.0
 # Frequencies at which models are compared, and the lowest as a share of the highest.
 _LINES, _LOWEST = 200, 1e-3
-# A part of large moves has this share of its power, and is raised by this factor until it has.
+# A part with a least move keeps this share of its power; it is raised by this factor until it does.
 _ENOUGH, _RAISED = 0.95, 1.05
-# Shares of the way from the last estimate that could be built on to one that cannot.
+# Shares of the way from the last usable estimate to a new one, tried from the new one on.
 _SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
 
@@ -56,11 +56,11 @@ class Planner:
 
     Attributes:
         nominal: the experiment on the plant of the spec, in raw parameters.
-        farthest: the radius of poles beyond which an estimate is not built on.
+        farthest: the largest radius of the poles of a usable estimate.
         cost: weights of the powers.
         step: time between samples in the unit of the experiment's frequencies.
         bounded: whether limits bound the power, so that a best experiment exists.
-        seed: of the record of the whole experiment.
+        seed: seed of the record of the whole experiment.
         designs: builds the design of a plan.
         asked: the accuracy question at a model; see `Identification.at`.
         block: the length of a record is a multiple of it, since periods and values are whole.
@@ -79,7 +79,7 @@ class Planner:
     reach: Array
 
     def radius(self, model: Model) -> float:
-        """Return the radius of the farthest pole of the plant, or of its loop; infinite if it is unstable."""
+        """Return the radius of the farthest pole of the plant, or of its loop, infinite if unstable."""
         try:
             loop = self._experiment(model).loop
         except SpecError:
@@ -115,9 +115,9 @@ class Planner:
     ) -> Planned:
         """Plan the experiment that follows `done` samples; raise `IdesignError` if there is no first plan.
 
-        Data that suffice now, or with the next part, may leave several models open. Then the next part
-        also separates minima. If tests leave data undecided that suffice, the part is planned as if without
-        data.
+        Data that suffice now, or with the next part, may leave several minima of the likelihood. The next
+        part then also separates these. If the data suffice but tests leave them undecided, the part is
+        planned as if there were no data.
 
         Args:
             known: None before any data.
@@ -156,7 +156,7 @@ class Planner:
         except IdesignError as error:
             if known is None:
                 raise
-            # The estimate may be far off; the next part improves it, and nothing is decided by this one.
+            # The estimate may be far off. The next part improves it, and this plan decides nothing.
             cost = np.inf if first is None else min(cap, first)
             gap = replace(self._stopgap(rules, cost, rest, seed, error), take=take)
             return self._kept(gap, rules, cap, None, earlier)
@@ -164,10 +164,10 @@ class Planner:
     def _sufficient(
         self, known: Standing | None, change: Change, cap: float, longest: int, *, robust: bool
     ) -> Planned:
-        """Return the plan that makes the data suffice, at all plants that they leave open if `robust`."""
+        """Return the plan that makes the data suffice, at all plants that they admit if `robust`."""
         model = None if known is None else known.model
         if robust:
-            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
+            # The accuracy may be infeasible at some plant that the data admit, but not at the estimate.
             with suppress(IdesignError):
                 found = self._designed(model, replace(change, uncertainty="data"))
                 if found.cost <= cap * REACHED:
@@ -194,7 +194,7 @@ class Planner:
         w = np.linspace(max(lo, _LOWEST * hi), hi, _LINES)
         apart = [self._apart(experiment, known.model.at(theta), w) for theta in known.others]
         squares = np.array([np.einsum("npi,npj->nij", one.conj(), one) for one in apart])
-        # Of power one: the mean over both signs of w.
+        # The spectrum has power one: 1 / pi times its integral over positive frequencies.
         shape = np.sum(squares / np.abs(squares).max(axis=(1, 2, 3), keepdims=True), axis=0)
         table = TabulatedSpectrum(w, shape * np.pi / np.trapezoid(np.einsum("nii->n", shape).real, w))
         gains = np.trapezoid(np.einsum("mnij,nji->mn", squares, table.phi).real, w) / np.pi
@@ -203,7 +203,7 @@ class Planner:
         more = given_record(request, experiment, table, power, lambda information: 0.0)
         if more is None:
             return plan
-        # Records within limits may exceed them together.
+        # The sum of two records within the limits may exceed them.
         record = more.samples[:take] + plan.record[:take]
         plant = FiniteRecord(experiment, take, self.step)
         u, y = (plant.signals(kind, record) for kind in ("input", "output"))
@@ -212,9 +212,9 @@ class Planner:
         return replace(plan, record=record, power=power_of(record), cost=cost, kind="parting", claim=None)
 
     def _apart(self, experiment: Experiment, other: Model, w: Array) -> ComplexArray:
-        """Return the difference of the predictions that two models make of an excitation, (n, p, r).
+        """Return the response (n, p, r) from the excitation to the difference of two models' predictions.
 
-        In units of the noise, at frequencies `w` (n,); the models have the same excitation and noise.
+        It is whitened, at frequencies `w` (n,); the models have the same excitation and noise.
         """
         model = cast(SampledPlant, experiment.model)
         off = model.plant_at(w) - other.plant_at(w)
@@ -238,8 +238,8 @@ class Planner:
 
         A part may be stronger than its plan is on average. An experiment that costs little at a wrong
         estimate may cost any amount at the plant if outputs are paid for. The cap is wide at the plant of
-        the spec, since plants differ. Noise does not count, as in the cost of a design. Moves of the part are
-        as slow, and as large, as the rules ask.
+        the spec, since plants differ. Noise does not count, as in the cost of a design. Moves of the part
+        keep the largest rate and the least size of the rules.
         """
         lead, last = 0, before[-1] if before.size else np.zeros(self.nominal.inputs)
         if rules.rate is not None and np.any(last):
@@ -255,7 +255,7 @@ class Planner:
             caps = [(self._experiment(known.model), cap), (self.nominal, wide * cap)]
 
         def part(scale: float) -> Array:
-            """Return the part, all of it but the lead at a scale."""
+            """Return the part at a scale, with its lead unscaled."""
             factors = np.where(np.arange(plan.take) < lead, 1.0, scale)
             return factors[: len(plan.applied), None] * plan.applied
 
@@ -272,7 +272,7 @@ class Planner:
         beyond = any(cost(at, applied) > most * REACHED for at, most in caps)
         record = np.concatenate([applied, plan.record[plan.take :]])
         part_cost = cost(caps[0][0], applied)
-        # The samples of a part are stronger or weaker than those of its plan are on average.
+        # A part may be stronger or weaker than its plan is on average.
         weaker = scale**2 < NEARLY and plan.power > 0.0
         share = power_of(applied) / plan.power if weaker else 1.0
         return replace(plan, record=record, share=share, part_cost=part_cost, beyond=beyond)
@@ -389,7 +389,7 @@ def _fits(found: _Found | None, cap: float) -> bool:
 def standing(
     planner: Planner, estimate: Model, informed: Callable[[Model], Array], last: Model
 ) -> Standing | None:
-    """Return the estimate with its accuracy, or the nearest usable model on the way from the `last` one.
+    """Return the estimate with its accuracy, or the nearest usable model on the way to it from the `last`.
 
     `informed` returns the information (k, k) of the data at a model. None: no model can be used.
     """
@@ -409,7 +409,7 @@ def standing(
 
 
 def other_minima(model: Model, estimate: Estimate, question: ModelQuestion | None) -> tuple[Array, ...]:
-    """Return the parameters (k,) of minima about as likely as the estimate that leave its accuracy open.
+    """Return the parameters (k,) of minima about as likely as the estimate that cast doubt on its accuracy.
 
     G differs there by more than is admitted, or the minima widen the covariance of the estimate.
     """
@@ -446,7 +446,7 @@ def _waiting(record: Array, start: Array, least: Array) -> Array:
 def _largest_scale(cost: Callable[[float], float], cap: float) -> float:
     """Return the largest scale up to one at which a cost, quadratic in the scale, is at most `cap`.
 
-    If effects of earlier parts alone cost more, the own effects of the part keep the cap.
+    If effects of earlier parts alone cost more, the effects of this part alone keep the cap.
     """
     full = cost(1.0)
     if full <= cap:

@@ -32,7 +32,7 @@ class Schedule:
 
     Attributes:
         parts: samples of the first parts; later parts have `block`.
-        samples: of the whole experiment as it is planned; `most`: where it ends at the latest.
+        samples: number of samples of the whole experiment as planned; `most`: the largest number.
         hold: samples for which each value stands; a part has whole values.
     """
 
@@ -83,7 +83,7 @@ class Rules:
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
     least: tuple[float, ...] | None = None  # smallest useful move of each input
-    seed: int = 0  # of the signal, as the spec states it
+    seed: int = 0  # seed of the signal, as the spec states it
 
     def seed_of(self, number: int) -> int:
         """Return the seed of the part with this number: each has its own, the same if it is planned again."""
@@ -91,7 +91,7 @@ class Rules:
         return int(own.generate_state(1)[0]) if self.seed else number
 
     def cap(self, first: float | None) -> float:
-        """Return the largest cost of a sample; `first` is that of the first plan. Infinite without a cap."""
+        """Return the largest cost of a sample; infinite without a cap. `first` is that of the first plan."""
         return np.inf if self.power_cap is None or first is None else self.power_cap * first
 
     @property
@@ -103,7 +103,7 @@ class Rules:
         """Return how a campaign stands after `done` samples; while nothing is decided, it goes on.
 
         Args:
-            verdict: of all data, `met` if they suffice at the estimate itself.
+            verdict: the verdict on all data, `met` if they suffice at the estimate itself.
             refuted: whether the data contradict the structure, or each other, which more data do not mend.
         """
         if refuted:
@@ -122,11 +122,11 @@ class Standing:
 
     Attributes:
         model: the estimate, or a model on the way to it.
-        information: (k, k) of the data by their own samples at the model, raw parameters.
+        information: (k, k), from the samples of the data at the model, in raw parameters.
         ratio: the largest r_u / r_adm, or of another requirement, at the model.
-        share: of the way from the last estimate to the new one. Below 1 if the new one has no stable loop, or
-            the accuracy cannot be evaluated at it.
-        open: whether the data leave it undecided: other minima of the likelihood, or tests.
+        share: share of the way from the last estimate to the new one. It is below 1 if the new one has no
+            stable loop, or the accuracy cannot be evaluated at it.
+        open: whether other minima of the likelihood, or tests, leave the model undecided.
         others: parameters (k,) of these minima.
     """
 
@@ -149,18 +149,18 @@ class Planned:
 
     Attributes:
         record: (rest, r) about the operating point, of which `take` samples are applied.
-        power: of the record; `cost`: of a sample of the design at the estimate.
+        power: power of the record; `cost`: cost of a sample of the design at the estimate.
         kind: the purpose; a `stopgap` is white noise if there is no design.
         capped: whether the cap or limits make it miss the accuracy that is asked.
-        claim: returns what is proved of the design, whose first plan sets the cap; None for white noise.
+        claim: returns the proof of the design, None without one; the first plan with a proof sets the cap.
         why: the reason why there is no design.
-        share: power of the next part over that of the plan, where it would cost more than the cap otherwise.
-        part_cost: of a sample of the next part at the plant that it is planned for, with the effects of
+        share: power of the next part over the power of the plan, below 1 if it was weakened to keep the cap.
+        part_cost: cost of a sample of the next part at the plant that it is planned for, with the effects of
             earlier parts.
         beyond: whether `part_cost` exceeds the cap, whatever is applied.
         alone: whether the part is planned without the data, which leave the model undecided.
-        fragile: whether a plan that ends with its part was to suffice at all plants that the data leave open,
-            and does at the estimate alone.
+        fragile: whether a plan that ends with its part suffices at the estimate alone, although it was to
+            suffice at all plants that the data do not rule out.
     """
 
     record: Array

@@ -50,7 +50,8 @@ class Oracle:
     """Holds the cost of an experiment whose design knows the true plant, summed over its samples.
 
     Attributes:
-        cost: of the spectrum; `record`: of the delivered record on the true plant, None without one.
+        cost: cost of the spectrum; `record`: cost of the delivered record, None without one. Both are on the
+            true plant.
     """
 
     cost: float
@@ -130,7 +131,7 @@ class CampaignTask:
             )
         results = self.design.solve()
         started = time.perf_counter()
-        with time_limit(inf):  # that of the solver is for the design
+        with time_limit(inf):  # the limit of the solver is for the design
             oracle = self.oracle()
             ways = {name: self.tried(name, executor) for name in self.ways}
         record = None if oracle is None else oracle.record
@@ -311,7 +312,7 @@ class _Run:
                 self._stand(model.at(found.theta[0], found.noise[0]), u, y)
             else:
                 self._identified(u, y)
-            # Only a first suspicion, or the end, is worth a search from several starts.
+            # A search from several starts is made only after a first suspicion, or at the end.
             if rules.state(done, "met" if self._met else "missed") == "running":
                 asks = rules.stops and self.known is not None
                 near = self._identified(u, y, near=True) if asks else None
@@ -328,7 +329,7 @@ class _Run:
         return self.known is not None and self.known.met
 
     def _identified(self, u: Array, y: Array, *, near: bool = False) -> Estimate | None:
-        """Return the estimate near the last one, or from several starts; this one is built on from now on."""
+        """Return the estimate near the last one, or from several starts; later plans rest on this one."""
         model, step, feedback = self.last, self.planner.step, self.true.loop is not None
         try:
             found = identify(model, u, y, step, start=model.theta, feedback=feedback, rest=True, near=near)
@@ -339,14 +340,14 @@ class _Run:
         return found
 
     def _verdict(self, full: Estimate | None) -> Verdict:
-        """Return the verdict on all data; where they leave several models open, the next plan will know."""
+        """Return the verdict on all data, and note other minima for the next plan."""
         known = self.known
         if full is None or known is None:
             return "met" if self._met else "missed"
         question = self.planner.question(known.model, known.information)
         others = other_minima(known.model, full, question)
         against = bool(full.tests.failed or others or not full.search.converged)
-        if not against and known.met:  # more parameters miss it all the more
+        if not against and known.met:  # a missed accuracy is missed with more parameters, too
             found = neglected(known.model, full, question.asked, question.information)
             against = bool(mattering(found))
         self.known = replace(known, open=against, others=others)

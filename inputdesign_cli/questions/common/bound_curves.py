@@ -25,7 +25,7 @@ from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum, best_directions, matrices
 
 _GRID_POINTS = 400
-_NEARLY = 0.5
+_NEARLY = 0.5  # peaks of the ratio above this are points of the axis
 _NOTHING, _ROUNDING = 1e-9, 1e-9
 _PAIRS = 6
 
@@ -34,11 +34,11 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Informed:
-    """Relates an information matrix M (k, k), in the coordinates of the errors, to them over frequency.
+    """Evaluates errors over frequency by an information matrix M (k, k) in their coordinates.
 
-    Without r_adm `stated` the errors are r_u of entries of G. Each binds at its `active` frequencies. For
-    comparison there are M of the baseline `white`, of white excitation with `equal` means, and of the
-    `record`. `of_several`: the design serves other plants, too, which the curves do not show.
+    Unless r_adm is `stated`, the errors are r_u of the entries of G. Each binds at its `active` frequencies.
+    M of the baseline `white`, of white excitation at `equal` cost or length, and of the `record` are for
+    comparison. `of_several`: the design serves other plants, too, which the curves do not show.
     """
 
     units: Units
@@ -84,7 +84,7 @@ class Informed:
             for violation in error.violations(self.information, above=_NEARLY)
         ]
         peaks = np.array([at for at in near if at is not None])
-        # What shows the shape of resonances.
+        # A coarser grid still shows the shape of resonances.
         grid = np.unique(np.concatenate([error.grid for error in self.errors]))
         shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]
         w = axis(*self.errors[0].band, np.concatenate([*binding, peaks, shape]))
@@ -134,7 +134,7 @@ class Informed:
         limiting = distinct(limiting, error.band[1])
         w = axis(*error.band, np.concatenate([error.grid, limiting]))
         S, applied = (part[:, 0, 0] for part in loop.sensitivity(w))
-        # With integral action S vanishes at frequency zero, where the loop has no end.
+        # With integral action S vanishes at frequency zero, where the loop gain is infinite.
         inside = np.abs(S) > _NOTHING
         w, S, applied = w[inside], S[inside], applied[inside]
         L, radius = 1.0 / S - 1.0, np.abs(applied / S) * error.error_bound(self.information, w)
@@ -152,7 +152,7 @@ class Informed:
 def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
     """Return the information (k, k) of white noise at the design's cost or length; None if limits bind both.
 
-    M less what is known without excitation is in proportion to both. The `ratio` is that of the costs.
+    M less its part without excitation is proportional to both. The `ratio` is that of the costs.
     """
     problem, white = design.problem, design.white
     if problem.goal == "factor" or ratio <= 0.0:
@@ -286,8 +286,8 @@ def with_periodogram(
 def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCurves] | None:
     """Return optimality.csv and its plot, the worth of the best direction over its price, or None.
 
-    By the bound over every spectrum it is at most one everywhere, and one where power pays. So it is by the
-    bound over all records, whose price grows where signals within the amplitude have no such autocovariances.
+    For the bound over every spectrum it is at most one, and one where power pays. The same holds for the
+    bound over all records, whose price also counts autocovariances that no signal within the amplitude has.
     """
     anything = design.any_spectrum
     if anything is None:
@@ -296,7 +296,7 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
     if price is None or value is None:
         return None
     lines, powers = anything.basis.lines(anything.x)
-    # By what is paid, not by power: power is almost free near DC in a loop with integral action.
+    # Lines count by their cost, not their power, which is almost free near DC in a loop with integral action.
     paid = np.einsum("nab,nba->n", matrices(price.density(lines)), powers).real
     support = lines[paid > _SUPPORT * paid.sum()]
     w = axis(*design.problem.experiment.band, support)

@@ -21,13 +21,13 @@ from inputdesign_cli.outcome.shares import per_cent
 
 SETTLED = 1e-3
 _MOST_ROUNDS = 15
-_STEP = 2.0  # the most that one round changes alpha by
-_SMALLER = 0.02
-# Streams that no `simulation.seed` of a spec begins.
+_STEP = 2.0  # the largest factor on alpha in one round
+_SMALLER = 0.02  # step of log(alpha) where no design exists
+# Seeds that no `simulation.seed` of a spec has.
 _TO_CORRECT, _TO_CHECK = 2**60, 2**60 + 1
-# Samples of all runs: asymptotic theory holds for long records, and many of them take minutes.
+# The most samples in all runs: many long records take minutes, and asymptotic theory holds for them.
 _MOST = 20_000_000
-# Runs that share one record, and its least length: in long records their differences hardly count.
+# Runs that share one realisation of the excitation if it is at least this long: long ones hardly differ.
 _EACH, _LONG = 20, 100
 
 
@@ -89,7 +89,7 @@ class SimulatedEstimates:
 
 @dataclass(frozen=True)
 class Confidence:
-    """Holds alpha of r_u; where calibrated also the way, the chi-squared one (`usual`) and the coverage.
+    """Holds alpha of r_u and of the chi-squared distribution (`usual`), its calibration and coverage if any.
 
     The `simulator` makes the estimates that alpha is calibrated to; asymptotic theory decides without one.
     """

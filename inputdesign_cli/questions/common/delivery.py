@@ -1,6 +1,6 @@
-"""Results that all kinds of questions deliver: how they grow, their last check, and a study of them.
+"""Results that all kinds of questions deliver: their growth, their last check, and their simulation.
 
-What is about to be written is reread, and evaluated by other means.
+Results are reread before they are written, and evaluated by other means.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Delivered:
     """Holds a design or an analysis to be tried: a record (n, r), None if no excitation is needed.
 
     `renewed` realises the spectrum anew in each run. `of_length` draws `bound` and `ellipses` for another
-    number of samples. `rivals` searches a number of records from several starts, if that finds other minima.
+    number of samples. `rivals` searches a number of records for other minima, from several starts.
     """
 
     results: Results
@@ -83,7 +83,7 @@ def with_study(
     tables: Mapping[str, Table] | None = None,
     curves: Mapping[str, Curves] | None = None,
 ) -> Results:
-    """Return the results with a Monte Carlo study that began then, by `perf_counter`."""
+    """Return the results with a Monte Carlo study; `begun` is `perf_counter` at its start."""
     seconds = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - begun}
     outcome = replace(results.outcome, simulation=study, timing_s=seconds)
     return adding(results, outcome, findings, tables, curves)
@@ -104,7 +104,7 @@ def check_claims(wrong: Iterable[str], remedy: str) -> None:
 
 
 def of_bounds(claimed: Objective, apart: float = APART, size: float = 0.0) -> Iterator[str]:
-    """Yield a sentence if the value lies beyond a proved bound by this share of it, or of a larger size."""
+    """Yield a sentence if the value lies beyond a proved bound by the share `apart` of it, or of `size`."""
     value, largest = claimed.value, claimed.upper_bound is not None
     for name, bound in (
         ("upper_bound", claimed.upper_bound),

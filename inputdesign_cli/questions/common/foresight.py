@@ -1,9 +1,8 @@
-"""Look for minima of the likelihood far apart, which may leave a design's data undecided, beforehand.
+"""Look in advance for distant minima of the likelihood, which may leave the data of a design undecided.
 
 The local covariance knows of one minimum. A dead time that few frequencies excite has others, whole periods
 away. A record of the design is simulated on the nominal plant and estimated with the search of `identify`.
-Knowledge besides the data rules minima out: who says that it is 25 s within 30 % has said that it is not ten
-minutes.
+Knowledge besides the data rules minima out: a dead time known as 25 s within 30 % is not ten minutes.
 """
 
 from __future__ import annotations
@@ -37,21 +36,21 @@ if TYPE_CHECKING:
     from inputdesign_cli.identification import Earlier, Estimate, Rival
 
 _SEED = 0
-# Seconds of a search for each sample, channel, channel and parameter, measured; the longest that is begun.
+# Measured seconds of a search per sample, input, output and parameter; the longest search that is begun.
 _SECONDS, _LONGEST = 1.2e-4, 20.0
-# What a simulated search may end with; then nothing can be said.
+# Errors after which a simulated search says nothing.
 _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
-# People are surer than they should be: parameters count as possible to this many times the stated distance.
+# Stated knowledge is often too narrow: parameters are possible up to this multiple of the stated distance.
 _ROOM = 3.0
-# Of its own deviations, by which an estimate may be off.
-_OFF = 3.0
+# An estimate may be off by this many of its standard deviations.
+_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True)
 class Knowledge:
     """Holds the region centre + columns z, (k,) and (k, m): z in the unit ball, with `box` in [-1, 1]^m.
 
-    Of directions without a column nothing is known.
+    Nothing is known about directions without a column.
     """
 
     centre: Array
@@ -79,12 +78,12 @@ class Foreseen:
     def missed(self, theta: Array, covariance: Array) -> NDArray[np.int64] | None:
         """Return the parameters (indices) of an estimate (k,) for whose values the design was not made.
 
-        They lie beyond their intervals by more than their own covariance (k, k) explains. None: the estimate
-        is one of the plants; all of the plant's parameters together lie beyond an ellipsoid.
+        They lie beyond their intervals by more than their own covariance (k, k) explains; for an ellipsoid
+        all parameters of the plant are returned. None: the estimate is one of the plants.
         """
         of_plant, centre = self.of_plant, self.region.centre
         away = (theta[: centre.size] - centre)[of_plant]
-        own = _OFF**2 * covariance[np.ix_(of_plant, of_plant)]
+        own = _DEVIATIONS**2 * covariance[np.ix_(of_plant, of_plant)]
         wide = self.region.columns[of_plant]
         if self.region.box:
             beyond = np.abs(away) > np.abs(wide).sum(axis=1) + np.sqrt(np.diag(own))
@@ -116,8 +115,8 @@ def that_agrees(
 class Foresight:
     """Predicts an experiment's data from the nominal plant and prior, both in raw parameters.
 
-    `entries` are errors that have r_u where none is bounded, and `earlier` counts along where data are
-    assessed. `knowledge` of the parameters rules rivals out.
+    `entries` are the errors for r_u if none is bounded. `earlier` is combined with data that are assessed.
+    `knowledge` of the parameters rules rivals out. Nothing is simulated unless it `looks`.
     """
 
     units: Units

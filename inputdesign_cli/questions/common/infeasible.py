@@ -20,11 +20,11 @@ from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.spectrum import LinesBasis
 
 _TOLERANCE, _EXACT = 1e-5, 1e-6
-_ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare
+_ROOM = 1.0 + 1e-4  # margin with which a remedy meets the accuracy
 _STEPS = 30
 _LONGEST_STEP, _MOST = 1e3, 1e9
 _NO_SHARE = 1e-5
-# A limit takes part in the conflict when its share of the proof's weight is above this.
+# A limit takes part in the conflict if its weight in the proof exceeds this share of the largest.
 _TAKES_PART = 1e-4
 _MOST_PLACES = 3
 
@@ -45,7 +45,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class StatedBound:
-    """Holds a bound of the spec: `factor` times the error is `value` times factor ** `power`.
+    """Holds a bound of the spec: errors `factor` times as large take value * factor ** `power`.
 
     A `fraction` is shown in per cent.
     """
@@ -72,7 +72,7 @@ class StatedBound:
 class Bought:
     """Holds the best accuracy within limits: `nearest` solves the `problem`, of the goal "factor".
 
-    The numbers `stated` in the spec are loosened alike; there are none if that has no words.
+    The `stated` numbers are loosened by one factor; there are none if no number of the spec scales errors.
     """
 
     units: Units
@@ -83,7 +83,7 @@ class Bought:
 
     @property
     def factor(self) -> float:
-        """Return the least common factor on all errors asked for with which they can be met."""
+        """Return the least common factor on all admitted errors that makes them feasible."""
         return float(np.sqrt(self.nearest.objective))
 
     @property
@@ -185,7 +185,7 @@ def explain(
         longer = int(np.ceil(question.experiment.samples * nearest.objective))
         enough = units.length(longer)
         remedies.append(f"with {enough} a spectrum can, and a record with somewhat more")
-    try:  # that it is infeasible is proved, whatever else is found out
+    try:  # infeasibility is proved already, and the rest is optional
         with time_for_hints():
             parts += _what_would_do(unreachable, question, involved)
             remedies += ["spectrum: {type: free} can meet it"] if _within_reach_of_any(question) else []
@@ -263,15 +263,15 @@ def contradictory(limits: Sequence[PowerLimit], why: str) -> InfeasibleError:
 def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -> float | None:
     """Return the least factor on these limits together that allows the accuracy; None if none does.
 
-    The multipliers of the limits are the slope of the square of the best ratio. Newton's method uses it, in
-    logarithms. Information of noise or of a prior does not grow with the powers: the square of the ratio is
-    not the factor.
+    The dual variables of the limits are derivatives of the squared best ratio, for Newton's method in
+    logarithms. The squared ratio itself is not the factor, since the information of noise or of a prior does
+    not grow with the powers.
     """
     stated = unreachable.problem.limits
     bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}
     places, found, at = list(bounds), unreachable.nearest, 1.0
     for _ in range(_STEPS):
-        # What is proved where the limits are too tight, and what is reached where they are not.
+        # The proved bound where the limits are too tight, and the attained value where they are not.
         ratio = max(found.certificate.bound, min(found.objective, 1.0))
         if abs(ratio - 1.0) <= _EXACT:
             return at

@@ -30,9 +30,9 @@ from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum
 
 _TAKES_PART = 1e-6
-# The cost beyond that of the design, relative to it, from which on a record has nothing to do with it.
+# A record whose extra cost exceeds this multiple of the design's cost no longer follows the design.
 _HOPELESS = 1e3
-# The share of the record from which on the dead time is the reason.
+# A dead time above this share of the record explains that.
 _LATE = 0.8
 
 Family = Basis | TabulatedSpectrum
@@ -43,18 +43,18 @@ T = TypeVar("T")
 class RecordRequest:
     """Describes the record that a spec asks for, of `samples` samples (None: as the experiment).
 
-    A record that `meets` keeps the accuracy itself; else it has the power of the design. Where the length is
-    sought it is `most_samples` at most, and at most `longest` are computed at all.
+    If it `meets`, the record itself keeps the accuracy; else it has the power of the design. A length that is
+    sought is at most `most_samples`. No record of more than `longest` samples is computed.
 
     Args:
-        bounds: on the samples of the record, on the outputs that it causes, and on powers.
-        band: in rad per sample.
-        step: between samples, in the unit of the experiment.
+        bounds: bounds on the samples of the record, on the outputs that it causes, and on powers.
+        band: frequencies of the excitation, in rad per sample.
+        step: time between samples, in the unit of the experiment.
         limit_keys: the keys of the spec that limit single samples, for messages.
-        others: may stand in for a kind of signal that does not fit.
+        others: settings of other kinds of signals, for a kind that does not fit.
         operating_points: levels (r,) added to each input.
-        also: files beside signal.csv: "mat", "npz", "h", "wav".
-        full_scale: of signal.wav; None: the largest value.
+        also: files beside signal.csv: "mat", "npz", "h", "wav", "step_table".
+        full_scale: the value at full scale of signal.wav; None: the largest value.
     """
 
     settings: SignalSettings
@@ -193,7 +193,7 @@ def _with_powers(bounds: Bounds, design: Design) -> Bounds:
     upper = (
         (limit.kind, limit.channel, limit.bound)
         for limit in design.problem.limits
-        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single ones are limited
+        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single moves are limited already
     )
     return replace(bounds, powers=tuple(upper))
 
@@ -355,7 +355,7 @@ def given_record(
 
 
 def spectrum_of(request: RecordRequest, basis: Family, x: Array) -> DesignedSpectrum:
-    """Return a spectrum for values as far apart as asked."""
+    """Return a spectrum for values that are a `step` of the request apart."""
     return DesignedSpectrum.of(basis, x, inputs=basis.inputs, step=request.step)
 
 
@@ -395,7 +395,7 @@ def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Rec
 
 
 def no_record(request: RecordRequest, samples: int, best: str, hint: str) -> InfeasibleError:
-    """Return the error `limits-too-tight`: what the best record of this length that was tried reaches."""
+    """Return the error `limits-too-tight`: what the best record of this length reaches."""
     keys = request.limit_keys
     message = f"no record of {samples} samples within {' and '.join(keys)} was found that {best}"
     return InfeasibleError.because("limits-too-tight", message, hint, keys[0])

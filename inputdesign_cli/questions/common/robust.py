@@ -23,9 +23,9 @@ from inputdesign_cli.information import jointly_whitened
 from inputdesign_cli.questions.common.foresight import Knowledge
 
 CONFIDENCE = 0.999
-"""Of the statements on plants that were not drawn."""
+"""Confidence of statements on plants that were not drawn."""
 MET = 1.0 + 1e-6
-# While the dearest plants are sought a rough optimum will do.
+# Tolerance of designs that only show the dearest plants.
 _ROUGH = 1e-4
 _TAKES_PART = 1e-6
 
@@ -48,7 +48,7 @@ class Batch:
 class Kept:
     """Holds the largest ratio of an error at a plant to the admitted one, and its frequency.
 
-    `asked` are the requirements there, and `cost` is that of the design at the plant where it is looked at.
+    `asked` are the requirements there. `cost` is the cost of the design at the plant, if it was computed.
     """
 
     share: float
@@ -94,11 +94,11 @@ class Region(Knowledge):
 
 @dataclass(frozen=True)
 class Plants:
-    """Holds the scenarios of a design: a batch beside the nominal plant; `discard` may be left out.
+    """Holds the scenarios of a design: a batch beside the nominal plant; `discard` of it may be left out.
 
-    `afresh` draws others from the same distribution, `fresh` in all; None if plants were listed. `at` is the
-    plant with parameters (k,), `unknowns` their number in the program. In the `region` the worst is
-    `searched`, too.
+    `afresh` draws others from the same distribution, `fresh` in all; None if plants were listed. `at` gives
+    the plant with parameters (k,), and `unknowns` is the number of unknowns of the program. In the `region`
+    the worst is `searched`, too.
     """
 
     batch: Batch
@@ -184,7 +184,7 @@ def tried_on(design: Design, samples: int, plants: Sequence[Alternative], above:
             kept = [replace(one, cost=costs[i % len(costs)]) for i, one in enumerate(kept)]
         return kept
     except (np.linalg.LinAlgError, IdesignError):
-        if len(plants) > 1:  # one of them is to blame, or more
+        if len(plants) > 1:  # one plant or more is to blame
             return [kept for plant in plants for kept in tried_on(design, samples, [plant], above)]
         # The experiment does not identify all of its parameters.
         own = plants[0].at(plants[0].experiment)
@@ -204,7 +204,7 @@ def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.rand
 
 
 def _at(design: Design, samples: int, plants: Sequence[Alternative]) -> Problem:
-    """Return the requirements at plants outside the design, each in coordinates of its own."""
+    """Return the problem at plants outside the design, each in coordinates of its own."""
     on = design.problem.on(design.result.basis)
     power = max(on.power("excitation").at(design.result.x), np.finfo(float).tiny)
     of_length = [plant.experiment.with_samples(samples) for plant in plants]

@@ -22,14 +22,14 @@ from inputdesign_cli.signal.prbs import shifted_sequences
 from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.signal.settings import SignalSettings
 
-# Random signs of the best spectrum, registers and clocks of pseudo-random sequences to begin with; the best
-# of these starts are improved, and at last random changes of the best record.
+# Starts: signs of random signals with the best spectrum, and PRBS of these registers and clocks. The best of
+# them are improved, and then random changes of the best record are tried.
 _DRAWN, _REGISTERS, _CLOCKS = 8, range(2, 12), (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 _IMPROVED, _CHANGES = 6, 1000
 _FEW = 2048  # if there are no more records, all are tried
-# A shortest record is sought to this share of its length; a length takes this share of the time that is left.
+# The shortest length is found to this share of it; one length takes this share of the remaining time.
 _FINE, _SHARE = 0.005, 0.25
-_SHORTER = 0.6  # of the way from the bound to the shortest record so far
+_SHORTER = 0.6  # next length, as a share of the way from the bound to the shortest so far
 
 
 def searches(design: Design, settings: SignalSettings) -> bool:
@@ -47,7 +47,7 @@ class LevelSearch:
     Args:
         plants: returns the plants, one for each scenario, for records of a length.
         cost: returns the cost of samples (n, r).
-        amplitude: of two-level records (r,); None if the first record has the levels.
+        amplitude: amplitude (r,) of two-level records; None: the levels of the first record.
         allowed: says whether samples (n, r) keep to the limits beside the amplitude; None if there is none.
         most_moves: the largest number of changes of the inputs in a number of samples; None without a limit.
     """
@@ -69,7 +69,7 @@ class LevelSearch:
         """Return the best record (n, r) that is found from a first one, no worse than that.
 
         It ends at `settings.tolerance` above the bound over all records, when time is over, or after a number
-        of tries. A least cost is that of the record once its level is as low as the accuracy allows.
+        of tries. The least cost is the cost at the lowest level that meets the accuracy.
         """
         bound, power = self.design.any_record, 1.0
         assert bound is not None
@@ -153,7 +153,7 @@ class LevelSearch:
 
 
 def _levels(record: Array) -> Array:
-    """Return the levels of a record (n, r) of as many at each input, (levels, r)."""
+    """Return the levels (levels, r) of a record (n, r): two for each input, or three with zero."""
     most = int(min(np.unique(column).size for column in record.T))
     ends = [record.min(axis=0), record.max(axis=0)]
     return np.array(ends if most < 3 else [ends[0], np.zeros(record.shape[1]), ends[1]])

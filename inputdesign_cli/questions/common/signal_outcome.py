@@ -24,8 +24,8 @@ from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
 from inputdesign_cli.signal.selection import Record
 
 _LAGS = 50
-_LOST = 1e-6  # of the largest sample
-# Noise whose deviation has grown by less than this in the second half of the record stands still.
+_LOST = 1e-6  # largest rounding, as a share of the largest sample
+# Noise is stationary if its deviation grows by less than this share in the second half of the record.
 _SETTLED = 0.02
 
 
@@ -73,7 +73,7 @@ def signal_of(
         spectral_factor_residual=record.factor_residual,
         operating_point=None if points is None or not made else _channels(points),
         wav_full_scale=_full_scale(request, record) if "wav" in request.also else None,
-        # An operator would make moves that are held, or few.
+        # Moves that are held, or few, may be made by an operator.
         moves=_moves(samples, units.sample_time) if made and (held or request.bounds.moves) else None,
         details={
             **({"phases": request.settings.phases} if record.method == "multisine" else {}),
@@ -162,10 +162,10 @@ def _predicted(request: RecordRequest, experiment: Experiment, record: Record) -
 
 
 def noise_deviation(experiment: Experiment, samples: int, step: float) -> tuple[Array, Array]:
-    """Return standard deviations of the noise at outputs (n, p) and inputs (n, r); these have some in a loop.
+    """Return standard deviations of the noise at outputs (n, p) and, in a loop, at inputs (n, r).
 
-    From the response to an impulse of e, whose squares add up. Noise that settles within the record has been
-    there before; one that drifts grows from the start on.
+    Their squares are sums of squared responses to an impulse of e. Noise that settles within the record is
+    stationary from its start; drifting noise grows from zero.
     """
     model, p = experiment.model, experiment.model.outputs
     e = np.zeros((p, samples, p))

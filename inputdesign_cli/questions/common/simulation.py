@@ -35,8 +35,8 @@ from inputdesign_cli.questions.common.bound_curves import Informed
 from inputdesign_cli.questions.common.delivery import Delivered, with_study
 from inputdesign_cli.signal.kinds import kind_of
 
-_OF_RUNS = 0x0B5  # the branch of a seed that runs have to themselves
-# Records that are searched from several starts, where those leave other minima.
+_OF_RUNS = 0x0B5  # spawn key of the random streams of runs
+# Number of records that are searched from several starts, if the design has rival minima.
 _SEARCHED = 10
 QUANTILES = (0.05, 0.5, 0.95)
 _PAIRS = 4
@@ -196,7 +196,7 @@ class Simulation:
         return replace(nominal, model=model, loop=loop, factor=None)
 
 
-@time_limit(inf)  # that of the solver is for the design
+@time_limit(inf)  # the limit of the solver is for the design
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
     """Return the results with the study of their excitation, or raise `SpecError` (`nothing-to-simulate`)."""
     started = time.perf_counter()
@@ -211,7 +211,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     excitations = _excitations(plan, delivered, delivered.record)
     nominal = plan.nominal.with_samples(len(delivered.record))
     true = plan.on_truth(nominal, outcome.power.output or ())
-    # The children of its seed have drawn a record: they must not return as the noise that it meets.
+    # Children of this seed have drawn the record: they must not be used again for its noise.
     seed = plan.seed if plan.renewed else np.random.SeedSequence(plan.seed, spawn_key=(_OF_RUNS,))
     trying = partial(tried_on, runs=plan.runs, seed=seed, step=units.step, executor=executor)
     counted, simulated = outcome.samples, len(delivered.record)

@@ -28,18 +28,18 @@ from inputdesign_cli.questions.common.signal_outcome import with_record
 from inputdesign_cli.questions.common.simulation import Simulation, simulate
 from inputdesign_cli.signal.selection import Record
 
-# Errors that grow by less than this, relative, where the start is unknown are not mentioned.
+# A relative growth of errors by an unknown start is not mentioned below this.
 _MATTERS = 0.2
-# An upper bound this small shows that without knowing them. A start is forgotten at e^-8 of itself.
+# An upper bound below this makes the growth itself unnecessary. A start is forgotten when it decays to e^-8.
 _SURELY, _FORGOTTEN = 0.19, 8.0
-_LONG = 10_000  # samples in which a loop shows what noise does to its input
+_LONG = 10_000  # samples that show the deviation of the input of a loop by noise
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumTask(ABC):
     """Asks about the spectrum of an experiment, with its record and its trial.
 
-    Without a requirement on errors, r_u is that of the simulated errors. `ellipses` of None are chosen.
+    Without a requirement on model errors, r_u is for `simulation.entries`. `ellipses` of None are chosen.
     """
 
     header: Header
@@ -60,7 +60,7 @@ class SpectrumTask(ABC):
         """Return the answer with many simulated experiments on the true system; see `common.simulation`."""
         delivered = self.delivered()
         if delivered.record is None:
-            seconds_left()  # or else its time is the reason
+            seconds_left()  # raises where time was the reason
         return simulate(self.simulation, delivered, executor)
 
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
@@ -80,7 +80,7 @@ class SpectrumTask(ABC):
     ) -> Results:
         """Return the results with a record, the effect of an unknown start, and the rival minima.
 
-        A design is of spectra, which have no start; the record may live on its start from rest.
+        A designed spectrum has no start, while a record may owe information to its start from rest.
         """
         samples, quantisers = record.samples, self.record.bounds.quantisers
         found = [*findings, *level_rounded(quantisers, float(np.abs(samples).max()))]

@@ -61,15 +61,15 @@ class Asked:
     sections: Mapping[str, Any]
     title: str = ""
     channels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    drifts: bool = False  # whether its noise does
-    integrates: bool = False  # whether its plant does
+    drifts: bool = False  # whether its noise drifts
+    integrates: bool = False  # whether its plant integrates
 
     @classmethod
     def of(cls, spec: Spec) -> Asked:
         """Return what a spec asks for, whatever the plant."""
         sections = {key: part for key, part in spec.content.items() if key in _WISHES}
         match sections:
-            case {"experiment": {"prior": _, **rest}}:  # it is of other parameters
+            case {"experiment": {"prior": _, **rest}}:  # the prior has other parameters
                 sections["experiment"] = rest
         integrates = False
         with suppress(SpecError):  # a plant that no log is compared with
@@ -99,7 +99,7 @@ def spec_text(
     Args:
         reasons: why the model deserves no trust.
         loop: whether inputs seem to answer the outputs.
-        asked: what another spec asks for, in place of that input.
+        asked: the sections on the design of another spec, in place of that input.
     """
     source = " ".join(" and ".join(path.name for path in sources).split())
     blocks = blocks_of(found.model)
@@ -127,7 +127,7 @@ def spec_text(
         if asked.drifts and "drift" not in blocks["noise"]:
             comments["noise"].append("The given spec lets the noise drift. This record shows no sign of it.")
         comments[next(iter(asked.sections))] = ["From here on as in the spec that explore was given."]
-    # The log names its columns; units are those of the spec that explore was given.
+    # The log names its columns; the units come from the spec that explore was given.
     stated, own = dict(asked.channels), _channels(log)
     named = {one: {**stated.get(one, {}), **own.get(one, {})} for one in sorted({*stated, *own})}
     sections = {
@@ -173,7 +173,7 @@ def _as_in_the_record(log: Record, *, integrates: bool) -> Asked:
 
 
 def _channels(log: Record) -> dict[str, dict[str, str]]:
-    """Return names and units of the channels as the header of the log states them, where a spec may."""
+    """Return names and units of the channels in the header of the log, where a spec may have them."""
     found = {}
     for channel, header in log.names.items():
         name, unit = name_and_unit(" ".join(header.split()))
@@ -185,7 +185,7 @@ def _channels(log: Record) -> dict[str, dict[str, str]]:
 
 
 def _usual(log: Record) -> list[float | list[float]]:
-    """Return power, middle and half of the range of every input; one that rests has the largest of others."""
+    """Return power, middle and half of the range of every input; one at rest gets the largest of others."""
     power, low, high = log.u.var(axis=0), log.u.min(axis=0), log.u.max(axis=0)
     power, half = (np.where(x > 0.0, x, x.max()) for x in (power, 0.5 * (high - low)))
     # Six digits of the distance that the input moves: a level far from zero takes more.

@@ -39,7 +39,7 @@ from inputdesign_cli.questions.exploration.build import Asked, build_explored, s
 from inputdesign_cli.questions.exploration.outcome import exploration_of, structure_curves, validation_of
 from inputdesign_cli.records import Preparation, Record, read_data, read_logs
 
-# Where more shifts appear, once these are left out so often, the plant is none of the models tried.
+# If shifts still appear after they were left out this many times, no model that was tried fits the plant.
 _MOST_SHIFTS = 2
 
 
@@ -47,7 +47,7 @@ _MOST_SHIFTS = 2
 class Exploration:
     """Holds the results, reasons against trust in any model (empty if one has it), and failed tests.
 
-    `levels` is the option with which `assess` takes levels away from this log as was done here.
+    `levels` is the option with which `assess` removes the levels of this log in the same way.
     """
 
     results: Results
@@ -63,7 +63,7 @@ def explore(
 
     Args:
         only: the structure to take; None: the simplest that explains the log as well as any.
-        asked: what the spec that is written asks for; None: the most informative experiment.
+        asked: the sections on the design of the spec to write; None: the most informative experiment.
     """
     started = time.perf_counter()
     whole_log = log = read_logs(paths, preparation)
@@ -128,7 +128,7 @@ def _doubts(
         data: the samples that the model was estimated from.
         loop, integrates: whether inputs answer the outputs, and the user says that the plant integrates.
     """
-    if idle := undriven(log.parts):  # the rest says nothing of the plant then
+    if idle := undriven(log.parts):  # then other tests say nothing about the plant
         return idle
     if swapped := perhaps_swapped(log.parts):
         return swapped

@@ -1,4 +1,4 @@
-"""Say in `result.json`, tables and figures how a model was found and how it does on other data."""
+"""Report in `result.json`, tables and figures how a model was found and how it fits other data."""
 
 from __future__ import annotations
 

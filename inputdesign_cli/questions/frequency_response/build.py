@@ -29,7 +29,7 @@ from inputdesign_cli.specification import FrequencyResponse, Spec
 from inputdesign_cli.specification.models.sizes import most
 
 _ZERO, _SAMPLES = 1e-12, "experiment.samples"
-# Periods that are tried for a hint, up to that many times as long.
+# For a hint, periods up to this multiple are tried, and no more than this number of them.
 _LONGEST, _TRIED = 1e3, 400
 # Periods of a block after the transient, if none are stated: their scatter shows the noise.
 _COUNTED = 4
@@ -66,7 +66,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
         if stated.noise is None
         else _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
     )
-    # The counted length is found where the shortest is asked for; all else is per sample of it.
+    # For the shortest experiment the counted length is sought, and the experiment has one sample.
     counted = periods.blocks * periods.kept(spec.experiment.samples) * periods.period
     experiment = Experiment(model, 1 if goal == "samples" else counted)
     simulation = build_simulation(spec, experiment)

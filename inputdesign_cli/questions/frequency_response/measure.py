@@ -50,7 +50,7 @@ _SURE = 0.95
 
 @dataclass(frozen=True)
 class Counted:
-    """Holds data that count, their periods, the number of records of equal length, and the data left out."""
+    """Holds data that count, their periods, the number of records of equal length, and notes on the rest."""
 
     data: Record
     periods: Periods
@@ -77,10 +77,10 @@ class Counted:
 class Judged:
     """Holds the deviations (L, p, r) of data by the noise of the spec (`expected`) and of the data (`found`).
 
-    The true ratios are between `least` and `largest` (L,) with 95 %.
-    Of the power of the inputs the share `differing` differs from period to period; `noise` (L, p) is averaged
-    along the lines. With `times` the periods a verdict would be met. The response is `moved` (L,) by a drift,
-    over what is admitted, and `distorted` by a nonlinearity. Spikes and drifts are `scattered`.
+    The true ratios are between `least` and `largest` (L,) with confidence 95 %. A share `differing` of the
+    input power changes from period to period. `noise` (L, p) is averaged along the lines. `times` as many
+    periods would meet the accuracy. `moved` (L,) is the shift of G by a drift, over r_adm; `distorted` is
+    its error by a nonlinearity. `scattered` are findings on spikes and drifts.
     """
 
     counted: Counted
@@ -128,7 +128,7 @@ class Judged:
     def remedy(self) -> tuple[int | None, str]:
         """Return the periods (of each block) that would have to count, and the remedy in words.
 
-        There is no number where more do not help: the mean of inputs that do not repeat falls as noise does.
+        No number is returned if more do not help: the mean of inputs that do not repeat falls like the noise.
         """
         samples, periods = self.times * self.counted.samples, self.counted.periods
         unlike = self.differing > responses.UNLIKE
@@ -174,7 +174,7 @@ def measure(
         data = counted.data
         judged, seen = _at_lines(terms, counted, name, assess=assess)
         response = of_periods(judged.response, terms.periods.period)
-        # Periods of outputs differ if the inputs do not repeat.
+        # If the inputs do not repeat, periods of the outputs differ without any fault.
         if judged.differing <= responses.UNLIKE:
             judged = _doubted(terms, judged)
     by_reference = data.r is not None and terms is None
@@ -273,7 +273,7 @@ def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Coun
     """Return the data that count, or raise `DataError` (`bad-period`, `too-few-samples`).
 
     Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
-    periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
+    periods that lie in one piece are taken. All have the same phase, counted from the start of each file:
     the one with the most periods. The sample time `step` is in the unit of the times of the data.
     """
     lengths, length = sorted(set(data.lengths)), data.lengths[0]
@@ -301,7 +301,7 @@ def _longest_phase(stated: Periods, data: Record, step: float) -> NDArray[np.int
     """Return the first samples of the periods without a gap, of the phase that has the most."""
     period = stated.period
     files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
-    # The number of samples between the begin of a file and each of its samples.
+    # The number of samples between the start of a file and each of its samples.
     places = np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
     piece = np.repeat(np.arange(len(data.lengths)), data.lengths)
     begins = np.flatnonzero(places[: max(len(places) - period + 1, 0)] >= stated.skip * period)
@@ -373,7 +373,7 @@ def judge_lines(
 ) -> Judged:
     """Return the deviations of the data against r_adm at the measured G, at the `excited` lines (L,).
 
-    Few periods give the noise of one line badly: its ratio to that of the spec is averaged along the lines.
+    Few periods estimate the noise of a line poorly: its ratio to that of the spec is averaged over lines.
     """
     if np.any(found.noise <= 0.0):
         message = "the periods do not differ at all, so that their noise is not known"
@@ -389,12 +389,12 @@ def judge_lines(
     freedom = 2 * found.freedom * window
     rare = 0.5 * (1.0 - _SURE) / (max(size // window, 1) * found.noise.shape[1])
     low, high = np.sqrt(freedom / scipy.special.chdtri(freedom, [rare, 1.0 - rare])).tolist()
-    # If r_adm is a share of |G|, it is known as well as |G| is.
+    # If r_adm is a share of |G|, its uncertainty is that of |G|.
     far = -float(scipy.special.ndtri(0.25 * (1.0 - _SURE) / smooth.size)) * np.sqrt(0.5)
     away = far * smooth
     at_least = lines.at(np.maximum(np.abs(found.G) - away, 1e-9 * away))
     at_most = lines.at(np.abs(found.G) + away)
-    # Sizes are less by `far` deviations at most, and noise comes out anew, in these data and in others.
+    # |G| may be less by `far` deviations, and the noise is estimated anew, from these data and from others.
     anew = 1.0 + scipy.special.ndtri(_SURE) / np.sqrt(freedom)
     needed = np.max(lines.ratios(smooth)) * (high + far * (lines.share or 0.0)) * anew
     return Judged(

@@ -63,7 +63,7 @@ _STREAM = 0x5EED
 class Planned:
     """Holds the experiment: powers (L, r), samples that count, the record, its deviations (L, p, r).
 
-    The largest `shift` of G by the start is in these deviations.
+    The largest `shift` of G by the start is in units of these deviations.
     """
 
     design: ResponseDesign
@@ -93,8 +93,8 @@ class Planned:
 class ResponseTask:
     """Designs lines, or analyses given ones, and studies them.
 
-    The experiment has the samples that count (one where the shortest is asked for), `asked` are stated in the
-    spec. Of noise that is `tabulated` there is no model. Powers (L, r) that are `given` are not designed.
+    The experiment has the samples that count (one if the shortest is sought); `asked` is their number in the
+    spec. Noise that is `tabulated` has no model. Powers (L, r) that are `given` are not designed.
     """
 
     header: Header
@@ -173,7 +173,7 @@ class ResponseTask:
         powers = design.powers.reshape(-1, self.experiment.inputs)
         samples, beyond, exact = self._drawn(powers, counted)
         if self.goal == "samples" and beyond > 1.0:
-            # The lines are scaled into the limits, and more periods make up for it.
+            # The lines are scaled down to the limits, and more periods compensate for that.
             counted = self._whole(beyond**2 / design.value)
             samples, beyond, exact = self._drawn(powers, counted)
         worst, scale, periods = float(np.max(self.lines.ratios(exact))), 1.0, self.periods
@@ -261,7 +261,7 @@ class ResponseTask:
             phases: Phases = "orthogonal" if settings.phases == "random" else settings.phases
             phases = "even" if (phases, number) == ("optimised", 0) else phases
             draft = Draft(lines, r * period, replace(settings, phases=phases), limited=limited)
-            blocks = np.split(Multisine().draw(draft, rng), r)  # each in as many periods
+            blocks = np.split(Multisine().draw(draft, rng), r)  # all with the same number of periods
             return np.concatenate([np.tile(block, (length // (r * period), 1)) for block in blocks])
 
         height = self._beyond if bounds.hard else lambda u: float(np.max(np.abs(u)))
@@ -316,7 +316,7 @@ class ResponseTask:
         met = "met" if ratios[worst] <= 1.0 + _ROUNDING else "missed"
         objective, baseline = self._objective(plan) if designed else (None, None)
         powers = matrices_of(plan.powers) if units.inputs > 1 else plan.powers[:, 0]
-        # What a user should know before applying the record.
+        # Findings that a user should know before applying the record.
         found = start_shifts(plan.shift)
         if self.goal in ("cost", "samples"):
             found += noise_leaks(plan.record.worst_ratio)

@@ -31,7 +31,7 @@ from inputdesign_cli.specification.models import spectrum as stated_spectrum
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
 _OF_DESIGNS = ("limits.spectrum", "limits.moves", "objective", "campaign")
-# Keys of signals that mean something for a record that the tool makes.
+# Keys of `signal` that apply only to a record that idesign makes.
 _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
 
 
@@ -74,7 +74,7 @@ def build_given(spec: Spec) -> GivenTask:
 
 
 def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
-    """Return the plants of `uncertainty`; raise `not-supported` for what the nominal plant alone has."""
+    """Return the plants of `uncertainty`; raise `not-supported` for keys of the nominal plant alone."""
     stated, limits = spec.uncertainty, spec.limits
     if stated is None:
         return None

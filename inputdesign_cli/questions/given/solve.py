@@ -43,8 +43,8 @@ from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
 _TOO_FAINT = 1e-12
 _ROUNDING = 1e-9
-# The error of linear interpolation is a quarter of that with every second row, taken twice to be safe; what
-# it leaves open of a ratio is at most so much.
+# The error of linear interpolation is a quarter of the error with every second row, doubled to be safe. A
+# ratio above one by no more than the second number may be due to it.
 _TABLE_SHARE, _TABLE_ERROR = 0.5, 1e-4
 
 
@@ -65,7 +65,7 @@ class GivenExcitation:
 
     @classmethod
     def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
-        """Return white excitation of this total power, flat over the band and even over channels."""
+        """Return white excitation of this total power, flat over the band and equal in all channels."""
         share = np.full(experiment.inputs, power / experiment.inputs)
         return cls("white", experiment, (TabulatedSpectrum.white(share, experiment.band), np.ones(1)))
 
@@ -234,7 +234,7 @@ class GivenTask(SpectrumTask):
     def _at_plants(self, experiment: Experiment, plants: Plants, nominal: Kept) -> RobustResult:
         """Return the accuracy at the plants of `uncertainty`, the worst left out as far as allowed.
 
-        The plant of the spec keeps `nominal`. It raises `SpecError` (`not-exciting`).
+        At the plant of the spec the accuracy is `nominal`. It raises `SpecError` (`not-exciting`).
         """
         batch, at = plants.batch, partial(self.excitation.at, samples=experiment.samples)
         tried = [at(plant) for plant in batch.plants]
@@ -266,7 +266,7 @@ class GivenTask(SpectrumTask):
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[float, float]:
-        """Return the excess of the largest ratio over one, and its error by a table if that decides."""
+        """Return the excess of the largest ratio over one, and its interpolation error if that decides."""
 
         def largest(M: Array) -> float:
             return max((worst(r.violations(M)).ratio for r in requirements), default=0.0)

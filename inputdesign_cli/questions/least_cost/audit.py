@@ -1,7 +1,7 @@
 """The last check of a design: the output, reread, is evaluated by other means before it is written.
 
-The spectrum is that of `result.json` as text, not that of the solver. Its information comes from a rule of
-its own: four Gauss points on intervals of the grid on which peaks are sought.
+The spectrum is that of `result.json` as text, not that of the solver. Its information comes from another
+quadrature rule: four Gauss points on intervals of the grid on which peaks are sought.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from inputdesign_cli.questions.common.delivery import APART, check_claims, of_bo
 from inputdesign_cli.questions.common.robust import kept_by
 from inputdesign_cli.questions.least_cost.outcome import Designed
 
-# A plant that keeps less than this share of the limit is not looked at again.
+# A plant whose largest ratio is below this is not evaluated again.
 _DOUBTFUL = 0.9
 _NODES_AT_ONCE = 4096
-# Steps of the grid, a fortieth of the distance to a pole each, to an interval of the rule; fewer where the
+# Steps of the grid, each a fortieth of the distance to a pole, in one interval of the rule; fewer if the
 # spectrum itself varies faster.
 _STEPS = 4
 _FAST = 200
-# The highest peaks on the grid are looked at more closely, `_INSIDE` points at a time. Where r_adm of a plant
-# passes that of its floor they have kinks, at which what is missed is in proportion to the last step.
+# The highest peaks on the grid are refined, `_INSIDE` points at a time. Where r_adm meets its floor, a peak
+# has a kink, so that its error is proportional to the last step.
 _PEAKS, _ZOOMS, _INSIDE = 8, 4, 129
 _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
@@ -57,8 +57,8 @@ class _WrittenSpectrum:
 def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0) -> None:
     """Raise `InaccurateError` (`internal-disagreement`) if the written spectrum does not bear out the claims.
 
-    Requirements that hold `on_grid` only are not claimed between its points. Of a `loose` proof the value and
-    its bounds may differ by this share.
+    Requirements that hold `on_grid` only are not checked. The value and the bounds of a `loose` proof may
+    differ by this share.
     """
     remedy = "rescale the signals, restrict the band, or look for poles near the unit circle"
     check_claims(_disagreements(done, outcome, max(APART, loose), on_grid=on_grid), remedy)
@@ -75,7 +75,7 @@ def _disagreements(done: Designed, outcome: Outcome, apart: float, *, on_grid: b
         return
     spectrum = read_plain(_WrittenSpectrum, plain(outcome.spectrum))
     plants = [_Reread(done, spectrum, scenario) for scenario in problem.scenarios]
-    # The nominal plant, and others that keep nearly all that is admitted.
+    # The nominal plant, and others whose error is near the admitted one.
     kept = kept_by(problem, done.design, done.experiment.samples) if problem.others else []
     doubtful = [one for n, one in enumerate(plants) if n == 0 or kept[n].share > _DOUBTFUL]
     for reread in doubtful if not on_grid else ():
@@ -129,7 +129,7 @@ class _Reread:
         between = (0.5 * (grid[1:] + grid[:-1]))[~beside]
         w = np.sort(np.concatenate([grid, between]))
         ratios = requirement.ratios(self._information, w)
-        # A resonance may stand higher between two points than at both, by more than the ways may differ.
+        # A resonance may be higher between two points than at both, by more than two evaluations may differ.
         padded = np.concatenate([[-np.inf], ratios, [-np.inf]])
         peaks = np.flatnonzero((ratios >= padded[:-2]) & (ratios >= padded[2:]))
         highest, found = peaks[np.argsort(-ratios[peaks])][:_PEAKS], float(np.max(ratios))
@@ -186,7 +186,7 @@ class _Reread:
         def density(w: Array) -> ComplexArray:
             if known:
                 return _density(entry, w, (lo, hi), r)
-            # A family from elsewhere.
+            # A family that another package adds.
             return found.basis.density(found.x, w).reshape(-1, r, r).astype(complex)
 
         return [(w, _root(density(w) * weight[:, None, None])) for w, weight in _rule(grid, steps)]

@@ -1,4 +1,4 @@
-"""Spec -> the question of a convex design: everything that can be wrong comes to light here."""
+"""Spec -> the question of a convex design; everything that can be wrong with the spec is reported here."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     reach, solver = check_reach(spec, question), spec.solver
     if reach.band is not None:
         question = _approaching(question, reach.band)
-    # What no spectrum attains is proved as what every spectrum reaches.
+    # An optimum that is only approached is proved to the tolerance of the bound over every spectrum.
     loose = basis.free and goal == "factor" and not reach.attained
     tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
     header, stated, exact = build_header(spec), build_confidence(spec, experiment), None

@@ -146,7 +146,7 @@ class ExactConfidence:
         return None if self.simulator is None else self.simulator.of_record(record.samples)
 
     def _first_alpha(self) -> float:
-        """Return alpha of white excitation for the least cost, lest the first design be out of reach."""
+        """Return alpha for white excitation if least cost is sought, so that the first design is feasible."""
         question, experiment = self.question, self.question.experiment
         power = white_power(question) if question.goal == "cost" else 0.0
         if power == 0.0:

@@ -223,7 +223,7 @@ def _power_limits(done: Designed) -> Iterator[LimitUse]:
     """Yield each power limit with what the design uses of it."""
     x, at = done.design.result.x, done.problem
     for limit in done.question.limits:
-        # Where the plant takes part in the power, the one of all scenarios that comes nearest to the limit.
+        # If the power depends on the plant, the scenario that comes nearest to the limit counts.
         alike = [at.limits[index].scenario for index in limit.everywhere(at.limits)]
         values = [at.power(limit.kind, limit.channel, scenario).at(x) for scenario in alike]
         value = max(values) if limit.upper else min(values)
@@ -265,7 +265,7 @@ def _findings(done: Designed, used: out.Powers) -> list[Finding]:
     findings += designs.sign_open(problem.requirements)
     if done.header.units.closed_loop and not found.basis.has_density:
         lines, powers_of_lines = found.basis.lines(found.x)
-        # The price of power one, even over the channels.
+        # The price of unit power that is spread evenly over the channels.
         prices = [matrices(problem.price.density(w)) for w in (lines, problem.gradients.grid)]
         costs, all_costs = (np.einsum("naa->n", price).real / price.shape[1] for price in prices)
         power = np.einsum("naa->n", powers_of_lines).real

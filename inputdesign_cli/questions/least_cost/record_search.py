@@ -1,6 +1,6 @@
 """Where no record of the cheapest spectrum fits within limits on samples: other signals, spectra, lengths.
 
-What costs least need not fit: where outputs are dear the inputs may be strong, and noise has high peaks.
+The cheapest spectrum need not fit: if outputs are expensive, inputs may be strong, and noise has high peaks.
 """
 
 from __future__ import annotations
@@ -38,40 +38,40 @@ from inputdesign_cli.questions.common.searched_record import searches
 from inputdesign_cli.signal.evaluation import MET
 from inputdesign_cli.signal.selection import LONG, Record
 
-# Lengths that are looked into: times the one that was asked for, or that many samples.
+# The longest record that is tried: this multiple of the samples asked for, or the second number if larger.
 _LONGEST, _AT_LEAST = 64, 20_000
-_LEAP, _DOUBLE = 8.0, 2.0
-# The ratio of so few samples predicts nothing for more of them: they may be less than a dead time.
+_LEAP, _DOUBLE = 8.0, 2.0  # largest growth of a length at once; growth where a ratio is infinite
+# The ratio of fewer samples predicts nothing for longer records: a dead time may outlast them.
 _FEW = 100
 _GROWTH, _MOST_GROWTHS = 1.03, 100.0
 _FAR = 1.5
 _FINE, _STEP = 0.01, 0.009
 _LENGTHS = 24
-_FALLS = 0.9  # of the length that seemed to be needed before
-_BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
-# A way that missed nearby, and by so much, is not tried: other phases change a ratio by less as a rule.
+_FALLS = 0.9  # a predicted length must fall to this share of the one before
+_BEYOND = 1.25  # a predicted length of this multiple of the longest is out of reach of chance
+# A way is not tried if it missed at a nearby length by this factor: other phases usually change less.
 _NEARBY, _HOPELESS, _HOPELESS_LONG = 1.2, 1.15, 1.01
-# A long record takes seconds to make. Its ratio follows from that of a pilot, a record of a share of its
-# samples with at least the fewest: information grows with the length, and luck averages out.
+# A long record takes seconds to make. A pilot, shorter by the first factor, but of at least the second number
+# of samples, predicts its ratio: information grows with the length, and chance averages out.
 _PILOT, _FEWEST = 16, 1000
 _MARGIN = 1.005
-# Whether a record meets is a matter of luck near the shortest: so far below one that does all are tried.
+# Near the shortest length it is chance whether a record suffices: all ways are tried at these shares of it.
 _BELOW = (0.96, 0.9)
 
 
 Way = Callable[[int, int], Made | None]
-"""Makes the first record of a length that meets the accuracy, or the best, of the spectrum for a length."""
+"""Makes a record of one length with the spectrum for another: the first that suffices, or the best."""
 
 
-# From the design towards the least input power that meets the accuracy, with a little room there.
+# Input powers from the design's (1) to the least that meets the accuracy with a margin (0), on a log scale.
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
 _ROOM = 1.02
 _TOLERANCE = 1e-5
-# Number of candidates of a long record: luck averages out.
+# Number of candidates of a long record: chance averages out.
 _ENOUGH = 3
 # No record of a length is made if its pilot needs more than this multiple of that length.
 _FAR_FROM = 1.03
-# The longest windows of the bound that proves that no record can.
+# The longest windows of the bound that proves that no record meets the accuracy.
 _WINDOWS = 12
 _WORDS = {
     "filtered_noise": "noise",
@@ -83,7 +83,7 @@ _WORDS = {
 
 
 def reach(record: Record, before: float = np.inf) -> float:
-    """Return the length that a record needs if its information grows with it, from the ratio `before`."""
+    """Return the length that a record needs if information grows with it; `before` is the ratio at zero."""
     if not np.isfinite(record.worst_ratio):
         return _DOUBLE * len(record.samples)
     known = before**-2.0
@@ -100,16 +100,16 @@ def pilot_length(samples: int, block: int) -> int:
 class ShortestRecord:
     """Searches the shortest record by trying lengths, multiples of `block` up to `longest`, in `ways`.
 
-    Of a long record only the most promising way is tried at a length. `before` is the ratio without a record.
+    At a long length only the most promising way is tried. `before` is the ratio without a record.
     """
 
     ways: Sequence[Way]
     block: int
     longest: int
     before: float = np.inf
-    inputs: int = 1  # each has as long a part of a period
-    needed: float = 0.0  # samples that would do, by the records that missed
-    _missed: dict[int, Record] = field(default_factory=dict)  # by way, its latest
+    inputs: int = 1  # a period has an equal block for each
+    needed: float = 0.0  # length that is predicted to suffice by the records that missed
+    _missed: dict[int, Record] = field(default_factory=dict)  # the latest miss of each way
     _tried: set[tuple[int, int]] = field(default_factory=set)  # ways and lengths
     _found: Made | None = None
     _low: int = 0
@@ -119,8 +119,8 @@ class ShortestRecord:
     def search(self, misses: Sequence[Record], low: int | None = None) -> Made | None:
         """Return the shortest record that meets the accuracy, to one per cent, or so far when time ends.
 
-        The `misses` missed; longer records than `low` are looked for. It raises `OutOfTimeError` before one
-        is found.
+        The `misses` are records that missed it; records longer than `low` are tried. It raises
+        `OutOfTimeError` if time ends before one is found.
         """
         self._low = low or len(misses[0].samples)
         self.needed = min(map(self._reach, misses))
@@ -160,7 +160,7 @@ class ShortestRecord:
             least, margin = (_MARGIN, _MARGIN) if low > LONG else (_GROWTH, 1.0)
             growth = min(least ** min(2.0**growths, _MOST_GROWTHS), _LEAP)
             length = self._rounded(min(max(margin * self.needed, growth * low), _LEAP * low, self.longest))
-            # Records shorter than what the plant remembers promise far less than longer ones keep.
+            # Records shorter than the memory of the plant predict far too great a length.
             far = self.needed > max(_BEYOND * self.longest, _FALLS * before)
             if length <= low or (growths > 0 and low >= _FEW and far):
                 return
@@ -169,14 +169,14 @@ class ShortestRecord:
         while self._high - self._low > max(_FINE * self._high, self.block):
             low, high = self._low, self._high
             middle = np.sqrt(low * high) if high > _FAR * low else 0.5 * (low + high)
-            if high > LONG:  # the first length was chosen by what is needed: it is hardly too long
+            if high > LONG:  # the first length was predicted, and is hardly too long
                 middle, step = max(middle, (1.0 - step) * high), min(2.0 * step, 1.0)
             whole = int(np.ceil(middle / self.block)) * self.block
             length = self._rounded(middle) if self._rounded(middle) < high else whole
             if length in (low, high):
                 break
             yield length
-        self._hopeless = np.inf  # short records may meet by luck
+        self._hopeless = np.inf  # short records may suffice by chance
         while self._high <= LONG and below:
             high, shorter = self._high, int(below.pop(0) * self._high / self.block) * self.block
             if 0 < shorter < high:
@@ -224,7 +224,7 @@ class ShortestRecord:
 def fitting_record(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:
     """Return the record of the design; where none is found that meets the accuracy, one that does.
 
-    Tried are spectra of less input power, and other kinds of signals; for a shortest experiment longer
+    It tries spectra of less input power, and other kinds of signals; for a shortest experiment longer
     records. A kind that the spec states is not replaced: the error names the one that would do. A shortest
     record of a few levels is shortened by a search.
 
@@ -250,7 +250,7 @@ def _first_fitting(request: RecordRequest, question: Question, design: Design, s
     """Return the record of the design, of another spectrum, of another kind, or a longer one."""
     sought = question.goal == "samples" and request.samples is None
     if sought:
-        # A spectrum may take fewer samples than any record has.
+        # A spectrum may need fewer samples than the shortest possible record has.
         samples = max(samples, least_period(design.problem.experiment.inputs) * request.settings.block)
         if request.searched and samples > LONG:
             length = pilot_length(samples, request.settings.block)
@@ -401,7 +401,7 @@ def _refusal(
 
 
 def _enough(samples: float) -> float:
-    """Return a length a tenth above an estimate, in two digits: one that just misses names a longer one."""
+    """Return a length a tenth above an estimate, in two digits: after a near miss it is longer still."""
     if not np.isfinite(samples):
         return samples
     unit = 10 ** max(int(np.log10(samples)) - 1, 0)

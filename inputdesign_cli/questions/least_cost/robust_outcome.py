@@ -47,7 +47,7 @@ from inputdesign_cli.questions.common.robust import (
 )
 from inputdesign_cli.questions.least_cost.outcome import Answer, Designed, spent
 
-# Steps towards the farthest point, of a difference, and of an ascent at most.
+# Step lengths towards the farthest point, the step of a difference, and the most steps of an ascent.
 _LENGTHS, _DIFFERENCE, _STEPS = (1.0, 0.5, 0.25, 0.1, 0.03), 0.01, 15
 _GAIN = 1e-5
 _STARTS = 3  # beside the plant of the spec
@@ -58,16 +58,16 @@ _NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
 # A plant binds when it is within this share of its limit.
 _BINDS = 1e-5
 _LISTED = 12
-_SAID = 4  # parameters of a plant beside its curve
-# Estimates that are foreseen, and the share of them that counts.
-_ESTIMATES, _MOST_OF_THEM = 100, 0.95
+_SAID = 4  # number of parameters in the label of a plant's curve
+# Number of estimates that are drawn, and the quantile of their ratios that is reported.
+_ESTIMATES, _QUANTILE = 100, 0.95
 _GRID_POINTS = 300
 
 
 def worst_plant(
     region: Region, keeps: Callable[[Alternative], Kept], starts: Sequence[Array]
 ) -> tuple[Searched, Alternative]:
-    """Return the worst plant of the region that ascents from parameters (k,) find, the worst known first."""
+    """Return the worst plant of the region that ascents find, from `starts` (k,), the worst known first."""
     tried, worst = 0, list[tuple[Array, Alternative, Kept]]()
 
     def share(z: Array) -> float:
@@ -141,9 +141,9 @@ def with_worst_plants(
 
 @dataclass(frozen=True)
 class Floor:
-    """Compares a plant's own r_adm with the floor, a `share` of that of the spec, which may count.
+    """Compares r_adm of a plant with its floor, which is a `share` of r_adm of the spec.
 
-    It is `raised` at some frequency, or `lost`: its own r_adm vanishes. Then `peak` is that of |S|, if any.
+    It is `raised` to the floor at some frequency. It is `lost` if it vanishes; then `peak` is that of |S|.
     """
 
     raised: bool
@@ -153,7 +153,7 @@ class Floor:
 
     @classmethod
     def at(cls, requirements: Sequence[Requirement]) -> Floor:
-        """Return the relation of a plant's own r_adm to the floor, from the requirements there."""
+        """Return the relation of r_adm of a plant to its floor, from the requirements there."""
         errors = model_errors(requirements)
         floors = [(floor, error.grid) for error in errors if (floor := error.admissible.floored) is not None]
         lost = any(floor.lost(grid) for floor, grid in floors)
@@ -201,7 +201,7 @@ def robust_result(
         entry = replace(entry, fresh=fresh, estimates=_estimates(done, plants, binding))
         drawn, beta = len(plants.batch.plants), 1.0 - CONFIDENCE
         searched = plants.searched is not None and plants.searched.added
-        # If some were left out, or searched, the theory is silent, and fresh draws count.
+        # Scenario theory does not cover plants that were left out or searched; fresh draws do.
         if len(kept) == drawn and not searched:
             before = None if plants.unknowns is None else risk_before(drawn, beta, plants.unknowns)
             risk = parts.Risk(CONFIDENCE, risk_after(drawn, beta, support), before)
@@ -223,7 +223,7 @@ def plants_kept(
     worst, floors = int(np.argmax(shares)), [Floor.at(one.asked) for one in at_each[1:]]
     raised = [p for p, one in enumerate(floors) if one.raised]
     floor: parts.FloorUse | None = None
-    if raised:  # numbers of the plants that are held to the floor, and of those without an r_adm of their own
+    if raised:  # numbers of plants that are held to the floor, and of plants without an own r_adm
         lost = sorted((p for p in raised if floors[p].lost), key=lambda p: -(floors[p].peak or 0.0))
         listed = (
             parts.LostPlant(numbers[p + 1], _named(plants, batch.thetas[kept[p]]), floors[p].peak)
@@ -298,7 +298,7 @@ def fresh_plants(
 ) -> tuple[parts.FreshPlants | None, list[Finding]]:
     """Return the share of other plants from the same distribution that are missed, as time allows.
 
-    In `try_on` a share up to the number may come out as 0; `promised` is a cost at every plant.
+    `try_on` may return 0 for a share up to its second argument; `promised` bounds the cost at every plant.
     """
     if plants.afresh is None:
         return None, []
@@ -355,8 +355,8 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.
             shares += [one.share for one in tried_on(done.design, samples, [estimated])]
     except IdesignError:  # no time is left, or what is asked cannot be asked of this plant
         return None
-    highest = float(np.quantile(shares, _MOST_OF_THEM, method="higher"))
-    return parts.DrawnEstimates(len(shares), _MOST_OF_THEM, highest) if np.isfinite(highest) else None
+    highest = float(np.quantile(shares, _QUANTILE, method="higher"))
+    return parts.DrawnEstimates(len(shares), _QUANTILE, highest) if np.isfinite(highest) else None
 
 
 def fan_curves(

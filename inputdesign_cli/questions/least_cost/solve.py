@@ -49,8 +49,8 @@ from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.questions.least_cost.sought import Sought
 from inputdesign_cli.signal.selection import Record
 
-_GAINED = 1.001  # a bound over records this much above that of the power has gained nothing
-_NEAR = 0.05  # of the best record there is: nothing is worth a note
+_GAINED = 1.001  # a bound over records up to this multiple of the bound over spectra gains nothing
+_NEAR = 0.05  # a record within this share of the best possible one needs no note
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +129,7 @@ class ConvexTask(SpectrumTask):
         except InaccurateError as error:
             if not reach.note:
                 raise
-            # What is only approached drives numbers to where digits end.
+            # An optimum that is only approached drives numbers to the limits of precision.
             explained = [replace(one, hint=f"{reach.note}; or {one.hint}") for one in error.diagnostics]
             raise InaccurateError(explained) from error
 
@@ -239,7 +239,7 @@ class ConvexTask(SpectrumTask):
 
 
 def _known(done: Designed, record: Record | None, step: float, *, own_length: bool = True) -> Array | None:
-    """Return the information (k, k) of the record, or of its spectrum over the designed length, if any."""
+    """Return the information (k, k) of the record, over its own or the designed length; None without one."""
     if record is None or not np.isfinite(record.worst_ratio):
         return None
     plant = FiniteRecord(done.experiment, len(record.samples), step)

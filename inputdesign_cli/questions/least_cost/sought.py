@@ -36,7 +36,7 @@ from inputdesign_cli.spectrum import PolynomialBasis, flat_basis, hvec, svec
 # The second frequency of a grid that begins at zero, as a share of the last.
 _ABOVE_ZERO = 1e-3
 _STARTS = 3
-_LONGEST = 20_000  # samples of records that are bounded one by one
+_LONGEST = 20_000  # samples of the longest records over which a bound is sought
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Sought:
     """Describes the requirements on a design, and the method that finds it.
 
     The experiment of the question has one sample if the length is sought. `exact` calibrates `alpha`;
-    `plants` are those beside the plant of the spec. `tolerance` is the relative gap that is proved, and
+    `plants` are plants beside the one of the spec. `tolerance` is the relative gap that is proved, and
     `any_spectrum_tolerance` that of the bound over every spectrum (None: none). `grid` replaces the exchange.
     `windows` are the longest of the bound over all records within an amplitude; 0 leaves it out.
     """
@@ -187,7 +187,7 @@ class Sought:
         except UnreachableError as unreachable:
             raise explain(self.header.units, question, unreachable, self.stated) from unreachable
         except UnfinishedDesignError as unfinished:
-            if self.exact is not None:  # it need not keep the confidence that alpha is sought for
+            if self.exact is not None:  # an unfinished design need not keep the confidence
                 raise
             design, ended = unfinished.design, what_ended()
         found = design.result

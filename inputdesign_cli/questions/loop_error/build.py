@@ -40,7 +40,7 @@ from inputdesign_cli.specification.transfer_of_states import transfer_functions
 _refuse = partial(refuse, who="a design for the closed-loop error")
 _GRID = 512
 _CANDIDATES = 20
-# A pole this near to z = 1, or this near to the unit circle.
+# A pole this near to z = 1 integrates; a root of D this near to the unit circle makes the noise drift.
 _INTEGRATES = 1e-7
 
 
@@ -116,7 +116,7 @@ def _in_delays(A: Array, B: Array, C: Array, D: Array, *, lag: int) -> tuple[Row
     """Return numerators and monic denominators in q^-1 of a system in states, delayed by `lag` samples."""
     above, below = [], []
     for row in transfer_functions(A, B, C, D, discrete=True):
-        # Excess poles are samples of delay; a zero is one coefficient.
+        # Excess poles are samples of delay; a zero entry has one coefficient.
         above.append(tuple(np.append(np.zeros(lag + len(den) - len(num)), num) for num, den in row))
         below.append(tuple(np.array(den) for _, den in row))
     return tuple(above), tuple(below)

@@ -40,7 +40,7 @@ from inputdesign_cli.signal.periodic import even_multisine, harmonics, periodogr
 from inputdesign_cli.signal.rational import rational_filter
 from inputdesign_cli.signal.spectral_factor import matrix_factor
 
-# Frequencies of the plots, and what share of the band they reach down to.
+# Number of frequencies of the plots, and the lowest as a share of the highest.
 _POINTS = 800
 _LOWEST = 1e-3
 KEY = "accuracy.closed_loop_error"
@@ -50,10 +50,10 @@ KEY = "accuracy.closed_loop_error"
 class LoopErrorTask:
     """Designs for the closed-loop error, and studies the design.
 
-    The `law` of control is called as in the spec, and `grid` are the points of spectrum.csv. The `covariance`
-    is that of a high model order, or exact for the model structure. The record is `filtered` white noise, by
-    a rational filter of `order` states for each input or by taps (None), or a multisine of equal `periods`.
-    The runs are on the plant of `true`, and with `white` noise of equal power is tried, too.
+    `law` is the name of the control law in the spec, and `grid` the number of points of spectrum.csv. The
+    `covariance` is asymptotic in the model order, or exact for the model structure. The record is `filtered`
+    white noise, by a rational filter of `order` states for each input or by taps (None), or a multisine of
+    equal `periods`. The runs are on the plant of `true`. With `white`, noise of equal power is tried, too.
     """
 
     problem: LoopErrorProblem
@@ -233,7 +233,7 @@ class LoopErrorTask:
         for stream in np.random.SeedSequence(self.signal_seed).spawn(self.candidates):
             u = make(np.random.default_rng(stream))
             powers = periodogram(u).powers
-            # What brings the record to its limits, by its own spectrum.
+            # The factor on powers by which the record exceeds its limits, by its own spectrum.
             excess = np.max(np.einsum("pkab,kba->p", metrics, powers).real / design.problem.most)
             excess = max(float(excess), max(self.bounds.shares(u).values(), default=0.0) ** 2)
             try:

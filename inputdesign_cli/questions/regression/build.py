@@ -17,7 +17,7 @@ from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compar
 from inputdesign_cli.questions.regression.solve import KEY, RegressionTask
 from inputdesign_cli.specification import Simulation, Spec
 
-# Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
+# Toeplitz designs take long to prove, hence this default; a stated tolerance replaces it.
 _STRUCTURED_TOLERANCE = 1e-6
 _ROUNDING = 1e-9
 _SIGNAL_KEYS = [

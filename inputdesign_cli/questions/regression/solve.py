@@ -64,7 +64,8 @@ class RegressionTask:
 
     Toeplitz moments belong to delayed copies of one input, and are proved to a relative gap of `tolerance`.
     The record has a number of equal `periods` (None: free), and a past by `start`. The trial has the true
-    parameters `theta` (None: not stated), the noise of `true`, or `relative_std` of it, and `compare` inputs.
+    parameters `theta` (None: not stated) and compares inputs. Its noise is that of `true`, or has a standard
+    deviation of `relative_std` times the rms of the noise-free output.
     """
 
     header: Header
@@ -265,8 +266,8 @@ class RegressionTask:
 def sensitivity(regression: Regression, energy: float, split: ErrorSplit, *, target: bool) -> out.Sensitivity:
     """Return the derivatives of the least error alpha^2 |b|^2 + sigma^2 c / E, or of the energy for a target.
 
-    At the optimum only the data move (envelope theorem). As the error falls with the energy by its variance
-    over the energy, the least energy rises by a change over this.
+    At the optimum only the data move (envelope theorem). The error falls with the energy at the rate
+    variance / energy: a change of the error over this rate is the change of the least energy.
     """
     alpha, falls = regression.neglected_norm, split.variance / energy
     unit = falls if target else 1.0
