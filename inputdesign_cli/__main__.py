@@ -1,4 +1,4 @@
-"""`python -m inputdesign_cli` and `idesign`: an interrupt while modules are imported is orderly too."""
+"""`python -m inputdesign_cli` and `idesign`: Ctrl-C ends them cleanly, also during imports."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 INTERRUPTED = 130  # as in `errors`, which may not have been imported yet
-_AGAIN = 0.05  # seconds
-# New objects before cycles among them are looked for: a command makes about as many in all, most of them by
-# its imports.
-_YOUNG = 500_000
+_RESEND_AFTER = 0.05  # seconds
+# Number of new objects that starts a garbage collection. A whole command makes about as many, mostly while it
+# imports.
+_GC_THRESHOLD = 500_000
 
 
 def main() -> None:
     """Run the `idesign` command."""
     sys.unraisablehook = _send_again
-    # The backend of a notebook from which the command is started need not exist here.
+    # A command started in a notebook inherits its backend, which may not be installed here.
     os.environ["MPLBACKEND"] = "agg"
-    gc.set_threshold(_YOUNG, 10, 10)
-    atexit.register(gc.freeze)  # what is left at the end need not be looked through
+    gc.set_threshold(_GC_THRESHOLD, 10, 10)
+    atexit.register(gc.freeze)  # no garbage collection at exit
     try:
         from inputdesign_cli.compute.interruptions import bare_interruptions
 
@@ -43,12 +43,12 @@ def main() -> None:
 def _send_again(lost: UnraisableHookArgs) -> None:
     """Send an interruption again that was raised in a finalizer, where Python drops it.
 
-    The handler of `compute.interruptions` sees to that; before it stands, Ctrl-C is sent once more.
+    The handler of `compute.interruptions` does so itself; before it is installed, SIGINT is sent again here.
     """
     if not issubclass(lost.exc_type, KeyboardInterrupt | SystemExit):
         sys.__unraisablehook__(lost)
     elif signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        again = threading.Timer(_AGAIN, os.kill, [os.getpid(), signal.SIGINT])
+        again = threading.Timer(_RESEND_AFTER, os.kill, [os.getpid(), signal.SIGINT])
         again.daemon = True
         again.start()
 

@@ -1,4 +1,4 @@
-"""Diagnostics as text for a terminal and as plain data, and what their codes mean; nothing is printed here.
+"""Diagnostics as text for a terminal and as plain data, with the meaning of codes; nothing is printed here.
 
 `error_codes.yaml` explains the codes of errors; it is read at the first question.
 """

@@ -1,8 +1,8 @@
-"""The few error types of the house.
+"""The error types of the package.
 
 Every error that a user can cause is a `Diagnostic`: a stable code, a sentence that states the error, and a
-hint at its remedy. `idesign explain CODE` documents the code, see `error_codes.yaml`. The mathematics knows
-nothing of files: it names the key (`plant.F`), and the spec adds file, line and column where it is at hand.
+hint at its remedy. `idesign explain CODE` documents the code, see `error_codes.yaml`. The mathematics names
+only the key (`plant.F`); the spec adds file, line and column if it was read from a file.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
-STANDARD_STREAM = "-"  # in place of the name of a file: standard input, or output
+STANDARD_STREAM = "-"  # stands for standard input or output in place of the name of a file
 
 EXIT_DONE = 0
 EXIT_MISSED = 1

@@ -35,9 +35,9 @@ FUNCTIONS: dict[str, _Function] = {
     "cosh": (math.cosh, math.sinh),
     "tanh": (math.tanh, lambda x: 1.0 - math.tanh(x) ** 2),
 }
-LONGEST = 500
-_REMEMBERED = 64  # sets of expressions, as a search asks for one at many points
-_SHOWN = 60  # letters of a composed expression that is longer
+LONGEST = 500  # characters of an expression
+_CACHED = 64  # sets of expressions: a search evaluates each of them at many points
+_SHOWN = 60  # characters that are kept of the text of a composed expression longer than LONGEST
 CONSTANTS = {"pi": math.pi}
 
 
@@ -50,7 +50,7 @@ class Step(NamedTuple):
 
 
 class Evaluated(NamedTuple):
-    """Holds K expressions in m parameters at one point; not a number where one is not defined there."""
+    """Holds the values of K expressions in m parameters at one point; NaN where one is not defined."""
 
     values: Array  # (K,)
     gradients: Array  # (K, m)
@@ -65,7 +65,7 @@ def worked_through(
     """
     known, unit = {symbol: i for i, symbol in enumerate(symbols)}, np.eye(len(symbols))
     found: list[_Result] = []
-    with np.errstate(all="ignore"):  # overflow is seen in the result
+    with np.errstate(all="ignore"):  # overflow shows in the result
         for step in steps:
             if step.operation == "number":
                 found.append(_Result(float(step.value)))
@@ -81,7 +81,7 @@ def worked_through(
 
 
 class _Result(NamedTuple):
-    """A value, not a number where it is not defined, and its slope (m,), which is None for a constant."""
+    """A value, NaN where it is not defined, and its slope (m,), which is None for a constant."""
 
     value: float
     slope: Array | None = None
@@ -130,7 +130,7 @@ def _combined(sign: str, first: _Result, second: _Result) -> tuple[float, float,
 
 
 class ExpressionError(ValueError):
-    """Raised for a flawed expression, with the flaw; the second argument says how to mend it."""
+    """Raised for a flawed expression, with the flaw; the second argument is a hint at the remedy."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
@@ -141,14 +141,14 @@ class ExpressionError(ValueError):
 class Expression:
     """A checked text, or an expression composed of others, and its value.
 
-    It is a list of steps without duplicates. The list is as long as its parts, however often they are used.
-    It is evaluated without recursion, however deep it is.
+    It is a list of steps without duplicates: a part that is used several times counts once. It is evaluated
+    without recursion, so that its depth is not limited.
 
     Attributes:
-        made: the steps of a composed expression; None for a text, which states them.
+        made: the steps of a composed expression; None if they follow from the text.
 
     Raises:
-        ExpressionError: by `of`, for a text that is no permitted expression.
+        ExpressionError: by `of`, if the text is no permitted expression.
     """
 
     text: str
@@ -181,7 +181,7 @@ class Expression:
     def present(self) -> bool:
         """Return whether a coefficient is present as written: it names parameters, or is not zero.
 
-        The structure of a plant is read off its words: it does not change with the nominal parameters.
+        The structure of a plant depends on its text alone, not on the nominal values of its parameters.
         """
         return bool(self.names) or self.at((), np.zeros(0))[0] != 0.0
 
@@ -200,7 +200,7 @@ class Expression:
     def at(self, symbols: Sequence[str], values: Array) -> tuple[float, Array]:
         """Return the value and its gradient (m,) where the `symbols` have these `values` (m,).
 
-        Both are not a number where the value is not defined, as one over zero or the root of minus one.
+        Both are NaN where the value is not defined, as one over zero or the root of minus one.
         Raises `KeyError`: a name is not among the symbols.
         """
         here = evaluated((self,), symbols, values)
@@ -216,7 +216,7 @@ def evaluated(expressions: tuple[Expression, ...], symbols: Sequence[str], value
     return worked_through(steps, places, symbols, values)
 
 
-@lru_cache(maxsize=_REMEMBERED)
+@lru_cache(maxsize=_CACHED)
 def _together(expressions: tuple[Expression, ...]) -> tuple[tuple[Step, ...], tuple[int, ...]]:
     """Return all steps of expressions, none of them twice, and the place where each expression ends."""
     table = _Table()
@@ -225,7 +225,7 @@ def _together(expressions: tuple[Expression, ...]) -> tuple[tuple[Step, ...], tu
 
 
 class _Table:
-    """A list of steps to which others are added unless they are there."""
+    """A list of steps without duplicates."""
 
     def __init__(self) -> None:
         self._places: dict[Step, int] = {}

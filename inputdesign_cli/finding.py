@@ -1,6 +1,6 @@
-"""Findings: what speaks for or against data, a model or a design, with a stable code and a severity.
+"""Findings: remarks for or against data, a model or a design, with a stable code and a severity.
 
-A kind of finding is declared once, in the file that decides when it holds and what it says. Verdict and
+A kind of finding is declared once, in the file that tests for it and words it. Verdict and
 trust follow from the severities, here and nowhere else.
 """
 
@@ -19,19 +19,20 @@ import numpy as np
 P = ParamSpec("P")
 R = TypeVar("R")
 CAUSES = ("unsettled", "contradicted", "unasked", "undetermined", "spikes", "drift", "nonlinearity", "chance")
-"""Why nothing is decided: the search, the data, the question at the estimate, other explanations; of a
-response without a model: a few samples, a drift, a nonlinearity, or the scatter of its periods."""
+"""Causes of an open verdict. The search did not settle; the data contradict the model; the question has no
+answer at the estimate; other parameters explain the data nearly as well. For a response without a model:
+spikes, a drift, a nonlinearity, or the scatter of its periods."""
 
 
 class Severity(StrEnum):
-    """How much a finding weighs, from a remark to a contradiction."""
+    """The weight of a finding, from a remark to a contradiction."""
 
     NOTE = "note"
     """Good to know; it changes no verdict."""
     DOUBT = "doubt"
     """A reason to look again before numbers are trusted; it changes no verdict."""
     UNDECIDED = "undecided"
-    """Neither met nor missed can be said."""
+    """The verdict can be neither met nor missed."""
     REFUTED = "refuted"
     """The data contradict the model, so that nothing can be said of its accuracy."""
 
@@ -42,8 +43,8 @@ class Finding:
 
     Attributes:
         code: stable name, explained by `idesign explain CODE`.
-        severity: what it means for a verdict.
-        message: one or two plain sentences: what is the case, where, and what to do.
+        severity: its effect on a verdict.
+        message: one or two plain sentences: the fact, its place, and the remedy.
         where: the key, channel, parameter or file that it is about; empty for all of it.
         figures: its numbers and names as plain data.
     """
@@ -65,9 +66,9 @@ class FindingKind:
 
     Attributes:
         title: a short statement that begins with a capital letter.
-        text: what it means and how it is found.
-        remedy: what to do about it.
-        cause: why nothing is decided where a finding is `undecided`; what refutes, contradicts.
+        text: its meaning, and the test that finds it.
+        remedy: the action to take.
+        cause: one of `CAUSES`, for findings that are `undecided`; refuting ones have "contradicted".
     """
 
     code: str
@@ -94,11 +95,11 @@ class FindingKind:
         """Return a finding of this kind: its message is the title, the fact and the remedy.
 
         Args:
-            fact: what holds in the case at hand.
-            where: what it is about.
-            remedy: what to do in the case at hand, if not that of the kind. One that begins with "Nothing" is
+            fact: the fact in the case at hand.
+            where: the key, channel, parameter or file that it is about.
+            remedy: the remedy in the case at hand, if not that of the kind. One that begins with "Nothing" is
                 left out of the message.
-            severity: where the case at hand weighs more or less than usual.
+            severity: its severity, if the case at hand weighs more or less than usual.
             figures: its numbers and names.
         """
         advice = (remedy or self.remedy).replace("`", "")
@@ -127,7 +128,7 @@ def _kind(severity: Severity, code: str, text: str, remedy: str, cause: str = "u
 
 
 note, doubt, unsure, refuted = (partial(_kind, severity) for severity in Severity)
-"""Declare a kind by its code, text, remedy and, of `unsure`, the cause why nothing is decided."""
+"""Declare a kind by its code, text, remedy and, for `unsure`, the cause of the open verdict."""
 NOTE, DOUBT, UNDECIDED, REFUTED = Severity.NOTE, Severity.DOUBT, Severity.UNDECIDED, Severity.REFUTED
 
 
@@ -150,7 +151,7 @@ def finding(
 
 
 def cause_of(finding: Finding) -> str:
-    """Return why a finding leaves nothing decided; empty where it does not."""
+    """Return the cause why a finding leaves a verdict open; empty if it does not."""
     if finding.severity is Severity.REFUTED:
         return "contradicted"
     return KINDS[finding.code].cause if finding.severity is Severity.UNDECIDED else ""
@@ -164,7 +165,7 @@ def reasons(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
 
 
 def verdict(findings: Iterable[Finding], *, met: bool) -> Literal["met", "missed", "undecided"]:
-    """Return what follows from the numbers, unless a finding forbids to say so."""
+    """Return "met" or "missed" as the numbers show, or "undecided" if a finding forbids both."""
     if undecided(findings):
         return "undecided"
     return "met" if met else "missed"

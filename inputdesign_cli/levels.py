@@ -1,7 +1,7 @@
-"""Levels of significance: shares of one error rate for all tests of data together.
+"""Significance levels: shares of one error rate for all tests of data together.
 
-A right model of a right noise is refuted, or leaves a verdict undecided, with at most the probability `RATE`
-by all tests together (Bonferroni).
+All tests together refute right models of plant and noise, or leave a verdict undecided, with at most the
+probability `RATE` (Bonferroni).
 """
 
 from __future__ import annotations
@@ -9,19 +9,19 @@ from __future__ import annotations
 RATE = 0.05
 
 SHARES = {
-    "one parameter": 0.12,  # a coefficient, a delay, a gain that is not always the same
+    "one parameter": 0.12,  # a coefficient, a delay, or a gain that varies
     "many signals": 0.1,  # past inputs, past residuals, trends
-    "varying gain": 0.1,  # of such a size that it moves G by more than is admitted
+    "varying gain": 0.1,  # large enough to move G by more than is admitted
     "level shift": 0.02,
     "one system": 0.02,  # experiments that differ
     "prior": 0.2,  # an earlier estimate that differs
     "far from nominal": 0.02,
-    "feedback": 0.002,  # an input that answers the outputs, or is logged late
+    "feedback": 0.002,  # an input that depends on the outputs, or is logged late
     "frozen": 0.002,  # a sensor that stands still
 }
-"""The share of each group of tests; what is left of the rate makes chance findings rarer."""
+"""The share of each group of tests; their sum below one makes chance findings rarer still."""
 
 
 def level(tests: str) -> float:
-    """Return the probability with which any of a group of tests fails though all is right."""
+    """Return the significance level of a group of tests: the probability that any of them fails by chance."""
     return RATE * SHARES[tests]

@@ -56,7 +56,7 @@ def points(group: str) -> dict[str, EntryPoint]:
 
 
 def loaded(point: EntryPoint) -> Any:
-    """Return what an entry point names; raise `SpecError` (`bad-plug-in`) if it cannot be loaded."""
+    """Return the object of an entry point; raise `SpecError` (`bad-plug-in`) if it cannot be loaded."""
     try:
         return point.load()
     except (Exception, SystemExit) as error:  # whatever the code of another package raises

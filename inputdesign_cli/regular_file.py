@@ -1,4 +1,4 @@
-"""Files that others name are read only if they are plain files: a pipe or a device may never end."""
+"""Read files only if they are plain files: a pipe or a device may never end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import stat
 
 
 def read_regular(path: str | os.PathLike[str], most: int = -1) -> bytes:
-    """Return the bytes of a file, at most `most`; refuse anything but a plain file without waiting for it.
+    """Return the bytes of a plain file, at most `most`; refuse a pipe or a device without waiting for it.
 
     Raises:
         OSError: it cannot be read; `IsADirectoryError` for a folder, and with errno EINVAL for a pipe, a
@@ -22,4 +22,4 @@ def read_regular(path: str | os.PathLike[str], most: int = -1) -> bytes:
 
 
 def _without_waiting(name: str, flags: int) -> int:
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))  # Windows: files are no pipes
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))  # no pipes among files on Windows

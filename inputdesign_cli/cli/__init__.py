@@ -75,7 +75,7 @@ COMMANDS = (
     explain,
     schema,
 )
-# A word of Python is no name of a function.
+# A function called `next` would hide the built-in one.
 _NAMES = {"proceed": "next"}
 for command in COMMANDS:
     name = _NAMES.get(command.__name__, command.__name__)

@@ -1,4 +1,4 @@
-"""Instructions for the experiment: what to apply and to log, and the command that judges the record."""
+"""Instructions for the experiment: signals to apply and to log, and the command that judges the record."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.results import Results
 
-# "u1 valve (%)": behind the channel stands its name.
+# The channel of a header such as "u1 valve (%)".
 _CHANNEL = re.compile(r"[ruy]\d+(?= |$)")
 
 
 def instructions(results: Results, spec: str, joint: str = "") -> list[str]:
-    """Return sentences on what to apply and to log, and the command that judges the record; none without one.
+    """Return sentences on the signals to apply and to log, and the judging command; none without a record.
 
     Args:
         spec: the file that `assess` gets.

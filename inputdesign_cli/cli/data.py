@@ -128,7 +128,7 @@ def assess(
     that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where the
     data contradict the model or leave it open; the output says what to run next.
     """
-    # Records that are judged together are another run than the first of them alone.
+    # Several records judged together make another run than the first of them alone.
     together = f"_and_{len(data) - 1}_more" if len(data) > 1 else ""
     sources = [spec, *data]
     place = Place(into, f"{data[0].stem}{together}_assessed", sources, judges=True, numbered=True)
@@ -147,7 +147,7 @@ def assess(
             preparation=rows.of(data),
         )
     again, explores = typed(changes, levels, rows), ["idesign", "explore", "--spec", str(spec)]
-    explores += typed(replace(levels, remove_means=False))  # what explore estimates itself
+    explores += typed(replace(levels, remove_means=False))  # explore estimates levels itself
     begins = {
         "idesign assess SPEC": ["idesign", "assess", str(spec), *again],
         # The longer beginning comes first: columns that the command has are not named twice.
@@ -168,7 +168,7 @@ def _with_typed(results: Results, begins: Mapping[str, Sequence[str]], *, explor
     """Return an assessment whose next command names the spec and the options that were typed.
 
     Args:
-        begins: how commands begin -> the words that are to stand there.
+        begins: the beginnings of commands -> the words that replace them.
         explored: whether `explore` has chosen the structure by the same data: it would choose it again.
     """
     judged = results.outcome.assessment

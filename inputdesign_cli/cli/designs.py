@@ -54,7 +54,7 @@ def solve(
         results, place = _results("solve", spec, changes, into, shown)
     keep(results, place, shown)
     if not (shown.quiet or shown.json_output or into.no_output):
-        for line in instructions(results, str(place.directory / "spec.yaml")):  # with what `--set` changed
+        for line in instructions(results, str(place.directory / "spec.yaml")):  # with changes by `--set`
             typer.echo(line)
     if trade:
         show_trade(plan, stated, words, place.directory, shown)

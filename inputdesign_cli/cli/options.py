@@ -1,6 +1,6 @@
 """Arguments and options that several commands share, so that they read the same everywhere.
 
-`options.toml` declares them: what all commands share under a name, and what single commands and groups have.
+`options.toml` declares them: the ones that commands share, and the ones of single commands and groups.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _owner(kind: type, name: str) -> str:
 
 
 def typed(*groups: DataclassInstance) -> list[str]:
-    """Return the words of a command line that give these options again, without those at their defaults.
+    """Return the words of a command line that give these options again, except options at their defaults.
 
     Args:
         groups: dataclasses of options, as a command takes them.
@@ -88,7 +88,7 @@ def typed(*groups: DataclassInstance) -> list[str]:
 
 
 def _declared(one: Parameter, kind: type, owner: str, *, is_argument: bool = False) -> Parameter:
-    """Return a parameter with what typer has to know of it."""
+    """Return a parameter with its declaration for typer."""
     stated = dict(TABLE.get(owner, {}).get(one.name) or TABLE["shared"][one.name])
     names = stated.pop("names", ())
     for key in ("parser", "autocompletion", "callback"):
@@ -141,7 +141,7 @@ def error_codes(incomplete: str) -> list[tuple[str, str]]:
 
 
 def spec_keys(incomplete: str) -> list[str]:
-    """Return the keys of a spec that `--set` takes, and behind the equals sign the words that a key takes."""
+    """Return the keys of a spec that `--set` takes, or, after an equals sign, the words that a key takes."""
     from inputdesign_cli.specification import json_schema
 
     schema = json_schema()
@@ -201,7 +201,7 @@ class Into:
 
 @dataclass(frozen=True)
 class Shown:
-    """Holds what is drawn and printed of a run."""
+    """Holds options on the figures and the printed output of a run."""
 
     figures: bool = True
     figure_format: Literal["png", "svg", "pdf"] | None = None
@@ -218,7 +218,7 @@ class Workers:
     worker_timeout: float | None = None
 
     def executor(self, *, quiet: bool) -> Executor:
-        """Return what computes: a cluster if an address is given, else one or more processes here."""
+        """Return the executor: a cluster if an address is given, else one or more processes here."""
         from inputdesign_cli.compute.cluster import Cluster
         from inputdesign_cli.compute.executor import InProcess
         from inputdesign_cli.compute.processes import Processes

@@ -1,4 +1,4 @@
-"""What comes with idesign: examples, starter specs, golden values, the schema of a spec, the codes."""
+"""Material that comes with idesign: examples, starter specs, golden values, the schema of a spec, codes."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def junit_text(rows: Sequence[Row], seconds: Seconds, error: IdesignError | None
     Args:
         rows: the comparison, file by file.
         seconds: (golden file, run) -> how long the run took; its first quantity carries it.
-        error: what ended the comparison, if anything did; it has a suite of its own.
+        error: the error that ended the comparison, if any; it has a suite of its own.
     """
     root = Element("testsuites", name="idesign check")
     for golden, of_file in groupby(rows, lambda row: row.golden):

@@ -1,4 +1,4 @@
-"""Options about data files: which column is what, which rows count, and what channels vary about."""
+"""Options about data files: roles of columns, rows that count, and levels about which channels vary."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Levels:
 
 @dataclass(frozen=True)
 class Written:
-    """Describes how a text file is written, where it does not show it, and which column is which."""
+    """Describes the format of a text file, as far as it does not show it itself, and the roles of columns."""
 
     columns: str = ""
     separator: str | None = None
@@ -43,7 +43,7 @@ class Written:
     time_format: str | None = None
 
     def preparation(self) -> Preparation:
-        """Return what these options say about data files.
+        """Return the preparation of data files by these options.
 
         Raises:
             typer.BadParameter: One of them cannot be read.
@@ -77,7 +77,7 @@ class Rows(Written):
     without: list[str] | None = None
 
     def of(self, data: Sequence[Path]) -> Preparation:
-        """Return what the options say about data files.
+        """Return the preparation of data files by the options.
 
         Raises:
             typer.BadParameter: One of them cannot be read.

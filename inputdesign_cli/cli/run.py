@@ -1,4 +1,4 @@
-"""What a run begins and ends with: a spec, a place for the run, and a summary."""
+"""The beginning and the end of a run: its spec, its place, and its summary."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def name_of(file: Path) -> str:
     return "stdin" if str(file) == STANDARD_STREAM else file.stem
 
 
-# Errors about a place that keeps what it has: another place is taken.
-_OTHERS = {
+# Errors that protect the content of a place: a `numbered` run takes another place.
+_PROTECTED = {
     *("output-other-run", "output-is-the-spec", "output-spec-changed"),
     *("output-signal-changed", "campaign-exists"),
 }
@@ -71,7 +71,7 @@ _OTHERS = {
 class Place:
     """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first.
 
-    A run without files goes on with what is in the directory. Where the default place of one that is
+    A run without files continues the one in the directory. Where the default place of one that is
     `numbered` holds a run of something else, it takes the first of runs/`name`_2, .. that does not.
     """
 
@@ -82,7 +82,7 @@ class Place:
     numbered: bool = False
     asked: str = ""  # the spec as it was read
     figures: Figures | None = None  # their form, if the spec has one
-    relocates: bool = True  # whether files that the spec names are named from the directory of the run
+    relocates: bool = True  # whether names of files in the spec become relative to the run directory
 
     def __post_init__(self) -> None:
         if self.into.no_output and self.into.output is not None:
@@ -119,7 +119,7 @@ class Place:
                 check_place(place.directory, place.origin, place.spared(place.asked))
                 return place
             except OutputError as error:
-                if not free or error.diagnostics[0].code not in _OTHERS:
+                if not free or error.diagnostics[0].code not in _PROTECTED:
                     raise
             number += 1
             place = replace(place, name=f"{self.name}_{number}")
@@ -127,13 +127,13 @@ class Place:
     def spared(self, spec: str) -> str:
         """Return the `spec.yaml` of the run: the user's own text where it is the spec itself.
 
-        Names of files in it, which start in the folder of the spec, then start in the directory of the run.
+        Otherwise names of files in it become relative to the directory of the run.
 
         Args:
             spec: the text of the run otherwise.
 
         Raises:
-            OutputError: `output-is-the-spec`, it would say something else.
+            OutputError: `output-is-the-spec`, its content would change.
         """
         from inputdesign_cli.outcome.run_files import SPEC
         from inputdesign_cli.specification import relocated, same_content

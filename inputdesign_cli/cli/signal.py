@@ -59,7 +59,7 @@ class Form:
             raise typer.BadParameter(
                 f"give one of --prbs, --multisine, --chirp, --steps and --kind, not {said}"
             )
-        known = {*own("idesign.signals"), *names("idesign.signals")} - {"slewed"}  # which needs a rate
+        known = {*own("idesign.signals"), *names("idesign.signals")} - {"slewed"}  # it needs a rate
         if self.kind and self.kind not in known:
             refuse(f"no kind is {self.kind!r}: there are {', '.join(sorted(known))}", "--kind")
         kind = self.kind or stated[0]
@@ -153,7 +153,7 @@ def _write(file: Path, results: Results) -> None:
 
 
 def _summary(results: Results, files: Sequence[Path]) -> str:
-    """Return what was made and what it excites, a line a fact."""
+    """Return the properties of the signal and of each channel, one in a line."""
     entry = results.result["signal"]
     unit, step = entry["time_unit"], entry["sample_time"]
     whole = f"{entry['samples']} samples every {step:g} {unit}"

@@ -23,7 +23,7 @@ Line = tuple[str, str]
 
 
 def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced: bool = False) -> str:
-    """Return a result in lines: what was asked, its cost, what is proved, the error reached, and the folder.
+    """Return a result in lines: the question, its cost, the proved bounds, the error reached, and the folder.
 
     Lines whose numbers the result does not have are left out.
 
@@ -57,7 +57,7 @@ def _trouble(outcome: Outcome, files: Sequence[Path]) -> Iterator[Line]:
 
 
 def _everything(outcome: Outcome, time_unit: str) -> list[Line]:
-    """Return what was found and proved, with all notes."""
+    """Return the results and the proofs, with all notes."""
     return [
         *_data(outcome, time_unit),
         *(("asked", text) for text in said("asked", outcome)),
@@ -79,7 +79,7 @@ def _lines(found: Iterable[Fact]) -> Iterator[Line]:
 
 
 def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
-    """Yield the estimate with its standard deviations, and each requirement with what the data reach."""
+    """Yield the estimate with its standard deviations, and each requirement with the ratio reached."""
     estimate = estimate_table(outcome)
     if estimate:
         rivals = outcome.identification is not None and outcome.identification.rivals

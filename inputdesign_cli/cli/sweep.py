@@ -87,7 +87,7 @@ def sweep(
 
 
 def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
-    """Print what a sweep has come to; end as its first failure does where no point has a result."""
+    """Print the result of a sweep; raise its first failure if no point has a result."""
     for why in () if quiet else done.damaged:
         typer.echo(f"note: {why}; the point was computed again", err=True)
     if json_output:

@@ -1,4 +1,4 @@
-"""How commands end and what reaches the terminal: data on stdout, everything else on stderr.
+"""The end of commands and their output: data on stdout, everything else on stderr.
 
 Standard streams may be closed, full or cut off, and signals may end the program.
 """
@@ -31,10 +31,10 @@ from inputdesign_cli.errors import EXIT_BAD_INPUT, EXIT_INTERRUPTED, Diagnostic,
 if TYPE_CHECKING:
     from rich.text import Text
 
-EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
+EXIT_PIPE = 141  # the exit code in a shell of a command that SIGPIPE ended
 EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
-_PATIENCE = 2.0  # seconds until a computation says how far it is
-_ENDLESS = 100_000  # characters of a line that nobody sees whole
+_PATIENCE = 2.0  # seconds until a computation shows its progress
+_UNBROKEN = 100_000  # characters of a line: wide enough never to break it
 
 
 class _Errors(io.TextIOWrapper):
@@ -57,7 +57,7 @@ class _Errors(io.TextIOWrapper):
             self._failed(error)
 
     def _failed(self, _error: OSError) -> None:
-        # What is still in the buffer goes nowhere, or Python would complain about it on its way out.
+        # The rest of the buffer goes to the null device; otherwise Python reports an error at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
 
 
@@ -79,7 +79,7 @@ def prepare_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, flags)  # gets the lowest number that is free
-    # Whoever calls from Python may have put streams of their own in place.
+    # A caller from Python may have replaced the streams.
     if sys.stderr is sys.__stderr__:
         sys.stderr = _Errors(*_parts(sys.stderr, 2), by_line=True)
     if sys.stdout is sys.__stdout__:
@@ -216,7 +216,7 @@ def colourful(stream: TextIO) -> bool:
 
 @contextmanager
 def status(text: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Show `text` on stderr while the block runs, if anybody is looking; the block may replace it."""
+    """Show `text` on stderr while the block runs, if it is a terminal; the block may replace it."""
     if quiet or not sys.stderr.isatty():
         yield lambda text: None
         return
@@ -229,10 +229,10 @@ def status(text: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def computing(about: Path | str, *, quiet: bool, doing: str = "computing") -> Iterator[None]:
-    """Show on stderr, if anybody is looking, what is computed inside, and after a while how far it is.
+    """Show on stderr, if it is a terminal, the computation inside, and after a while its progress.
 
     Args:
-        about: the file, or what else it is about.
+        about: the file, or another name for the computation.
     """
     with status(f"{about}: {doing} ...", quiet=quiet) as show:
         started = time.monotonic()
@@ -260,7 +260,7 @@ def aligned(
     from rich.table import Table
 
     colours = colourful(sys.stdout)
-    width = shutil.get_terminal_size().columns if wrap and sys.stdout.isatty() else _ENDLESS
+    width = shutil.get_terminal_size().columns if wrap and sys.stdout.isatty() else _UNBROKEN
     grid = Table.grid(padding=(0, gap, 0, 0))
     for column in range(len(rows[0])):
         last = column == len(rows[0]) - 1

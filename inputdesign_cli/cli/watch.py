@@ -106,7 +106,7 @@ def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figur
                 solved = partial(
                     followed.solved, place.directory, time.strftime("%H:%M:%S"), time.monotonic() - started
                 )
-                # The answer at once; then what the page draws; then the figures that are files.
+                # First the answer, then the pictures of the page, then the files of figures.
                 board.show(solved(pictures=False).page)
                 followed = solved()
                 board.show(followed.page)

@@ -1,4 +1,4 @@
-"""`idesign wizard`: questions in the user's words, a commented spec, and what it comes to."""
+"""`idesign wizard`: questions in the user's words, a commented spec, and the verdict on its design."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _asked(
         said.texts, output.stem, output.parent, brief=brief, remarks=said.remarks, unclear=said.unclear
     )
     while (one := talk.question) is not None:
-        default = one.default or ""  # stands in grey at the prompt
+        default = one.default or ""  # shown in grey at the prompt
         asks = f"{one.asks} (Enter: {default})" if default else one.asks
         text = _typed(asks, one.allowed, default) if terminal else _piped(asks)
         if text is None:
@@ -144,7 +144,7 @@ def _asked(
             raise wrong
         if wrong is not None:
             complain(wrong)
-    return talk.draft, replace(said, texts=talk.answers, places={})  # what is typed stands in no file
+    return talk.draft, replace(said, texts=talk.answers, places={})  # typed answers have no places
 
 
 def _typed(asks: str, allowed: str, default: str) -> str:

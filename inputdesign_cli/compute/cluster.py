@@ -15,22 +15,22 @@ from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostEr
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.version import __version__
 
-_AHEAD = 2  # jobs on their way for each thread of the cluster
-_TICK = 2.0  # seconds after which it is asked whether there still are workers
+_AHEAD = 2  # submitted jobs for each thread of the cluster
+_TICK = 2.0  # seconds between checks whether there still are workers
 
 
 @dataclass(frozen=True)
 class Cluster:
     """The workers behind the scheduler at `address`.
 
-    A job whose worker is lost is given to another one (the scheduler sees to it, three times at most).
+    A job whose worker is lost is given to another one by the scheduler, at most three times.
     Workers that join while jobs are running are used.
     """
 
     address: str
     patience: float = 10.0  # seconds to find the scheduler, and a first worker
     worker_timeout: float | None = None  # seconds without any worker before the work is given up
-    say: Callable[[str], None] = field(default=lambda text: None)  # what a user should know meanwhile
+    say: Callable[[str], None] = field(default=lambda text: None)  # called with messages for the user
     shares_files: bool = field(default=False, init=False)
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
@@ -94,7 +94,7 @@ class Cluster:
             raise DataError.because(
                 "cluster-extra", "Dask is not installed", hint="pip install 'inputdesign-cli[cluster]'"
             ) from None
-        # Its diagnostics about lost connections are no news: what they lead to is an error of ours.
+        # Its diagnostics about lost connections are hidden: their consequences are reported as our errors.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         try:
             encrypts = Security().get_connection_args("client").get("ssl_context") is not None

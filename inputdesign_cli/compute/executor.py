@@ -11,7 +11,7 @@ Answer = TypeVar("Answer")
 
 
 # One thread for the linear algebra: matrices are small, and results must not depend on the machine.
-# Read by the libraries when numpy is first imported.
+# The libraries read this when numpy is first imported.
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
@@ -46,7 +46,7 @@ class Executor(Protocol):
 
 
 class WorkerLostError(Exception):
-    """Raised where a worker ended in the middle of a job, and so did the second one with that job."""
+    """Raised where every worker that was given a job ended in the middle of it."""
 
 
 class InProcess:

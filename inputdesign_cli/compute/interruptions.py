@@ -1,4 +1,4 @@
-"""Let interruptions reach the caller unchanged, although compiled modules lose them or make other errors."""
+"""Let interruptions reach the caller unchanged, although compiled modules lose or replace them."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_came: list[int] = []
-# An import that is interrupted may drop the interruption, or crash in a compiled module. It may end first.
+_came: list[int] = []  # numbers of the signals raised
+# An interrupted import may drop the interruption, or crash in a compiled module: it is finished first.
 _PATIENCE = 5.0  # seconds that it may take
 # Lookups and finalizers may drop an interruption, too.
 _MOMENT = 0.05  # seconds until it is raised again
 _waiting_since: list[float] = []
-_HAS_ALARM = hasattr(signal, "SIGALRM")  # not on Windows: what is dropped there stays dropped
+_HAS_ALARM = hasattr(signal, "SIGALRM")  # not on Windows: dropped interruptions are lost there
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
     """Handle a signal: Ctrl-C is `KeyboardInterrupt`, others end the program in order.
 
-    Modules that are being imported are imported first. What is dropped on its way is raised again.
+    An import that is under way is finished first. A dropped interruption is raised again.
 
     Raises:
         KeyboardInterrupt, SystemExit: now, or in a moment by way of SIGALRM.
@@ -57,12 +57,12 @@ def _is_under_way(handled: BaseException | None) -> bool:
 
 @contextmanager
 def bare_interruptions() -> Iterator[None]:
-    """Let Ctrl-C and the end by a signal leave the block as themselves, never as the cause of another error.
+    """Let Ctrl-C and the end by a signal leave the block unchanged, never as the cause of another error.
 
-    Some errors name an interruption in their text alone, so that the signals are kept that `interrupt` saw.
+    Some errors name an interruption in their text alone: the signals that `interrupt` raised are kept.
 
     Raises:
-        KeyboardInterrupt, SystemExit: where an error was made of one of them.
+        KeyboardInterrupt, SystemExit: one of them has caused an error.
     """
     _came.clear()
     _waiting_since.clear()
@@ -76,7 +76,7 @@ def bare_interruptions() -> Iterator[None]:
         raise
     finally:
         if _HAS_ALARM and (_came or _waiting_since):
-            signal.signal(signal.SIGALRM, signal.SIG_IGN)  # one that is on its way would come after the end
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)  # a pending alarm would come after the end
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 

@@ -2,7 +2,7 @@
 
 The pool of concurrent.futures gives up all its jobs when one process is killed, and leaves processes behind
 when its caller is. Here each of these jobs is tried again in a process of its own. A pipe whose other end
-only the caller holds ends the processes with it.
+only the caller holds ends the processes with the caller.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection
 
 from inputdesign_cli.compute.executor import ONE_THREAD, Answer, Finished, Job, WorkerLostError
 
-_ATTEMPTS = 2
+_ATTEMPTS = 2  # processes of its own in which such a job is tried
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Processes:
                         pending[pool.submit(function, job)] = job
                     more = bool(pending)
                     wait(pending, return_when=FIRST_COMPLETED)
-                wait(pending)  # the others have ended as well
+                wait(pending)  # the pool ends the other jobs as well
             for future, job in list(pending.items()):
                 del pending[future]
                 yield _alone(function, job) if _was_killed(future) else _finished(job, future)
@@ -89,7 +89,7 @@ def _finished(job: Job, future: Future[Answer]) -> Finished[Job, Answer]:
 
 
 def _alone(function: Callable[[Job], Answer], job: Job) -> Finished[Job, Answer]:
-    """Compute a job in a process of its own: its process was killed, or that of another job."""
+    """Compute a job in a process of its own, after its process or that of another job was killed."""
     for _ in range(_ATTEMPTS):
         with _pool(1) as pool:
             future = pool.submit(function, job)

@@ -1,4 +1,4 @@
-"""Limit the time of an answer, and report how far it is.
+"""Limit the time of a computation, and report its progress.
 
 The limit is set where a task begins, and read wherever work is repeated.
 """
@@ -15,7 +15,7 @@ from threading import Event
 
 from inputdesign_cli.errors import InaccurateError
 
-# The longest search for what to do instead of what is infeasible. No design depends on it, only a hint.
+# The longest search for a remedy of an infeasible problem. No design depends on it, only a hint.
 HINT_SECONDS = 5.0
 
 
@@ -127,7 +127,7 @@ class Round:
 
 @dataclass(frozen=True)
 class Counted:
-    """Counts the finished ones of a series of tasks."""
+    """Holds the number of finished tasks in a series."""
 
     what: str
     done: int

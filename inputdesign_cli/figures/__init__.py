@@ -1,6 +1,6 @@
-"""What a reader looks at: figures of a run."""
+"""Figures of runs and sweeps."""
 
 import logging
 
-# That its cache cannot be written is no news for the user: matplotlib then uses another place.
+# No warning if the cache of matplotlib cannot be written: it then uses another place.
 logging.getLogger("matplotlib").setLevel(logging.ERROR)

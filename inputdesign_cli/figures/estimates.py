@@ -12,13 +12,13 @@ from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREY, ORA
 from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.results import Array
 
-_POINTS = 200  # of an ellipse
-_BEHIND = (0.01, 100.0)  # points of fit below the best that are told apart
-_OPAQUE = 0.8
+_POINTS = 200  # points of an ellipse
+_BEHIND = (0.01, 100.0)  # range of the axis of points of fit below the best
+_OPAQUE = 0.8  # opacity of the cells of a matrix
 _NUMBERED = 8  # rows up to which the entries are written into the cells
-_MOST_NUMBERS = 10  # along a matrix
-_SHOWN = 0.99  # share of the runs that is shown: few runs of the tail would squeeze the rest
-_WIDE = 5.0  # costs beyond it are shown over their logarithm
+_MOST_NUMBERS = 10  # ticks along a matrix at most
+_SHOWN = 0.99  # share of the runs within the axis: few runs in the tail would squeeze the rest
+_WIDE = 5.0  # relative cost beyond which its axis is logarithmic
 
 
 def boundary(center: Array, covariance: Array, probability: float) -> Array:
@@ -64,7 +64,7 @@ def draw_estimates(page: Figure, curves: of.EstimateCurves, time_unit: str) -> N
         axes.plot(curves.samples, middle, "o-", color=BLUE, markersize=3, label="estimate")
         label = "two standard deviations"
         style.band(axes, curves.samples, middle - spread, middle + spread, BLUE, 0.25, label=label)
-        # The first estimates know so little that their band would hide the rest.
+        # The wide bands of the first estimates would hide the rest.
         near = spread <= 5.0 * np.median(spread)
         low, high = (middle[near] + side * 1.2 * spread[near] for side in (-1.0, 1.0))
         axes.set(ylim=(float(low.min()), float(high.max())), title=name, xlabel="samples")
@@ -72,7 +72,7 @@ def draw_estimates(page: Figure, curves: of.EstimateCurves, time_unit: str) -> N
 
 
 def draw_orders(page: Figure, curves: of.OrderCurves, time_unit: str) -> None:
-    """Draw how far the fit of each structure stays behind the best, in decades, over its parameters."""
+    """Draw the distance of each structure's fit to the best, in decades, over the number of parameters."""
     axes = page.subplots()
     best = max(float(np.max(fit)) for _, fit in curves.fits.values())
     for number, (family, (sizes, fit)) in enumerate(curves.fits.items()):
@@ -159,7 +159,7 @@ def draw_campaign(page: Figure, curves: of.CampaignCurves, time_unit: str) -> No
 
 
 def draw_runs(page: Figure, curves: of.RunCurves, time_unit: str) -> None:
-    """Draw the share of the runs up to each value, way by way, with means in theory or a limit of ratios."""
+    """Draw the distribution of the runs with each input, with means in theory or the limit of ratios."""
     axes = page.add_subplot()
     found = {name: np.sort(values) for name, values in curves.values.items() if values.size}
     everything = np.concatenate(list(found.values()))

@@ -20,22 +20,22 @@ from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import NyquistCurves
 from inputdesign_cli.outcome.results import Array
 
-# How much higher a page is with a panel under one other, or under several.
+# Factors on the height of a page with a panel below one other, or below several.
 _TALL, _TALLER = 1.25, 1.4
-# Ratios beyond this many times the limit, or the design, run out of the linear panel.
+# Other ratios beyond this many times the limit, or the first one, are cut off by the linear panel.
 _HIGHEST = 4.0
 # Ratios that all stay below this share of the limit are flat on a linear axis: they are drawn over decades.
 _FAR_BELOW = 0.25
-# A gain below this many times the least error is drawn there.
+# A gain below this share of the least error is drawn at that share.
 _FAR = 1e-2
-# Plants drawn as lines of their own, those with a colour, and the least ratio beside the largest one.
+# Numbers of plants drawn as lines and in colour at most, and the least ratio shown relative to the largest.
 _MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
 
 
-LIMITING = "limiting frequencies"  # at which a requirement binds: rings mark them
+LIMITING = "limiting frequencies"  # a requirement binds there; rings mark them
 P = TypeVar("P", bound=of.Panel)
-_DISCS = 36
-# Of the plane, what is shown: so far around -1 and 0 the loop decides on its margins.
+_DISCS = 36  # error discs along the curve at most
+# Limits of the complex plane that are shown: the margins of a loop are seen around -1 and 0.
 _LEFT, _RIGHT, _HALF = -2.2, 1.2, 1.35
 
 
@@ -53,7 +53,7 @@ def draw_panels(
 
     Args:
         magnitude: the label of the vertical axes at the left.
-        title: says what all panels are about.
+        title: the common title of all panels.
     """
     single = len(panels) == 1
     places = [(0, 0)] if single else [panel.entry or (0, 0) for panel in panels]
@@ -123,7 +123,7 @@ def _plot_error(axes: Axes, curves: of.BoundPanel) -> None:
         style.plot_admitted(axes, w, curves.r_adm)
     else:
         least = _FAR * min(float(np.nanmin(style.positive(values))) for _, values, _ in errors)
-        gain = np.maximum(curves.G_abs, least)  # one that vanishes would stretch the axis without end
+        gain = np.maximum(curves.G_abs, least)  # a vanishing one would stretch the axis without end
         axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
     style.marked(axes, curves.active, height, label=LIMITING)
@@ -143,7 +143,7 @@ def _plot_ratios(axes: Axes, panels: Sequence[of.BoundPanel]) -> None:
         for place, (name, values, look) in enumerate(drawn):
             ratio = values / style.positive(curves.r_adm)
             top = float(np.nanmax(ratio, initial=0.0))
-            # White excitation that meets the same reaches the same: no more than its name is to be said.
+            # White excitation that meets the same requirement has the same maximum: it needs no label here.
             same = curves.r_u_equal is not None and values is curves.r_u_white
             axes.plot(curves.frequency, ratio, label="" if same else f"{name}: up to {top:.3g}", **look)
             tops.append(top if not place else min(top, _HIGHEST * max(tops)))
@@ -190,7 +190,7 @@ def _magnitude(axes: Axes, panel: of.ResponsePanel) -> None:
 
 
 def _phases(axes: Axes, panels: Sequence[of.ResponsePanel]) -> None:
-    """Draw the phases of all entries, of models without jumps, and of data, if known, on the nearest turn.
+    """Draw the phases of all entries, unwrapped for models; known ones of data on the branch nearest to them.
 
     A negative gain begins half a turn away from a positive one.
     """
@@ -289,7 +289,7 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
         label = f"not admissible: |S| above {1.0 / curves.circle:.3g}"
         handles.append(Patch(facecolor="#FDF1E9", edgecolor=ORANGE, linestyle=DASHED, label=label))
     limiting = np.interp(curves.limiting, curves.frequency, L)
-    limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
+    limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes, too, and would shift the layout
     if limiting.size:
         style.marked(axes, limiting.real, limiting.imag, label=LIMITING)
     axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)

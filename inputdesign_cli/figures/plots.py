@@ -1,4 +1,4 @@
-"""One entry for every figure: the type of the curves decides what is drawn."""
+"""One entry for every figure: the type of the curves determines the drawing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results
 
-# Each draws its curves on an empty page; the text is the unit of time.
+# Each function draws its curves on an empty page; its last argument is the unit of time.
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.BoundCurves: frequency.draw_bound,
     of.CampaignCurves: estimates.draw_campaign,
@@ -39,7 +39,7 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
 
 
 def painter(curves: Curves, time_unit: str = "s") -> Callable[[Figure], None]:
-    """Return what draws curves on an empty page; frequencies are labelled rad per `time_unit`."""
+    """Return the function that draws curves on a page; frequencies are labelled in rad per `time_unit`."""
     return lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit)
 
 

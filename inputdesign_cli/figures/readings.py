@@ -1,4 +1,4 @@
-"""What a drawn figure says along its curves, read back from it: one who points at it sees values."""
+"""Values along the curves of a drawn figure, for a page that shows them under the pointer."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Traced(Line2D):
 
     Args:
         x, y: its points (n,).
-        along: what it goes along (n,), called `name`.
-        values: shown at every point, (n,) by name.
+        along: the third variable (n,), called `name`.
+        values: further values at every point, (n,) by name.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class Traced(Line2D):
 
 
 def readings(page: Figure) -> list[dict[str, object]]:
-    """Return the panels of a laid-out page with named curves over an axis, or along one in the plane.
+    """Return the panels of a laid-out page that have named curves over an axis, or one curve in the plane.
 
     `box` is left, top, width and height in shares of the page; `low` and `high` are the ends of the axis. A
     panel with a curve in the plane has its `path`, in shares of the panel from the left and from the top.

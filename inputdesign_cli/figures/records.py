@@ -18,13 +18,13 @@ from inputdesign_cli.outcome.results import Array
 _ONE_BY_ONE = 1000  # samples that a figure of this width can show
 _ROWS = 4  # channels that fit, of the record and of the outputs together
 _MARGIN = 0.08  # above and below, as a share of the range shown
-_HIGHER = 0.25  # of the page, for each row beyond the second
+_HIGHER = 0.25  # share of the page height for each row beyond the second
 _BAND = 2.0  # standard deviations
 _LIMIT: dict[str, Any] = {"color": ORANGE, "linewidth": 1.2, "linestyle": DASHED, "label": "limits"}
-# Of a record beyond the first length, the second number of samples is shown more closely.
+# Samples beyond which a part of a record is also shown enlarged, and samples of that part.
 _WHOLE, _PART = 600, 400
-_AS_LIVELY = 0.5
-_POINTS = 3000  # of a curve that a page can show
+_AS_LIVELY = 0.5  # share of the largest variance from which on the first part is taken
+_POINTS = 3000  # points of a curve that a page can show
 _GAP = 1.5  # sample times between two records that follow each other
 
 
@@ -81,7 +81,7 @@ def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: b
     y, noise = panel.values[: time.size], _BAND * panel.deviation[: time.size]
     label = f"± 2 standard deviations of noise{' since the start' if noise[0] < noise[-1] else ''}"
     style.band(axes, time, y - noise, y + noise, GREY, 0.3, label=label)
-    # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
+    # The level at rest is known for inputs only: their axis has levels, and that of outputs has deviations.
     what = f"predicted {'input' if panel.applied else 'output'}"
     levels = levels and not panel.applied
     said = what if panel.applied else f"{what}, {'deviation Δ ' if levels else ''}from rest"
@@ -142,7 +142,7 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         residual = curves.panels[0].y - curves.panels[0].predicted
         axes[1].plot(*_drawn(curves, residual, whole), color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
-        # As many steps whatever its height: the page is laid out for the numbers of the first height.
+        # A fixed number of steps: the layout is made for the tick labels at the first height.
         axes[1].yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
     ends = np.concatenate([curves.time[[0, -1]], curves.left_out])
     over, last = (axes[:2], axes[1]) if single else (axes, axes[-1])
@@ -169,7 +169,7 @@ def _liveliest(y: Array) -> slice:
 def _drawn(curves: FitCurves, values: Array, part: slice) -> tuple[Array, Array]:
     """Return times and values of a part of (n,) as a page can show them, with a gap between two records."""
     at, begins = np.arange(part.start, part.stop), np.cumsum(curves.lengths, dtype=np.int64)[:-1]
-    if at.size > _POINTS:  # of each column of the page a gap, the least and the largest value
+    if at.size > _POINTS:  # keep a gap, the least and the largest value for each column of the page
         gap = np.isnan(values)
         marked = (gap, np.where(gap, -np.inf, -values), np.where(gap, -np.inf, values))
         columns = np.array_split(at, _POINTS // 3)
@@ -179,7 +179,7 @@ def _drawn(curves: FitCurves, values: Array, part: slice) -> tuple[Array, Array]
 
 
 def _draw_outputs(place: Axes, curves: FitCurves, panel: FitPanel, part: slice, *, single: bool) -> None:
-    """Draw an output, its prediction and, in dashes that show what lies below, its simulation."""
+    """Draw an output, its prediction and, in dashes that let the others show, its simulation."""
     name, percent = f"y{panel.output + 1}", "" if panel.fit is None else f"fit {panel.fit:.1f} %"
     simulated = "simulated from u" + (f" ({percent})" if single and percent else "")
     place.plot(*_drawn(curves, panel.y, part), color=BLACK, linewidth=1.6, label="recorded")

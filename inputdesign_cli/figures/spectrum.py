@@ -12,14 +12,14 @@ from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREEN, GREY, ORAN
 from inputdesign_cli.outcome.curves import DirectionCurves, OptimalityCurves, SpectrumCurves
 from inputdesign_cli.outcome.results import Array
 
-LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
-DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
+LOG_FROM = 100.0  # ratio of peak to white level from which on a density has a logarithmic axis
+DECADES = 5.0  # decades shown below the peak: zeros of a spectrum would stretch the axis without end
 # Entries of a nearly singular spectrum lie on each other: the dashes let the lower ones show through.
 DASHES: tuple[LineStyleType, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
-NOTHING = 1e-9  # of the largest entry: below there is rounding only
-MOST = 6  # curves that stay apart in one panel
+NOTHING = 1e-9  # share of the largest entry: smaller ones are rounding
+MOST = 6  # curves that can be distinguished in one panel
 FEW = 60  # lines that are drawn bold
-_BESIDE = 1.1
+_BESIDE = 1.1  # factor of the margins beside the outer lines
 
 
 def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:

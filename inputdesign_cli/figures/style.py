@@ -36,7 +36,7 @@ FileType = Literal["png", "svg", "pdf"]
 FILE_TYPES: dict[str, FileType] = {"png": "png", "svg": "svg", "pdf": "pdf"}
 
 DPI = 150
-_COMPRESSED = 3  # of nine: half the time of the usual six, for files a tenth larger
+_COMPRESSED = 3  # level of nine: half the time of the usual six, for files a tenth larger
 TYPE_SIZE = 9.5  # points
 Width = Literal["page", "column", "phone"]
 # Width and height in inches, and the size of the text in points: of a page, of a column in a paper, and of a
@@ -51,7 +51,7 @@ _SIZES_OF_TEXT = (
     *("xtick.labelsize", "ytick.labelsize", "legend.fontsize"),
 )
 
-# Okabe and Ito's palette, which stays apart for colour-blind readers.
+# Okabe and Ito's palette, which colour-blind readers can distinguish.
 BLACK = "#000000"
 BLUE = "#0072B2"
 ORANGE = "#D55E00"
@@ -60,14 +60,14 @@ GREY = "#777777"
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # for curves near a limit
 
-# Of a legend: letters that an inch holds, and what a handle takes beside its label.
+# Widths in a legend, in letters: an inch, a handle with its gaps, and the excess of a capital.
 _LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
-_PANEL, _ROW = 2.3, 0.4  # inches that a panel takes at least, and what a further row adds to a page
+_PANEL, _ROW = 2.3, 0.4  # least inches of width of a panel, and share of the page height for a further row
 
-# A logarithmic axis whose end is below the first multiple of its beginning has even steps; beyond the second
-# only powers of ten have a number.
+# A logarithmic axis has even steps, at most as many as the second number, if its ends have a ratio below the
+# first. Beyond the last ratio, only powers of ten have a number.
 _EVEN, _STEPS, _WIDE = 8.0, 6, 1e4
 
 DASHED = (0, (5, 2))
@@ -156,13 +156,13 @@ def rendered(
 ) -> bytes:
     """Return the file of a figure that `paint` draws on an empty page; the same figure gives the same file.
 
-    `seen` gets the page as it was laid out.
+    `seen` is called with the page after its layout.
     """
     buffer = io.BytesIO()
     with mpl.rc_context(), warnings.catch_warnings():
-        mpl.rcdefaults()  # whatever the user's matplotlibrc says
+        mpl.rcdefaults()  # independent of the user's matplotlibrc
         mpl.rcParams.update(_look(width))
-        # A box stands for a letter of the user's that the font lacks; tables and pages have it.
+        # The font may lack a letter of the user's: a box replaces it here, but tables and pages have it.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         page = painted(paint, width)
         for axes in page.axes:
@@ -258,7 +258,7 @@ def log_axes(axes: Axes, which: Literal["x", "y"], nonpositive: Literal["clip", 
 def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
     """Make one axis logarithmic over a few decades about one: 0.5, 1, 2, 5 in place of powers of ten.
 
-    Where that would leave one number or two, as over what is drawn so far, there are even steps.
+    If the range drawn so far would then have only one number or two, the steps are even.
     """
     log_axes(axes, which)
     axis = axes.xaxis if which == "x" else axes.yaxis
@@ -306,7 +306,7 @@ def plot_limit(axes: Axes, top: float) -> None:
 def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
     """Draw the admitted error r_adm as a dashed line with a shade beyond it, alike in all figures.
 
-    To be called last: the shade ends where the axis does.
+    It must be called last: the shade ends at the end of the axis.
     """
     admitted = positive(r_adm)
     low, high = axes.get_ylim()
@@ -317,9 +317,9 @@ def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
     axes.set_ylim(bottom, top)
 
 
-# Round after round of the colours.
+# The dashes change when all colours have been used.
 _DASHES: tuple[LineStyleType, ...] = ("solid", (0, (3, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1, 1)))
-# As many as have no divisor in common with the colours.
+# Their number, 7, has no divisor in common with the 6 colours: 42 pairs are distinct.
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
@@ -340,7 +340,7 @@ def positive(values: Array) -> Array:
 
 
 def labelled(*panels: Axes) -> list[Artist]:
-    """Return the artists with a label, in the order in which they were drawn; of equal labels the first."""
+    """Return the artists with a label in the order of drawing; for equal labels, the first."""
     found: dict[str, Artist] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

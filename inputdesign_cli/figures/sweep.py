@@ -21,18 +21,18 @@ from inputdesign_cli.outcome.design import OBJECTIVES, objective
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.run_directory import output_errors, write_bytes
 
-# What no design whatever does better.
+# Bounds that no design of the kind can pass.
 BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structure_bound": "any moments"}
 MOST_CURVES = len(PALETTE)
 MOST_KEYS = 3
 NAMES = ("curves", "map", "moments")
-COLUMNS = 3  # of small multiples
+COLUMNS = 3  # panels in a row
 MOST_LABELLED = 100  # cells of a map that carry their number
-_LETTERS = 9.0  # of numbers beside each other, on an inch of a page
+_LETTERS = 9.0  # letters of tick labels that an inch of a page holds
 _CELL = 0.6  # inches of the page that a column of a map takes where it has numbers
 _PREFIX, _TRACE = "moments.entries.", "moments.trace"
-_FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
-# Values over a wider ratio are drawn on a logarithmic scale; keys from the second ratio on.
+_FLAT = 0.02  # relative difference below which criteria look equal
+# Values are drawn on a logarithmic scale beyond the first ratio, and keys beyond the second.
 LOG_FROM = 10.0
 _LOG_KEYS_FROM = 100.0
 # Ticks at points: their largest number, and their least distance as a share of the axis.
@@ -74,8 +74,8 @@ def _remove(root: Path, name: str) -> None:
 def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]]]:
     """Return the names and drawing functions of a sweep's figures: curves over a numeric key, a map over two.
 
-    Of three keys the curves are small multiples, a panel for each value of the third. Sweeps over more, or
-    without two results, have none.
+    With three keys, the curves have a panel for each value of the third. Sweeps over more keys, or with fewer
+    than two results, have no figures.
     """
     quantity = next((name for name in QUANTITIES if _usable(table.numbers(name))), None)
     if quantity is None:
@@ -119,7 +119,7 @@ def _draw_panels(
         if panels:
             axes.set_title(f"{_short(panels)} = {value}", loc="left", color=GREY)
             axes.label_outer()
-            # Under one panel alone there is no room for it.
+            # The page has common labels: a single panel has no room for them.
             axes.set_xlabel("")
             axes.set_ylabel("")
     if panels:
@@ -137,7 +137,7 @@ def _draw_panels(
 def _draw_curves(
     axes: Axes, table: SweepTable, quantity: str, along: str, across: str | None, shown: NDArray[np.bool_]
 ) -> None:
-    """Draw the quantity over one key, a curve with its bound for each value of the other; white if alone.
+    """Draw the quantity and its bound over one key, for each value of the other; without one, also white.
 
     Only points (n,) that are `shown` are drawn; the scales depend on all.
     """
@@ -177,7 +177,7 @@ def _scale_values(axes: Axes, table: SweepTable, drawn: Sequence[Array]) -> None
     if low > 0 and high > LOG_FROM * low and table.kind != "D":
         style.plain_decades(axes, "y")
     elif table.maximised:
-        # Differences count, except differences of rounding.
+        # The axis shows differences, unless they are due to rounding.
         half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
         axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     elif low > 0:
@@ -209,7 +209,7 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     bar = page.colorbar(image, label=_label(table, quantity))
     if wide:
         style.plain_decades(bar.ax, "y")
-    # Beside each other numbers take room by their letters, above each other they take a line each.
+    # Labels side by side need room for their letters; labels above each other need a line each.
     across = -(-sum(len(text) + 2 for text in columns) // int(_LETTERS * style.width_for(page)))
     ticks = ((axes.xaxis, columns, along, across), (axes.yaxis, rows, down, -(-len(rows) // 20)))
     for axis, texts, key, step in ticks:
@@ -240,7 +240,7 @@ def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
     """Draw R11, R12, .. and the trace over a key ([eckhard-mse], Figures 1, 2); crosses without a result."""
     x, trace, entries = _known(table, along), _known(table, _TRACE), _moment_entries(table)
     drawn = [_known(table, name) for name in entries]
-    # Entries may coincide (R11 = R22 if the regressors are delayed copies): the later, the thinner.
+    # Entries may coincide (R11 = R22 if the regressors are delayed copies): later curves are thinner.
     widths = np.linspace(5.0, 1.2, len(entries))
     axes = page.add_subplot()
     for name, y, colour, width in zip(entries, drawn, PALETTE, widths, strict=False):
@@ -281,7 +281,7 @@ def mark_failures(axes: Axes, where: Array) -> None:
 def scale_key(axes: Axes, key: str, x: Array) -> None:
     """Set the scale and the label of the axis of a key: logarithmic for N and over decades.
 
-    Up to a dozen points that stand apart have their ticks, and no others.
+    Up to a dozen points have the only ticks, if they are not too near to each other.
     """
     points = np.unique(x[np.isfinite(x)])
     wide = points[0] > 0 and (key == "experiment.samples" or points[-1] > _LOG_KEYS_FROM * points[0])
@@ -297,7 +297,7 @@ def scale_key(axes: Axes, key: str, x: Array) -> None:
 
 
 def draw_trade(trade: Trade, page: Figure) -> None:
-    """Draw the ratios to what is asked, which stands at one, or the criterion, over the length."""
+    """Draw the ratios to the required accuracy, which is one, or the criterion, over the length."""
     axes = page.add_subplot()
     for number, (name, row) in enumerate(trade.rows.items()):
         colour, dashes = style.stroke(number)

@@ -1,4 +1,4 @@
-"""A sweep as the report reads it: what was varied, and the table."""
+"""The keys that a sweep varied, and its table, as the report reads them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from inputdesign_cli.outcome.run_files import readable
 from inputdesign_cli.outcome.text_formats import csv_rows
 from inputdesign_cli.regular_file import read_regular
 
-# What a sweep is about, if its results have it: the first of these.
+# The main quantity of a sweep is the first of these that its results have.
 QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
 
 
@@ -82,7 +82,7 @@ class SweepTable:
 
     @property
     def best(self) -> tuple[str, str] | None:
-        """Return the quantity that the sweep is about and its best point; None without a result."""
+        """Return the main quantity of the sweep and its best point; None without a result."""
         for name in QUANTITIES:
             values = self.numbers(name)
             if values is None or not np.isfinite(values).any():

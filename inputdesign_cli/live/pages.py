@@ -21,7 +21,7 @@ Stamp = tuple[tuple[int, int, int] | None, ...]
 
 
 def stamp(paths: Sequence[Path]) -> Stamp:
-    """Return times, sizes and numbers of inodes of files, which change with their content."""
+    """Return modification times, sizes and inodes of files, which change with their content."""
     found: list[tuple[int, int, int] | None] = []
     for path in paths:
         try:
@@ -51,7 +51,7 @@ def _later(paths: Sequence[Path]) -> Stamp:
 
 @dataclass(frozen=True)
 class Followed:
-    """A spec as it is followed; `designs` describe the newest good design and the one before on the pages."""
+    """A spec that is followed; `designs` are the pages of the newest good design and of the one before."""
 
     name: str
     state: str = "computing"  # computing, done, failed
@@ -73,7 +73,7 @@ class Followed:
         return replace(self, state="done", said=said, designs=(made, *self.designs[:1]), errors=())
 
     def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:
-        """Return the page with the error; `lines` are the lines of `file`, the spec as it was read."""
+        """Return the followed spec with an error; `lines` are the lines of `file` when it was read."""
         listed = tuple(_placed(diagnostic, lines, file) for diagnostic in error.diagnostics)
         number = f"{len(listed)} errors" if len(listed) > 1 else "One error"
         return replace(self, state="failed", said=f"{number}: the last good design stays.", errors=listed)

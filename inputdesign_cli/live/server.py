@@ -1,8 +1,8 @@
 """The server of one page: loopback only, behind a path that nobody can guess, and no file at all.
 
-A page of another site cannot read it. The Host header must name the loopback interface (so that a name of
-that site which leads here is refused), and the path holds a secret. Other users of the machine do not know
-that path either.
+A page of another site cannot read it. The Host header must name the loopback interface, so that a foreign
+name that resolves to it is refused, and the path holds a secret. Other users of the machine do not know that
+path either.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from inputdesign_cli.errors import OutputError
 from inputdesign_cli.report.render import script, script_source
 
 HOST = "127.0.0.1"
-# Seconds that a page waits for news before it asks again, and that a client may take for its request.
+# Seconds after which a page asks for news again, and seconds that a client may take for its request.
 _PATIENCE, _SLOWEST = 20.0, 30.0
 _POLICY = (
     f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'self' {script_source()}; "
@@ -38,7 +38,7 @@ class Board:
         self._page, self._version = "", 0
 
     def show(self, page: str) -> None:
-        """Put up another page, a whole HTML document."""
+        """Show another page, a whole HTML document."""
         with self._changed:
             if page != self._page:
                 self._page, self._version = page, self._version + 1

@@ -1,7 +1,7 @@
 """Many runs of one simulated experiment, in batches that any executor may compute.
 
-The batches and their random streams follow from the number of runs and the seed alone, never from place or
-order of computation. One process, several and a cluster give the same numbers.
+The batches and their random streams depend on the number of runs and the seed alone, not on the place or
+order of computation. One process, several processes and a cluster give the same numbers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def run_batches(
     """Return the answers of `function(count, rng)` for batches of `size` runs (the last shorter), in order.
 
     Args:
-        function: draws all that is random from `rng`; it can be pickled, with what all batches share.
+        function: draws its random numbers from `rng` alone; it can be pickled, with its shared data.
         seed: the seed of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 

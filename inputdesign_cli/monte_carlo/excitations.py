@@ -33,7 +33,7 @@ class Excitation(Protocol):
 
 @dataclass(frozen=True)
 class Recorded:
-    """Holds one record (samples, r), `step` apart, that all runs apply."""
+    """Holds one record (samples, r) that all runs apply, its samples `step` apart."""
 
     name: str
     record: Array

@@ -29,9 +29,9 @@ from inputdesign_cli.plant.transfer import product_of
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise
 
-# Batches stay in the cache of the processor.
+# Samples in a batch, so that it fits into the cache of the processor.
 _BATCH_SAMPLES = 200_000
-# The rule on the circle is wrong by exp(-_DECAY).
+# The trapezoidal rule on the unit circle has a relative error of about exp(-_DECAY).
 _DECAY = 40.0
 _LONGEST_GRID = 2**16
 
@@ -42,7 +42,7 @@ class LossStudy:
 
     Attributes:
         loss: (runs,) square root of the sum over the simulated samples of |y - y0|^2.
-        exact: (runs,) the same from the H2 norm of each run's loop, the reference averaged out.
+        exact: (runs,) root of the mean of its square over reference and noise, by the H2 norm of the loop.
         estimates: the parameters (runs, k).
         unstable: the number of estimates with an unstable loop; their losses are left out.
         power: (inputs,) mean squares of the inputs applied.
@@ -71,7 +71,7 @@ def study_losses(
         inputs: name -> spectrum on the harmonics of the record.
         executor: where batches of the runs are computed (default: in this process).
     """
-    assert problem.law.desired is not None  # for types
+    assert problem.law.desired is not None  # for mypy
     roots = {name: dense_roots(lines, samples) for name, lines in inputs.items()}
     tried = partial(_losses, problem, problem.law.desired, roots, samples)
     size = max(1, _BATCH_SAMPLES // samples)
@@ -138,7 +138,7 @@ def _simulated(numerator: Array, denominator: Array, entering: Array, stable: ND
     loss = np.full(numerator.shape[0], np.inf)
     samples = entering.shape[1]
     for run in np.flatnonzero(stable):
-        # The denominator first: it is common to all entries, and what is left are short convolutions.
+        # The denominator is common to all entries and comes first; the rest are short convolutions.
         slow = [filtered([1.0], denominator[run], v) for v in entering[run].T]
         total = 0.0
         for row in numerator[run]:
@@ -153,7 +153,7 @@ def _simulated(numerator: Array, denominator: Array, entering: Array, stable: ND
 def _mean_square(
     problem: LoopErrorProblem, desired: DesiredLoop, numerator: Array, denominator: Array, radius: Array
 ) -> Array:
-    """Return E|y - y0|^2 of each loop (runs,), by a rule on the circle exact to the decay of its poles."""
+    """Return E|y - y0|^2 of each loop (runs,), by the trapezoidal rule on the unit circle."""
     stable = radius < 1
     common = prefilter(desired)
     slowest = max(float(radius[stable].max(initial=0.0)), float(np.abs(common.poles).max(initial=0.0)))

@@ -7,7 +7,7 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 
-_DRAWS = 2000
+_DRAWS = 2000  # Wishart matrices
 
 
 def binomial_limits(successes: int, runs: int, *, confidence: float = 0.95) -> tuple[float, float]:
@@ -37,7 +37,7 @@ def wishart_range(
 def whitened_eigenvalues(estimates: Array, information: Array) -> Array:
     """Return the eigenvalues (k,) of the covariance of `estimates` (runs, k) in units of M^-1, near one."""
     centred = estimates - estimates.mean(axis=0)
-    # Through a factor of M with a unit diagonal: M itself may have a condition number of 1e12.
+    # By a factor of M scaled to a unit diagonal, as M itself may have a condition number of 1e12.
     scale = np.sqrt(np.diag(information))
     factor = np.linalg.cholesky(information / np.outer(scale, scale))
     whitened = (centred * scale) @ factor

@@ -31,7 +31,7 @@ _OUTPUTS_AT_ONCE = 100
 class PredictedError:
     """Holds the error over frequency that the design predicts: r_u and, if asked for, r_adm, (n,) each.
 
-    `w` (n,) is in the unit of the experiment. Several entries of G stand one after the other, each over its
+    `w` (n,) is in the unit of the experiment. Several entries of G follow each other, each over its
     own frequencies: `entries` holds the entry (output, input) of each value, (n, 2). Without it the
     prediction is about the one entry of G, or the Frobenius norm of all.
     """
@@ -64,7 +64,7 @@ class Trials:
     power: dict[PowerKind, list[float]]
     total_power: dict[PowerKind, list[float]]
     first: Array
-    name: str = ""  # of the excitation
+    name: str = ""  # name of the excitation
     information: Array | None = None
 
     @classmethod
@@ -112,7 +112,7 @@ class Trials:
             experiment=self.true,
             band=self.true.band,
             entry=None,
-            admissible=Absolute(1.0),  # of r_adm, which is not stated
+            admissible=Absolute(1.0),  # a placeholder, as r_adm is not used
             alpha=predicted.alpha,
         )
         if entries is None:
@@ -136,8 +136,8 @@ def tried_on(
     """Try an excitation on a system: the true one, or the design model.
 
     Args:
-        model: whose structure is estimated.
-        seed: one for all excitations, so that they meet the same noise.
+        model: the model whose structure is estimated.
+        seed: all excitations of a study share it, so that they have the same noise.
         step: time between samples in the unit of the experiment's frequencies.
         executor: where the batches of runs are computed (default: in this process); the result does not
             depend on it.
@@ -153,11 +153,11 @@ def _run(
 ) -> Trials:
     """Simulate a batch of experiments from rest on the true system and identify each of them.
 
-    The noise is drawn first, so that every excitation meets the same. Runs where the search does not
-    settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
-    with an error of its own in each run. The search begins at the parameters of `model`.
+    The noise is drawn first, so that all excitations have the same noise. Runs where the search does not
+    settle are repeated from several starts. Prior information enters as an estimate from earlier data, with
+    an independent error in each run. The search begins at the parameters of `model`.
     """
-    from inputdesign_cli.identification import fit_batch, identify  # only now: designs do without it
+    from inputdesign_cli.identification import fit_batch, identify  # only now: designs do not need it
 
     system = true.model
     e = _noise(true, runs, rng)
@@ -205,7 +205,7 @@ def _again_where_lost(
         report_progress(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))
         try:
             other = again(u[run], y[run])
-        except SpecError:  # the noise of this run leaves some parameter without an estimate
+        except SpecError:  # with this noise, some parameter has no estimate
             continue
         theta[run], noise[run], information[run] = other.theta, other.noise, other.information
         converged[run], steps[run] = other.search.converged, other.search.steps

@@ -18,9 +18,9 @@ class PartRecord:
 
     Attributes:
         file: its name in the directory; `given`: the name of the user's file.
-        samples: that were applied; `plan`: the file of the plan.
+        samples: number of samples applied; `plan`: the file of the plan.
         energy: cost of these samples.
-        likeness: correlation with the plan; `scale`: at which the plan was applied.
+        likeness: correlation with the plan; `scale`: factor on the plan at which it was applied.
     """
 
     file: str
@@ -47,11 +47,11 @@ class PlannedPart:
     """Describes a part to be applied.
 
     Attributes:
-        samples: of the part; `planned_samples`: of the whole plan.
-        power: mean square of the plan; `part_power`: of the part.
-        cost: of a sample of the design; `part_cost`: of a sample of the part.
+        samples: length of the part; `planned_samples`: length of the whole plan.
+        power: mean square of the plan; `part_power`: mean square of the part.
+        cost: cost of a sample of the design; `part_cost`: cost of a sample of the part.
         capped: whether the plan misses the accuracy that is asked.
-        offset: levels that the excitation varies about.
+        offset: levels about which the excitation varies.
         why: the reason why there is no design.
     """
 
@@ -90,11 +90,11 @@ class Campaign:
     """Holds the records and decisions of an experiment in parts.
 
     Attributes:
-        version: of the form of the directory.
-        folder: from the directory to where file names in the spec start.
-        last: the last estimate that was built on, by the names of the parameters.
-        first_cost: of a sample of the first design.
-        digests: SHA-256 of the files that decisions are made by, and of the decisions.
+        version: number of the format of the directory.
+        folder: path from the directory to the folder that file names in the spec are relative to.
+        last: the last estimate that a plan was based on, by the names of the parameters.
+        first_cost: cost of a sample of the first design.
+        digests: SHA-256 of the files that decisions depend on, and of the decisions.
         regardless: whether to go on although tests refute the structure.
     """
 

@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class OutcomeError(ValueError):
-    """Says that plain data do not have the form of the result that they should hold."""
+    """Raised where plain data do not have the form of the result that they should hold."""
 
 
 _NAMES = {str: "text", bool: "truth value", int: "whole number", float: "number", list: "list"}
@@ -40,7 +40,7 @@ def plain(value: object, where: str = "result") -> Any:
     """Return a result in JSON's own types; `where` names it in errors.
 
     Raises:
-        ValueError: a NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
+        ValueError: a NaN or an infinity: JSON has none, and a null in its place would hide an error.
         TypeError: a value or a key that has no place in JSON.
     """
     if isinstance(value, np.ndarray | np.generic):
@@ -83,7 +83,7 @@ def json_text(value: object) -> str:
 
 
 def read_plain(kind: type[T], data: object, where: str = "") -> T:
-    """Return a result of this type from plain data; keys that it does not know are passed over.
+    """Return a result of this type from plain data; unknown keys are ignored.
 
     Raises:
         OutcomeError: something that it needs is missing, or of another type.

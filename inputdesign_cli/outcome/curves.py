@@ -19,7 +19,7 @@ class Curves:
     """Holds the content of one figure; `figures.plots` draws each kind."""
 
 
-# Users write frequencies with three digits or so: within this share, a frequency is that of the line.
+# Users write frequencies with about three digits: one within this share of a line stands for the line.
 _SAME_LINE = 1e-3
 
 
@@ -36,12 +36,12 @@ class SpectrumCurves(Curves):
 
     frequency: Array  # (n,) rad per time unit
     spectrum: NDArray[np.complex128]  # (n, r, r), Hermitian; real powers will do
-    white: float | None = None  # the level of the white baseline; of one input's sinusoids its power
+    white: float | None = None  # density of the white baseline; for the sinusoids of one input, its power
     lines: bool = False
-    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
+    symbol: str = "u"  # the signal: "u" in open loop, "r" in closed loop
     record: Array | None = None  # (n, r), smoothed periodograms of the record
-    band: tuple[float, float] | None = None  # where the sinusoids might be
-    label: str = "design"  # what gave it
+    band: tuple[float, float] | None = None  # the band in which sinusoids may lie
+    label: str = "design"  # source of the spectrum
 
     @property
     def phi(self) -> Array | NDArray[np.complex128]:
@@ -52,9 +52,9 @@ class SpectrumCurves(Curves):
     def __call__(self, w: ArrayLike) -> NDArray[np.complex128]:
         """Return the spectrum (.., r, r) at frequencies `w`, a number or an array (..), in rad per time unit.
 
-        A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
-        and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
-        is that of the line.
+        A density is interpolated between the frequencies of spectrum.csv. Sinusoids have their power at their
+        lines, and zero between them. A frequency stands for a line if their distance is at most a
+        thousandth of that frequency, and of the distance to the next line.
         """
         stated = np.asarray(w, dtype=float)
         at, shape = stated.ravel(), (*stated.shape, *self.spectrum.shape[1:])
@@ -74,16 +74,16 @@ class DirectionCurves(Curves):
 
     frequency: Array  # (n,)
     gain: Array  # (n, inputs), singular values of G, largest first
-    power: Array  # (n, inputs), of the input along the right singular vectors
+    power: Array  # (n, inputs), power of the input along the right singular vectors
     white: float | None = None
     lines: bool = False
 
 
 @dataclass(frozen=True)
 class RunCurves(Curves):
-    """Holds a number of each run of a study, way by way: a loss, or the largest r_u/r_adm of the true plant.
+    """Holds a number of each run, by input or strategy: a loss, or the largest r_u/r_adm of the true plant.
 
-    `limit` is what is asked of the ratio, and `theory` has the mean of a loss.
+    `limit` is the required upper limit of the ratio, and `theory` has the mean of a loss in theory.
     """
 
     values: Mapping[str, Array]  # name -> (runs,)
@@ -97,7 +97,7 @@ class Panel:
 
     frequency: Array
     entry: tuple[int, int] | None = field(default=None, kw_only=True)  # output and input, from zero
-    names: str = field(default="", kw_only=True)  # of the input and the output, where the user gave them
+    names: str = field(default="", kw_only=True)  # names of input and output, if the user gave them
 
 
 @dataclass(frozen=True)
@@ -107,12 +107,12 @@ class BoundPanel(Panel):
     r_u: Array
     G_abs: Array
     r_adm: Array | None = None
-    r_u_white: Array | None = None  # of white excitation that meets the same, or exhausts the same limits
+    r_u_white: Array | None = None  # for white excitation at the same accuracy or the same limits
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
-    r_u_record: Array | None = None  # of the samples of the record
-    label: str = "design"  # what gave r_u
-    r_u_equal: Array | None = None  # of white excitation at the cost, or of the length, of the design
-    white_labels: tuple[str, str] = ("white", "white, same cost")  # what r_u_white and r_u_equal are called
+    r_u_record: Array | None = None  # for the samples of the record
+    label: str = "design"  # source of r_u
+    r_u_equal: Array | None = None  # for white excitation with the cost, or the length, of the design
+    white_labels: tuple[str, str] = ("white", "white, same cost")  # names of r_u_white and r_u_equal
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ class NyquistCurves(Curves):
     frequency: Array
     loop: NDArray[np.complex128]
     radius: Array  # |C| r_u
-    circle: float | None = None  # the distance from -1 that is to be kept, where it is one
-    limiting: Array = field(default_factory=lambda: np.zeros(0))
+    circle: float | None = None  # required distance from -1, if it is constant
+    limiting: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
 
 
 @dataclass(frozen=True)
@@ -157,8 +157,8 @@ class DeviationPanel(Panel):
     G_abs: Array
     r_adm: Array
     deviation: Array
-    found: Array | None = None  # of data, or of simulated experiments
-    label: str = ""  # what gave them
+    found: Array | None = None  # deviations of data or of simulated experiments
+    label: str = ""  # source of `found`
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class DeviationCurves(Curves):
 class OptimalityCurves(Curves):
     """Holds the equivalence-theorem ratio over frequency: at most one, and one on the support.
 
-    `within` is that of the bound over all records within an amplitude, `record_bound`, where there is one.
+    `within` is the ratio for the bound over all records within an amplitude, and `record_bound` its value.
     """
 
     frequency: Array
@@ -184,7 +184,7 @@ class OptimalityCurves(Curves):
 
 @dataclass(frozen=True)
 class FanCurves(Curves):
-    """Holds r_u / r_adm over frequency at many plants; of several entries of G the largest."""
+    """Holds r_u / r_adm over frequency at many plants; for several entries of G, the largest."""
 
     frequency: Array  # (n,)
     ratios: Array  # (plants, n)
@@ -215,8 +215,8 @@ class EstimateCurves(Curves):
 class TradeCurves(Curves):
     """Holds the cost relative to the design that knows the plant, and the share of runs within r_adm.
 
-    Of each way: mean, 5 % and 95 % of the cost; the share and its 95 % limits. `record`: cost of the record
-    that the design delivers which knows the plant.
+    A point has, for one strategy, mean, 5 % and 95 % quantiles of the cost, and the share with its 95 %
+    limits. `record` is the cost of the record of the design that knows the plant.
     """
 
     points: Mapping[str, tuple[float, float, float, float, float, float]]
@@ -233,7 +233,7 @@ class Ellipse:
     names: tuple[str, str]
     center: Array  # (2,)
     covariance: Array
-    white: Array | None = None  # of white excitation within the same limits
+    white: Array | None = None  # covariance with white excitation within the same limits
     estimates: Array | None = None
 
 
@@ -267,7 +267,7 @@ class ErrorBandCurves(Curves):
 class FitPanel:
     """Holds a recorded output, its one-step prediction and its simulation from the input; arrays (n,).
 
-    `left_out` are the samples (m,) of the output that the estimate does without.
+    `left_out` are the samples (m,) of the output that the estimate does not use.
     """
 
     y: Array
@@ -283,12 +283,12 @@ class FitPanel:
 class FitCurves(Curves):
     """Holds the fit of a model to the data of its estimate, output by output, over `time` (n,).
 
-    `left_out` are the times (m,) of samples that the estimate does without.
+    `left_out` are the times (m,) of samples that the estimate does not use.
     """
 
     time: Array
     panels: tuple[FitPanel, ...]
-    lengths: tuple[int, ...] = ()  # samples of each record, one after the other; empty: of one
+    lengths: tuple[int, ...] = ()  # samples of each record, one after the other; empty for one
     left_out: Array = field(default_factory=lambda: np.zeros(0))
 
 
@@ -320,11 +320,11 @@ class OrderCurves(Curves):
 
 @dataclass(frozen=True)
 class PredictedPanel:
-    """Holds what the record causes from rest at an output, or in a loop at an input; arrays (n,)."""
+    """Holds the response from rest to the record at an output, or in a loop at an input; arrays (n,)."""
 
     name: str  # "y1"
     values: Array
-    deviation: Array  # of the noise there
+    deviation: Array  # standard deviation of the noise there
     limits: tuple[float, float] | None = None
     label: str = ""  # its name and unit, where there are any
     applied: bool = False  # an input, at its operating point; outputs are counted from rest
@@ -332,15 +332,15 @@ class PredictedPanel:
 
 @dataclass(frozen=True)
 class SignalCurves(Curves):
-    """Holds the record to be applied: `time` (n,), an array (n,) for each channel; below, the outputs."""
+    """Holds the record to be applied: `time` (n,), an array (n,) for each channel, and the predictions."""
 
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
     labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
     predicted: tuple[PredictedPanel, ...] = ()
-    held: bool = True  # each value until the next
-    levels: bool = False  # the channels stand at an operating point; what they cause is counted from rest
+    held: bool = True  # each value is held until the next
+    levels: bool = False  # channels include an operating point; their effects are counted from rest
     moves: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> largest move, its limit
 
 
@@ -351,7 +351,7 @@ class ErrorCurves(Curves):
     energy: Array
     bias_squared: Array
     variance: Array
-    white: Array  # of white regressors of that energy
+    white: Array  # error with white regressors of that energy
     design: tuple[float, float]  # energy and error of the design
     target: float | None = None
 
@@ -361,7 +361,7 @@ class MomentsCurves(Curves):
     """Holds the moments of regressors, and the lines of the periodic input that has them (for one input)."""
 
     R: Array  # (n, n)
-    estimated: int  # how many of the n are estimated
+    estimated: int  # number of them that are estimated
     line_frequency: Array | None = None  # (L,) rad per time unit, from 0 on
     line_power: Array | None = None  # (L,) mean squares
     nyquist: float = np.pi

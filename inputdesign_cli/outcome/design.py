@@ -54,7 +54,7 @@ class Coverage:
     """Holds shares of estimates within r_adm with their 95 % limits, where alpha was calibrated.
 
     `exact` and `linear` are shares of `draws` from asymptotic theory, `kept` that of simulated `runs`.
-    `asked` and `chi_squared_alpha` say what was asked for and which alpha is replaced.
+    `asked` is the stated probability, and `chi_squared_alpha` the alpha that is replaced.
     """
 
     draws: int
@@ -84,7 +84,7 @@ class ModelError:
 class Loop:
     """Holds the controller of a loop and the margins kept; times in the user's unit, phase in degrees.
 
-    Noise moves the input of this loop by `input_deviation`, a standard deviation.
+    `input_deviation` is the standard deviation of the input of this loop due to noise.
     """
 
     nominal_peak: float | None = None
@@ -218,8 +218,8 @@ class Signal:
     """Holds sizes of the samples, an entry for each channel, and the accuracy of the samples themselves.
 
     `worst_ratio` is the largest ratio of the requirements. `of_limits` are the shares of limits on single
-    samples that it takes. `begun_anywhere` is the growth of its errors where the start is unknown (None
-    without bound). It is absent (NaN here) where the start does not matter.
+    samples that it uses. In `details`, `begun_anywhere` is the growth of its errors if the start is unknown
+    (None without bound); it is absent if the start does not matter.
     """
 
     samples: int
@@ -331,12 +331,12 @@ class Sensitivity:
 class ObjectiveWords:
     """Holds the words for one `objective.kind`."""
 
-    name: str  # of the value
-    asked: str  # what the summary says was asked
-    label: str = ""  # of the value on an axis, if that is not the name
-    maximised: bool = False  # its bounds are from above
+    name: str  # name of the value
+    asked: str  # the question in the summary
+    label: str = ""  # name of the value on an axis, if another
+    maximised: bool = False  # its bounds are upper bounds
     white: str = "value"  # the entry of `baseline.white` to compare with
-    spent: str = ""  # what white excitation that meets the same takes more of
+    spent: str = ""  # the quantity that white excitation needs more of for the same accuracy
 
     @property
     def axis(self) -> str:
@@ -382,10 +382,10 @@ WHITE = ("white", "white, same cost")
 
 
 def white_labels(kind: str | None, white: White, samples: int) -> tuple[str, str]:
-    """Return the labels of white excitation in curves: the baseline, and that with equal means.
+    """Return the labels of white excitation in curves: the baseline, and the one at equal cost or length.
 
     Args:
-        kind: of the objective; None without one.
+        kind: the kind of the objective; None without one.
     """
     spent = objective(kind).spent
     if not spent:

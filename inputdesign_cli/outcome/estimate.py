@@ -28,7 +28,7 @@ class DetectionLines:
 
 @dataclass(frozen=True)
 class SilentLine:
-    """Describes the outputs at lines of one kind that are not excited; lists are by output.
+    """Describes the outputs at one kind of lines that are not excited; tuples have an entry per output.
 
     `worst_ratio` is the largest share of r_adm that the nonlinearity takes, at `frequency`. `cubed` names the
     signal whose cube the lines resemble.
@@ -47,7 +47,8 @@ class SilentLine:
 class MeasuredLines:
     """Holds the lines, the periods that count, and the largest deviation over the admitted one.
 
-    Of a measurement without lines of a spec, only the method and how far a model lies outside are there.
+    A measurement without lines of a spec has only its method and size, and `model_outside`: the share of
+    estimates of G whose confidence disc misses the model (`model_far_outside`: by far).
     """
 
     lines: int | None = None
@@ -74,7 +75,7 @@ class MeasuredLines:
 
 @dataclass(frozen=True)
 class Test:
-    """Holds a chi-squared test: statistic, degrees of freedom, and the probability of more by chance."""
+    """Holds a chi-squared test: statistic, degrees of freedom, and the probability of a larger statistic."""
 
     statistic: float
     degrees_of_freedom: int
@@ -122,9 +123,9 @@ Verdict = Literal["met", "missed", "undecided"]
 
 @dataclass(frozen=True)
 class Neglected:
-    """Holds a parameter that the model does without, and its effect on G over the admitted error.
+    """Holds a parameter that the model lacks, and its effect on G relative to the admitted error.
 
-    `may_move` is an upper limit of that, with 95 %.
+    `may_move` is an upper 95 % limit of this effect.
     """
 
     parameter: str
@@ -151,9 +152,9 @@ class Nominal:
 class Assessment:
     """Holds the verdict with its reasons, and the accuracy that a designed top-up would reach.
 
-    `undecided` are the reasons against a verdict that explain all others, `causes` their kinds, and `next` is
-    the command to run then. `left` is the largest ratio after the top-up, `experiments` how often it has to
-    be applied (`periods`: how many periods have to count).
+    `undecided` are the reasons against a verdict that explain all others, `causes` their causes, and `next`
+    is the command to run then. `left` is the largest ratio after the top-up, `experiments` how often it has
+    to be applied (`periods`: how many periods have to count).
     """
 
     verdict: Verdict
@@ -190,8 +191,8 @@ class Validation:
 class Structure:
     """Holds a structure that was tried: its orders and delays, and its fit.
 
-    `failed` are the tests of its residuals that fail. `certain` is whether no parameter of the plant deviates
-    by more than half its value.
+    `failed` are the tests of its residuals that fail. `certain` is whether no standard deviation of a
+    parameter of the plant exceeds half its value (for a dead time, it may be a sample).
     """
 
     family: str
@@ -223,7 +224,7 @@ class ExploredOutput:
 
 @dataclass(frozen=True)
 class FeedbackInput:
-    """Holds an input that may answer the outputs, with the probability of that by chance."""
+    """Holds an input that may depend on the outputs, and the probability that this shows by chance."""
 
     input: str
     probability: float

@@ -177,7 +177,7 @@ class Row:
 
 
 def compare(golden: Golden, results: Mapping[str, Result | IdesignError]) -> list[Row]:
-    """Return a row for each quantity; `results` by names of runs. A run without a result fails its rows."""
+    """Return a row for each quantity; `results` go by name of run. A run without a result fails its rows."""
     rows = []
     for run in golden.runs:
         result = results.get(run.name)

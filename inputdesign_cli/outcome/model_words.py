@@ -17,7 +17,7 @@ Blocks = dict[str, dict[str, Plain]]
 
 @singledispatch
 def blocks_of(model: plant.Model) -> Blocks:
-    """Return `plant` and `noise` of a model; polynomials that are 1 are left out.
+    """Return the blocks `plant` and `noise` of a model; polynomials that are 1 are left out.
 
     Raises:
         TypeError: models of this kind have no words.
@@ -62,7 +62,7 @@ def _(model: plant.SampledModel) -> Blocks:
 
 @blocks_of.register
 def _(model: plant.StateSpaceModel) -> Blocks:
-    return {"plant": {}, "noise": _variance(model)}  # the plant is in the words of its parameters
+    return {"plant": {}, "noise": _variance(model)}  # `Reparametrised` has the words of the plant
 
 
 @blocks_of.register
@@ -72,7 +72,7 @@ def _(model: plant.Coloured) -> Blocks:
         name: _rows(rows) for name, rows in (("C", model.C), ("D", model.D)) if _matter(rows)
     }
     inside = blocks["noise"].get("D")
-    if inside is not None and "D" in own:  # of each output one is 1
+    if inside is not None and "D" in own:  # for each output, one of the two is 1
         own["D"] = [one if len(one) > 1 else other for one, other in zip(own["D"], inside, strict=True)]
     if any(model.drift):
         own["drift"] = model.drift[0] if len(model.drift) == 1 else list(model.drift)

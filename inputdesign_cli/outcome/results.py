@@ -1,6 +1,6 @@
 """Results of a design, an analysis or a study for the record and the report: plain data, nothing to compute.
 
-`Outcome` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
+`Outcome` is the content of `result.json`; the rest is the content of CSV files and plots. Frequencies
 are in rad per time unit, spectra in the convention of the contract (power = integral over the normalised
 circle / 2 pi).
 """
@@ -25,7 +25,7 @@ from inputdesign_cli.outcome.robust import Robust
 from inputdesign_cli.outcome.simulation import Simulation
 
 Array = NDArray[np.float64]
-# Data as JSON has it. What is in a result is known by its path, not by its type.
+# Plain data as in JSON. The path of an entry of a result determines its content, not the type.
 Json = Any
 Result = Mapping[str, Json]
 
@@ -111,7 +111,7 @@ class Results:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Return what speaks for or against the data, the model or the design, with codes and severities."""
+        """Return the findings about the data, the model or the design, with codes and severities."""
         return self.outcome.findings or ()
 
     @property
@@ -126,7 +126,7 @@ class Results:
 
     @property
     def model_error(self) -> design.ModelError | None:
-        """Return the largest r_u/r_adm and its frequency, or None if no model error is looked at."""
+        """Return the largest r_u/r_adm and its frequency, or None if no model error is asked about."""
         return self.outcome.model_error
 
     @property

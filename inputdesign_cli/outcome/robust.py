@@ -69,7 +69,7 @@ class SearchedPlant:
 
 @dataclass(frozen=True)
 class Risk:
-    """Bounds the share of plants at which the design may miss what is asked, with the stated confidence."""
+    """Bounds the share of plants at which the design may miss the accuracy, with the stated confidence."""
 
     confidence: float
     after: float

@@ -1,7 +1,7 @@
 """The run directory: written whole or not at all, `result.json` last, and never over something else.
 
-Where `result.json` stands, the run is complete and every other file belongs to it. A reader may rely on
-that whatever happens to the writer: a full disc, an interrupt, a power cut.
+If `result.json` is there, the run is complete and every other file belongs to it. This holds whatever happens
+to the writer: a full disc, an interrupt, a power cut.
 
 `made_from` in `result.json` names the spec and the data relative to the run directory: a project that is
 moved as a whole keeps its runs. `asked_sha256` is the digest of the spec as it was read, if the `spec.yaml`
@@ -102,7 +102,7 @@ def check_directory(directory: Path) -> Path:
 def check_place(directory: Path, origin: Origin, spec: str) -> None:
     """Refuse a directory that could not take a run, before the run is computed.
 
-    What may change in the meantime is looked at again when the run is written.
+    Conditions that may change in the meantime are checked again when the run is written.
 
     Args:
         spec: the `spec.yaml` of the run, as far as it is known beforehand.
@@ -176,10 +176,10 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
     """Refuse to replace the run in `target` unless it was made from the same files, or from the same spec.
 
     Args:
-        origin: what the new run is made from.
+        origin: the sources of the new run.
         spec: its `spec.yaml`.
         target: the directory of the run.
-        shown: how the user calls it.
+        shown: the name by which the user calls it.
 
     Raises:
         OutputError: `output-other-run`; `output-spec-changed` and `output-signal-changed`, the user has
@@ -204,7 +204,7 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
         raise _lost("output-signal-changed", shown / SIGNAL, "move it away if it is a record")
     ours, theirs = origin.seen_from(target), result.get("made_from")
     known = theirs if isinstance(theirs, list) else []
-    if known[:1] != [SPEC] and origin.asked:  # or else spec.yaml is the user's own text
+    if known[:1] != [SPEC] and origin.asked:  # otherwise spec.yaml is the user's own text
         same |= digest(origin.asked) == result.get("asked_sha256", result.get("spec_sha256"))
     same_file = ours[:1] == known[:1] and ours[:1] not in ([], [STANDARD_STREAM])
     of = ""
@@ -244,14 +244,14 @@ def write_run(
     """Write a run directory and return the paths of its files, `result.json` last.
 
     An earlier run in `directory` is replaced, including files that the new run no longer has, and the page
-    about it. Files that are not of a run are left alone. Whatever fails or kills the writer, `directory`
-    holds what it held before or the new run, at the latest after the next call.
+    about it. Files that belong to no run are left alone. Whatever fails or kills the writer, `directory`
+    holds its earlier content or the new run, at the latest after the next call.
 
     Args:
-        results: what a verb of the package returned.
-        directory: where to write it.
+        results: the results that a verb of the package returned.
+        directory: the directory to write.
         figures: file name ("bound.png") -> content, as `figures.plots.draw_all` draws them.
-        origin: what the run was made from; a run of something else is then not replaced.
+        origin: the sources of the run; a run from other sources is then not replaced.
 
     Raises:
         OutputError: `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a
@@ -282,7 +282,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a single file as `replace_text` does; what is no file, as a pipe or a device, is written into."""
+    """Write a single file as `replace_text` does; a pipe or a device is written into."""
     if path.exists() and not path.is_file():
         with output_errors(path):
             path.write_bytes(content)
@@ -335,7 +335,7 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
     """Return the outcome of a whole run, typed.
 
     Args:
-        directory: of the run.
+        directory: the directory of the run.
         result: its `result.json`, where that was read already.
 
     Raises:
@@ -373,7 +373,7 @@ def curves_json(curves: Mapping[str, Curves]) -> bytes:
 
 
 def _plain(value: NDArray) -> object:
-    """Return values without a type in JSON: complex numbers, and arrays that are not contiguous."""
+    """Return complex numbers as {re, im}, and other arrays in contiguous memory, for orjson."""
     if np.iscomplexobj(value):
         return {"re": np.ascontiguousarray(value.real), "im": np.ascontiguousarray(value.imag)}
     return np.ascontiguousarray(value)

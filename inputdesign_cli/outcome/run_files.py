@@ -2,8 +2,8 @@
 
 Everything happens in a folder of work inside the directory of the run, under a lock that ends with its
 process. The folder holds `new`, the files of the new run, and `old`, the files of the run that leaves, while
-files are moved. The directory may be a mounted volume: a file moves in one step only within one. Which files
-are of a run its `result.json` says, whoever has written it.
+files are moved. The directory may be a mounted volume: a file moves in one step only within one. The
+`result.json` of a run lists its files, whoever has written it.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from inputdesign_cli.version import __version__
 
 RESULT, SPEC, SIGNAL, PAGE = "result.json", "spec.yaml", "signal.csv", "report.html"
 FIGURES = "figures.json"
-# Every run has some of these; what else it wrote its result lists under `files`.
+# Every run has some of these; its result lists the others under `files`.
 STANDARD_FILES = (
     SPEC,
     *(f"{stem}.{kind}" for stem in ("spectrum", "signal", "bound") for kind in ("csv", "png")),
 )
 _LIBRARIES = ("numpy", "scipy", "cvxpy", "clarabel")
-_LONGEST_NAME = 255  # bytes, of a file system
-# How each page that `idesign report` writes begins: one of the user's own is not removed.
+_LONGEST_NAME = 255  # bytes of a file name
+# Mark of the pages that `idesign report` writes: a page of the user's own is not removed.
 PAGE_MARK = b'<meta name="generator" content="idesign '
 _DAMAGES = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 _WORK, _LOCK = ".run.partial", ".run.lock"
-_PATIENCE = 10.0  # seconds that another writer is waited for
+_PATIENCE = 10.0  # seconds to wait for another writer
 _POLL = 0.02  # seconds between two tries
 
 
@@ -122,14 +122,14 @@ def readable(file: Path, of: str = "a run") -> Iterator[None]:
 
 
 def _finite(text: str) -> float:
-    """Return a number of a result; idesign writes no other than finite ones."""
+    """Return a finite number of a result; idesign writes no others."""
     if not math.isfinite(value := float(text)):
         raise OutcomeError(f"{text} is no finite number")
     return value
 
 
 def is_plain(name: object) -> bool:
-    """Return whether a name is of a file in the directory itself, and none elsewhere."""
+    """Return whether a name is that of a file in the directory itself, not elsewhere."""
     if not isinstance(name, str) or name in ("", os.curdir, os.pardir) or set(name) & {"/", "\0"}:
         return False
     try:
@@ -153,7 +153,7 @@ def environment() -> Mapping[str, str]:
 def workplace(target: Path) -> Iterator[Path]:
     """Make a folder of work in `target`, held for this process alone, with an empty `new` in it.
 
-    What a killed process left is put right first; whatever happens, nothing of the work remains.
+    Remains of a killed process are repaired first. The folder is removed in any case.
 
     Raises:
         OutputError: `output-busy`, another process writes into `target`.
@@ -173,7 +173,7 @@ def workplace(target: Path) -> Iterator[Path]:
 
 
 def heal(target: Path) -> None:
-    """Repair `target` after a killed process: it has the run before, or the next one.
+    """Repair `target` after a killed process: it then holds the earlier run or the new one, whole.
 
     Raises:
         OutputError: `output-busy`.
@@ -252,7 +252,7 @@ def _alone(target: Path) -> Iterator[Path]:
 
 
 def _is_folder(path: Path) -> bool:
-    """Return whether a path is a folder and no link: other places are not to be reached."""
+    """Return whether a path is a folder and no link, which could lead elsewhere."""
     return path.is_dir() and not path.is_symlink()
 
 
@@ -265,7 +265,7 @@ def _clear(work: Path, target: Path) -> None:
         if _is_folder(old) and (new / RESULT).is_file():
             _move([name for name in listed_files(new) if not os.path.lexists(new / name)], target, new)
             _move(sorted(os.listdir(old), key=RESULT.__eq__), old, target)
-        # Without it the rest is never taken for what is to be moved back.
+        # Removed first: if the rest stays, a later call must not move files back.
         (new / RESULT).unlink(missing_ok=True)
     shutil.rmtree(work, ignore_errors=True)
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 _ITEM = re.compile(r"^\s*- ", re.MULTILINE)
-_BLANK = "\ue000"  # stands for a blank that stays
+_BLANK = "\ue000"  # placeholder of a blank that `_tidy` keeps
 _OF_NOISE = re.compile(r"[cd]\d+(?:\[\d+\])?")  # names that the program gives to parameters of noise
-_LOOSE = re.compile(r" ([,;)]|:(?!:)|\.(?!\.))")
+_LOOSE = re.compile(r" ([,;)]|:(?!:)|\.(?!\.))")  # a blank before punctuation
 
 
 def sentences(
@@ -35,7 +35,7 @@ def sentences(
         package: the package with the folder `templates`.
         file: a template in that folder.
         part: the name of the macro.
-        facts: what the template knows by name.
+        facts: the values that the template uses, by name.
         filters: how it writes some of them, besides the filters of all templates.
     """
     templates = _templates(package)
@@ -45,7 +45,7 @@ def sentences(
 
 
 def filled(package: str, file: str, facts: Mapping[str, object]) -> str:
-    """Return the text of a template with its facts, escaped in HTML; the arguments are as of `sentences`."""
+    """Return the text of a template with its facts, escaped in HTML; the arguments are as for `sentences`."""
     return _templates(package).get_template(file).render(facts)
 
 
@@ -91,12 +91,12 @@ def of_plant(parameters: Mapping[str, float], digits: int = 4) -> list[str]:
 
 
 def parameter(name: str) -> str:
-    """Return the name of a parameter, that of the noise as one: `noise d1`."""
+    """Return the name of a parameter, marked if it belongs to the noise: `noise d1`."""
     return f"noise {name}" if _OF_NOISE.fullmatch(name) else name
 
 
 def shown(value: object) -> str:
-    """Return a number with seven digits."""
+    """Return a number with seven digits, and other values as text."""
     return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 

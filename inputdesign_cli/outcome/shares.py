@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-_LARGE = 1000.0  # per cent, which three digits would write with an exponent
+_LARGE = 1000.0  # per cent; three digits would need an exponent
 _LEAST = 1e-300
-_EXACT = 1e-12  # a value this near to its digits has them
+_EXACT = 1e-12  # relative rounding: a value this near to a rounded one equals it
 
 
 def per_cent(share: float, digits: int = 3) -> str:
@@ -16,7 +16,7 @@ def per_cent(share: float, digits: int = 3) -> str:
 
 
 def chance(probability: float) -> str:
-    """Return a probability for a sentence, also one that is below the smallest number."""
+    """Return a probability for a sentence, also one too small for a double."""
     return f"{probability:.1e}" if probability >= _LEAST else f"below {_LEAST:.0e}"
 
 

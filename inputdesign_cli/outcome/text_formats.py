@@ -1,4 +1,4 @@
-"""Tables as CSV, exact to the last bit and strict about what may stand in them; signals as files."""
+"""Tables as CSV, exact to the last bit and strict about their content; signals as files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import orjson
 
 from inputdesign_cli.outcome.results import Array, Table
 
-_A_LINE = 4
+_A_LINE = 4  # numbers in a line of a C array
 
 
 def csv_text(table: Table) -> str:
@@ -33,17 +33,17 @@ def csv_text(table: Table) -> str:
 
 
 def csv_line(cells: Iterable[str]) -> str:
-    """Write one line of a table; a cell with a comma, a quote or the end of a line in it stands in quotes.
+    """Write one line of a table; a cell with a comma, a quote or the end of a line in it is quoted.
 
     Spreadsheets run a text that begins like a formula, so an apostrophe goes before it: `'=1+1`. Numbers stay
     unchanged.
     """
-    buffer, end = io.StringIO(), "\r\n"  # the writer puts in quotes what holds a character of its end
+    buffer, end = io.StringIO(), "\r\n"  # the writer quotes cells with a character of its line end
     csv.writer(buffer, lineterminator=end).writerow(map(_escaped, cells))
     return f"{buffer.getvalue().removesuffix(end)}\n"
 
 
-# Apostrophes of the text itself count, so that taking one away gives back every text.
+# Leading apostrophes of the text count as well, so that removing one restores every text.
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|-inf", re.ASCII | re.IGNORECASE)
 
@@ -123,7 +123,7 @@ def header_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
     unit = next((name.removeprefix("time_") for name in channels if name.startswith("time_")), "s")
     samples = len(next(iter(signals.values())))
     lines = [
-        "#pragma once",  # two of them in one file clash by their names, and none is left out silently
+        "#pragma once",  # a guard macro would silently skip the header of another signal
         "",
         f"#define SIGNAL_SAMPLES {samples}",
         f"#define SIGNAL_SAMPLE_TIME {sample_time!r} /* {unit} */",
@@ -144,4 +144,4 @@ WRITERS: dict[str, Callable[[Mapping[str, Array], float], bytes]] = {
     "npz": npz_bytes,
     "h": header_bytes,
 }
-"""By the ending of the file."""
+"""The function that writes a file, by its ending."""

@@ -11,10 +11,10 @@ from functools import cached_property
 class Units:
     """Holds the units and names of time, frequency and channels that the user of an experiment uses.
 
-    `sampled` says whether time is discrete, where the experiment counts in rad/sample, or continuous, where
-    it counts in rad per `time_unit` as the user does. `channels` are names and units of u1, .. and y1, .. if
-    the user gave them, else empty. `by_duration` says whether the user states lengths in `time_unit` or in
-    samples. One input and one output carry no index in the names of curves and entries.
+    `sampled` is whether time is discrete. The experiment then has frequencies in rad/sample; in continuous
+    time it has them in rad per `time_unit`, as the user does. `channels` are names and units of u1, .. and
+    y1, .. if the user gave them, else empty. `by_duration` is whether the user states lengths in `time_unit`,
+    not in samples. One input and one output carry no index in the names of curves and entries.
     """
 
     time_unit: str
@@ -99,7 +99,7 @@ class Units:
         return self.inputs == self.outputs == 1
 
     def entry(self, output: int, input: int) -> str:
-        """Return an entry of G, counted from zero, as in names of parameters: `[2,1]`; nothing for one."""
+        """Return an entry of G, counted from zero, as in names of parameters: `[2,1]`; empty for one."""
         return "" if self.single else f"[{output + 1},{input + 1}]"
 
     def suffix(self, output: int, input: int) -> str:

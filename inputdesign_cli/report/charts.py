@@ -23,13 +23,13 @@ from inputdesign_cli.outcome.sentences import sentences, spoken
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Figures of simulated runs: there is one of each for every input that was tried.
+# Figures of simulated runs; each exists for every input that was tried.
 _OF_RUNS = ("errors", "cloud", "disturbance")
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Holds a picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
+    """Holds a picture for an <img>: its data, a caption, and the values shown under the pointer (JSON)."""
 
     uri: str
     caption: str
@@ -52,7 +52,7 @@ def _caption(stem: str, curves: Curves) -> str:
 
 
 def captioned(curves: Curves) -> str:
-    """Return the caption of a figure, which speaks of the curves that are in it."""
+    """Return the caption of a figure, which describes the curves that it has."""
     known: dict[str, object] = {"curves": curves, "most_named": MOST_NAMED}
     if isinstance(curves, BoundCurves):
         panels = curves.panels
@@ -71,7 +71,7 @@ def _highest(error: Array | None, admitted: Array | None) -> float:
 
 
 def chart(paint: Callable[[Figure], object], caption: str) -> Chart:
-    """Return the chart that `paint` draws on an empty page; in an image its ids meet no others of a page."""
+    """Return the chart that `paint` draws on an empty page; as an image, its ids do not clash with others."""
     panels: list[dict[str, object]] = []
     content = rendered(paint, "svg", width="phone", seen=lambda page: panels.extend(readings(page)))
     uri = "data:image/svg+xml;base64," + base64.b64encode(content).decode()

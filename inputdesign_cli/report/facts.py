@@ -13,7 +13,7 @@ from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss, objecti
 from inputdesign_cli.outcome.sentences import parameter, sentences, shown, spoken
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 
-# The template of each part of a result: what a run does not need is not compiled.
+# The template of each part of a result; templates that a run does not need are not compiled.
 _TEMPLATES = {
     **dict.fromkeys(("asked", "facts", "proofs"), "design.txt"),
     **dict.fromkeys(("estimate", "verdict", "campaign_stands", "next"), "data.txt"),
@@ -21,11 +21,11 @@ _TEMPLATES = {
 }
 # The status of an excitation that was given, in words.
 _GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
-BREAK = "\n"  # within a cell: what follows is a remark
+BREAK = "\n"  # begins a remark within a cell
 _SPREAD = "{:.4g} ± {:.2g}"
-# Below this share of its standard deviation the digits of an estimate say nothing, not even its order.
+# An estimate below this share of its standard deviation is shown as zero: its digits have no meaning.
 _NOTHING = 1e-3
-_NORMAL = 1.96  # standard deviations to either side of 95 %
+_NORMAL = 1.96  # standard deviations from the mean to the limits of 95 %
 
 
 class Fact(NamedTuple):
@@ -40,8 +40,8 @@ def said(part: str, outcome: Outcome, **more: object) -> list[str]:
     """Return the sentences of a part of the templates about a result.
 
     Args:
-        part: asked, proofs (what is proved of all other experiments), verdict, assumptions, ..
-        more: what else the part knows by name.
+        part: asked, proofs (bounds on all other experiments), verdict, assumptions, ..
+        more: further facts of the part by name.
     """
     template = _TEMPLATES[part]
     of_data = outcome.identification, outcome.assessment, outcome.validation, outcome.campaign
@@ -61,8 +61,8 @@ def facts(outcome: Outcome, time_unit: str = "", part: str = "facts") -> list[Fa
     """Return the cost of an experiment and its accuracy, if the result has them.
 
     Args:
-        time_unit: of frequencies.
-        part: or how well an `estimate` explains the data, or how a campaign stands (`campaign_stands`).
+        time_unit: the unit of time of frequencies.
+        part: `facts`, or the fit of an `estimate` to data, or the state of a campaign (`campaign_stands`).
     """
     parts = (text.split("::") for text in said(part, outcome, time_unit=time_unit))
     return [Fact(*(one.strip() for one in each)) for each in parts]
@@ -75,7 +75,7 @@ def answer(verb: str, outcome: Outcome) -> str:
 
 
 def provenance(environment: Mapping[str, object], more: Iterable[Fact] = ()) -> list[Fact]:
-    """Return the versions, and further facts that show where numbers come from."""
+    """Return the versions, and further facts on the origin of the numbers."""
     return [*more, *(Fact(name, str(version)) for name, version in environment.items() if version)]
 
 
@@ -142,7 +142,7 @@ def _share(value: float | None, limits: Limits | None) -> str:
 def _within(one: TriedInput, *, several: bool) -> str:
     """Return the share within r_adm of the design as text.
 
-    It is empty unless `several` says rightly whether the true plant has an r_adm of its own.
+    It is empty unless `several` agrees with whether the true plant has an r_adm of its own.
     """
     own = (one.within_r_adm_true is None) != several
     return _share(one.within_r_adm, one.within_r_adm_limits) if own else ""
@@ -157,7 +157,7 @@ def _spread(found: LossMoments | None) -> str:
 
 
 def _cells(one: TriedInput) -> dict[str, str]:
-    """Return what the runs with an input gave, as text by column; empty where it is not known."""
+    """Return the results of the runs with an input as text by column; empty where one is not known."""
     model, found, theory = one.on_design_model, one.mean_estimate, one.theory
     known = one.mse is not None and isinstance(found, np.ndarray)
     deviations = ""

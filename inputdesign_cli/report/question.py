@@ -1,4 +1,4 @@
-"""A spec in words: the system, the experiment and what is asked. The sentences stand in `question.txt`."""
+"""A spec in words: the system, the experiment and its goal. `question.txt` has the sentences."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpec
 from inputdesign_cli.specification.models.uncertainty import SOURCES
 from inputdesign_cli.specification.plugins import added
 
-# The polynomials besides B that are not one, and what the structure is called.
+# Names of structures by the polynomials besides B that are not one.
 _STRUCTURES = {
     "": "a finite impulse response", "A": "an ARX", "AC": "an ARMAX", "F": "an output-error",
     "CF": "a Box-Jenkins", "DF": "a Box-Jenkins", "CDF": "a Box-Jenkins",
@@ -20,18 +20,18 @@ _STRUCTURES = {
 
 @dataclass(frozen=True)
 class Question:
-    """Holds the question of a spec in words, and the facts of the spec that a page needs besides."""
+    """Holds the question of a spec in words, and further facts of the spec for a page."""
 
     title: str
-    sentences: tuple[str, ...]  # the system, the experiment, what is asked
+    sentences: tuple[str, ...]  # on the system, the experiment and its goal
     time_unit: str
     closed_loop: bool
     regression: bool
     linearised: bool  # r_u is of first order in the parameters
     asked: frozenset[str]  # the keys under `accuracy`
     family: str  # the type of the spectrum; empty for a given one
-    seed: int  # of the signal
-    units: str  # of the values on the page
+    seed: int  # the seed of the signal
+    units: str  # the units of the values on the page
 
 
 def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:

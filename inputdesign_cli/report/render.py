@@ -54,7 +54,7 @@ def _filled(
 ) -> str:
     """Return the page about a directory.
 
-    It carries the SHA-256 of the file `record`, so that a reader can see whether it is about that file.
+    It has the SHA-256 of the file `record`, so that a reader can check that it is about that file.
     Its date is the date of the record, so that the same run gives the same page.
     """
     with readable(directory / record, "a run" if record == RESULT else "a sweep"):
@@ -68,7 +68,7 @@ def _filled(
 
 
 def filled(template: str, content: Mapping[str, object]) -> str:
-    """Return a template with its content; whatever text comes from a spec or a result is escaped."""
+    """Return a template with its content; any text from a spec or a result is escaped."""
     return sentences.filled("inputdesign_cli.report", template, {"version": __version__, **content})
 
 
@@ -78,5 +78,5 @@ def script(name: str) -> str:
 
 
 def script_source() -> str:
-    """Return the source by which the policy of a server lets the script inside a page run, and no other."""
+    """Return the source for a Content-Security-Policy that allows the script inside a page, and no other."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script('hover.js').encode()).digest()).decode()}'"

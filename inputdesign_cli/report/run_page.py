@@ -1,4 +1,4 @@
-"""What the page about a run says."""
+"""The content of the page about a run."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def _verb(outcome: Outcome) -> str:
 
 
 def command_of(verb: str, outcome: Outcome, sources: Sequence[str]) -> str:
-    """Return the command that makes the run again, with its data and what was removed from them."""
+    """Return the command that repeats the run, with its data and the levels removed from them."""
     if outcome.exploration is not None:
         columns = ",".join(f"{role}={column}" for role, column in outcome.exploration.channels.items())
         asked = [one for one in sources if one.endswith((".yaml", ".yml"))]
@@ -165,7 +165,7 @@ def command_of(verb: str, outcome: Outcome, sources: Sequence[str]) -> str:
 
 
 def flat(value: object, path: str = "") -> list[tuple[str, str]]:
-    """Return every entry of a result by its path; of a long list its length only."""
+    """Return every entry of a result by its path; for a long list, only its length."""
     if isinstance(value, Mapping):
         if set(value) == {"re", "im"}:
             return [(path, f"{shown(value['re'])} {value['im']:+.7g}i")]

@@ -1,4 +1,4 @@
-"""The sources of the methods that gave the numbers of a run."""
+"""The sources of the methods behind the numbers of a run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Source:
     fields: Mapping[str, str]
 
     def __str__(self) -> str:
-        """Return the citation: authors, title, where it appeared, and the year."""
+        """Return the citation: authors, title, journal or publisher, and year."""
         *others, last = self.fields["author"].split(" and ")
         authors = f"{', '.join(others)} and {last}" if others else last
         names = ("journal", "volume", "edition", "publisher", "eprint", "year", "pages")

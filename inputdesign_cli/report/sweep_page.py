@@ -1,4 +1,4 @@
-"""What the page about a sweep says."""
+"""The content of the page about a sweep."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def sweep_page(root: Path) -> dict[str, object]:
     """Return the content of the template for a sweep.
 
     Raises:
-        DataError: as `read_sweep`; `run-unreadable`, what is there of a point does not hold.
+        DataError: as `read_sweep`; `run-unreadable`, the files of a point are damaged.
     """
     table = read_sweep(root)
     _check_points(table, root)
@@ -102,7 +102,7 @@ def _check_points(table: SweepTable, root: Path) -> None:
 
 
 def _columns(table: SweepTable) -> list[tuple[str, str]]:
-    """Return the columns that are shown, by name and title; white excitation is measured as the value is."""
+    """Return the columns that are shown, by name and title; white excitation has the unit of the value."""
     kind = objective(table.kind)
     value = [("objective.value", kind.name if table.kind else "value")]
     white = [(f"baseline.white.{kind.white}", f"{kind.name} of white")] if table.kind else []
@@ -123,7 +123,7 @@ def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, Outcome]
 
 
 def _answer(table: SweepTable) -> str:
-    # While the sweep goes on the table is ahead of the summary.
+    # During a sweep, the table is newer than the summary.
     statuses = ", ".join(f"{n} {status}" for status, n in sorted(Counter(table.columns["status"]).items()))
     said = f"{table.rows} points: {statuses}."
     found = table.best

@@ -1,4 +1,4 @@
-"""Check what must hold across the sections of a spec: its parts fit the plant, and the question is complete.
+"""Check conditions across the sections of a spec: its parts fit the plant, and the question is complete.
 
 Each check is a function of the spec that yields diagnostics with absolute paths.
 """
@@ -22,7 +22,7 @@ from inputdesign_cli.specification.yaml.places import Path, parse_key
 
 _Found = Iterator[PathDiagnostic]
 _SAMPLED = "add sample: zoh to the plant"
-_LONGEST_DELAY = 1000
+_LONGEST_DELAY = 1000  # samples
 _ROUNDING = 1e-4  # 3.1416 is meant as pi
 _WEIGHTS = (
     *("accuracy.model_error.weight", "accuracy.weighted_variance.weight"),
@@ -73,7 +73,7 @@ def noise_fits(spec: Spec) -> _Found:
 
 def _noise(spec: Spec, noise: NoiseShape, *path: str) -> _Found:
     if noise.standard_deviation is not None:
-        return  # the filter was made for this plant, and lists of channels are checked as such
+        return  # `fading_noise` made the filter for this plant; `channels` checks the lists
     outputs = spec.plant.outputs
     has = f"but the plant has {count(outputs, 'output')}"
     white = "the noise of a regression is white" if spec.plant.kind == "regression" else ""
@@ -398,7 +398,7 @@ def limits_present(spec: Spec) -> _Found:
         return
     keys = "limits.input_power, limits.output_power, limits.excitation_power or limits.amplitude"
     path = ["objective"]
-    if spec.goal == "shortest_experiment" and spec.plant.kind != "regression":  # else it is refused as such
+    if spec.goal == "shortest_experiment" and spec.plant.kind != "regression":  # refused for a regression
         message = "the shortest experiment needs a limit on power: otherwise one strong sample would do"
     elif spec.goal == "best_accuracy" and asked:
         message = f"accuracy.{asked[0]} is to be the best that limits allow, but nothing limits its power"
@@ -420,7 +420,7 @@ def lengths_agree(spec: Spec) -> _Found:
         yield PathDiagnostic("conflicting-keys", message, hint, ("experiment", "samples"))
 
 
-# Checks that rest on the same keys. They are skipped if one could not be read: the answers would mislead.
+# Checks by the keys that they rest on. If one of these could not be read, they would mislead and are skipped.
 CHECKS: dict[tuple[str, ...], tuple[Callable[[Spec], _Found], ...]] = {
     ("plant", "sample_time", "experiment.controller"): (
         *(plant_is_stable, controllers_fit, noise_fits, names_differ, true_system_fits, spectrum_fits),
@@ -431,7 +431,7 @@ CHECKS: dict[tuple[str, ...], tuple[Callable[[Spec], _Found], ...]] = {
     ("experiment", "limits", "objective"): (lengths_agree,),
 }
 
-# These checks do not matter if a model is only to be estimated.
+# Checks that are left out if a model is only to be estimated.
 OF_DESIGNS = (something_asked, limits_present)
 
 
@@ -441,7 +441,7 @@ def related(path: Path, broken: Iterable[Path]) -> bool:
 
 
 def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagnostic]:
-    """Return the diagnostics of all checks whose keys are not `broken`; of designs only with `design`."""
+    """Return the diagnostics of all checks whose keys are not `broken`; `OF_DESIGNS` only with `design`."""
     return [
         found
         for keys, checks in CHECKS.items()

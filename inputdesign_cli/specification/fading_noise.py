@@ -1,4 +1,4 @@
-"""Noise in an engineer's words, its standard deviation and how fast it fades, as `variance`, `C` and `D`."""
+"""Noise stated by its standard deviation and correlation time, as `variance`, `C` and `D`."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from inputdesign_cli.specification.yaml.plain import Plain
 # Correlation times in samples: below the first noise is white, above the second it drifts.
 WHITE, _DRIFTING = 0.2, 1e5
 _SIZE, _TIME = "standard_deviation", "correlation_time"
-_ELSE = ("variance", "relative_std", "C", "D")
-DRIFT_STEP = 0.2  # of noise that drifts besides, from one sample to the next, in its standard deviations
+_ALTERNATIVES = ("variance", "relative_std", "C", "D")
+DRIFT_STEP = 0.2  # move of an added drift in a sample, in standard deviations of the noise
 
 
 def in_filters(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
@@ -37,9 +37,9 @@ def in_filters(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
 def discrete(deviation: float, time: float, step: float) -> tuple[float, float]:
     """Return the variance of e and the pole a of noise with a standard deviation and a correlation time.
 
-    A Gauss-Markov process of standard deviation s and correlation time T is in samples h apart exactly
-    v(t) = a v(t - 1) + e(t) with a = exp(-h/T) and var e = s^2 (1 - a^2): its autocovariance at a lag of k
-    samples is s^2 exp(-k h/T). If T is zero, it is white.
+    Sampled with a step h, a Gauss-Markov process of standard deviation s and correlation time T is exactly
+    v(t) = a v(t - 1) + e(t). Here a = exp(-h/T) and var e = s^2 (1 - a^2), so that its autocovariance at a
+    lag of k samples is s^2 exp(-k h/T). If T is zero, it is white.
     """
     return (
         (deviation**2 * -expm1(-2.0 * step / time), 1.0 + expm1(-step / time))
@@ -49,15 +49,16 @@ def discrete(deviation: float, time: float, step: float) -> tuple[float, float]:
 
 
 def drifting(pole: float) -> float:
-    """Return c of (1 - c q^-1) / ((1 - a q^-1)(1 - q^-1)) e for noise of this pole a that drifts besides.
+    """Return c of (1 - c q^-1) / ((1 - a q^-1)(1 - q^-1)) e, noise with the pole a and a drift.
 
-    The fading noise is kept, and the drift moves by `DRIFT_STEP` of its standard deviation in a sample.
+    The variance of e is kept. In a sample the drift moves by `DRIFT_STEP` standard deviations of
+    e/(1 - a q^-1).
     """
     return 1.0 - DRIFT_STEP * ((1.0 - pole) / (1.0 + pole)) ** 0.5
 
 
 def _numbers(value: Plain, sizes: tuple[float, float] = QUANTITIES) -> list[float]:
-    """Return one number or several as a list; an empty one if they are none of these sizes."""
+    """Return one number or several as a list, which is empty unless all lie within `sizes`."""
     listed = value if isinstance(value, list) else [value]
     numbers = all(isinstance(x, int | float) and not isinstance(x, bool) for x in listed)
     return [float(x) for x in listed] if numbers and all(sizes[0] <= x <= sizes[1] for x in listed) else []
@@ -67,7 +68,7 @@ def _filter(noise: dict[str, Plain], step: Plain) -> dict[str, Plain]:
     deviations, steps = _numbers(noise[_SIZE], DEVIATIONS), _numbers(step)
     times = _numbers(noise[_TIME]) if _TIME in noise else [0.0]
     if not (deviations and times and steps) or len({len(deviations), len(times)} - {1}) > 1:
-        return {"variance": 1.0}  # the values have errors of their own
+        return {"variance": 1.0}  # validation reports these values
     rows = [discrete(s, T, steps[0]) for s, T in np.broadcast(deviations, times)]
     shapes = [[1.0, -pole] if pole else [1.0] for _, pole in rows]
     curves = [[1.0, -drifting(pole)] for _, pole in rows]
@@ -81,14 +82,14 @@ def _filter(noise: dict[str, Plain], step: Plain) -> dict[str, Plain]:
 def _faults(
     data: dict[str, Plain], noise: dict[str, Plain], plant: dict[str, Plain], path: Path
 ) -> Iterator[PathDiagnostic]:
-    """Find what states the noise twice or not at all, and plants and samples that cannot hold it."""
+    """Yield diagnostics of noise that is stated twice, not at all, or unsuitably for plant or samples."""
     timed = (*path, _TIME)
     if _SIZE not in noise:
         message = "{key} stands without standard_deviation, which says how large the noise is"
         hint = "add standard_deviation: 0.1, or write variance, C and D in place of both"
         yield PathDiagnostic("missing-key", message, hint, timed, at_key=True)
         return
-    for key in (key for key in _ELSE if key in noise):
+    for key in (key for key in _ALTERNATIVES if key in noise):
         message = "{key} stands beside standard_deviation, which states the noise alone"
         yield PathDiagnostic("conflicting-keys", message, "remove it", (*path, key), at_key=True)
     if isinstance(noise.get("drift"), list):

@@ -35,13 +35,13 @@ from inputdesign_cli.specification.yaml.places import Path, Places, format_key
 from inputdesign_cli.specification.yaml.plain import Plain, fingerprint
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
-_WHOLE = 1e-9
+_WHOLE = 1e-9  # rounding of a number of samples
 
 
 def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
     """Add `samples` to each section with a `duration`: the largest number that fits.
 
-    An experiment without a length takes all that limits allow, unless the shortest one is asked for.
+    An experiment without a length is as long as limits allow, unless the shortest one is asked for.
     """
 
     def positive(value: Plain) -> bool:
@@ -169,7 +169,7 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
         noise.setdefault("variance", 1.0)  # it may be left out if it is to be estimated
     reported: list[PathDiagnostic] = []
     broken = set(tree.broken)
-    for find in (in_filters, _empty, in_samples):  # a noise without a size has its variance nevertheless
+    for find in (in_filters, _empty, in_samples):  # in this order: noise of empty size gets a variance
         for one in list(find(data)):
             reported.append(one)
             broken.add(one.path)
@@ -240,7 +240,7 @@ def _with_defaults(spec: Spec) -> Spec:
     if "cost" not in spec.model_fields_set and spec.closed_loop:
         update["cost"] = Cost(input_power=1.0, output_power=1.0)
     single = (spec.plant.inputs, spec.plant.outputs) == (1, 1)
-    lines = spec.accuracy.frequency_response is not None  # which are the spectrum
+    lines = spec.accuracy.frequency_response is not None  # its lines are the spectrum
     if spec.spectrum is None and not lines and spec.goal == "least_cost" and spec.plant.sampled and single:
         update["spectrum"] = FirSpectrum(type="fir")
     return spec.model_copy(update=update) if update else spec
@@ -279,7 +279,7 @@ class SpecTemplate:
     confine: FilePath | None = None
 
     def spec(self, overrides: Sequence[str]) -> Spec:
-        """Return the checked spec of one variant, without the `sweep` block; errors as of `load_spec`."""
+        """Return the checked spec of one variant, without the `sweep` block; errors as for `load_spec`."""
         every = [*self.overrides, *overrides, "sweep=null"]
         return parse_spec(self.text, self.file, every, folder=self.folder, confine=self.confine)
 
@@ -334,22 +334,22 @@ def same_content(one: str, other: str) -> bool:
 
 
 def relocated(text: str, here: FilePath, there: FilePath) -> str:
-    """Return the text of a spec in the folder `there` that names the files which it named in `here`.
+    """Return the text of a spec moved from the folder `here` to `there`, with adapted names of files.
 
-    Names of files that do not exist, and absolute ones, stay.
+    Absolute names and names of files that do not exist stay.
     """
     names = {one for one in _texts(yaml.safe_load(text)) if os.path.isfile(here / one)}
     return renamed(text, moved_names(names, here, there)) if names else text
 
 
 def moved_names(names: Iterable[str], here: FilePath, there: FilePath) -> dict[str, str]:
-    """Return how files that are named from the folder `here` are named from `there`; absolute names stay."""
+    """Return names relative to `there` by names relative to `here`; absolute names are left out."""
     own = [name for name in names if not FilePath(name).is_absolute()]
     return {name: FilePath(os.path.relpath(here / name, there)).as_posix() for name in own}
 
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
-    """Return the text of a spec in which files have other names, by their names so far."""
+    """Return the text of a spec with new names of files; `names` maps old to new ones."""
     if not names:
         return text
     tree, lines = read(text, "spec.yaml"), text.splitlines(keepends=True)
@@ -369,14 +369,15 @@ def _texts(data: Plain) -> Iterator[str]:
         yield from _texts(value)
 
 
-# Sample times differ by this share at most, from rounding in a text.
+# Largest relative difference between equal sample times, due to rounding in a text.
 _SAME = 1e-6
 
 
 def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
-    """Return the block `estimate` of a file that the spec names at `key`; errors show nothing else of it.
+    """Return the block `estimate` of a file that the spec names at `key`; errors show no other content.
 
-    Raises `SpecError`: `bad-model-file`; `wrong-estimate`, of another sample time; it cannot be read.
+    Raises `SpecError` if it cannot be read, has no sound block (`bad-model-file`), or has another sample time
+    (`wrong-estimate`).
     """
     try:
         text = read_text(spec.resolve_path(name))

@@ -1,8 +1,8 @@
-"""What other packages add to a spec by entry points: requirements, spectra and control laws.
+"""Sections that other packages add to a spec by entry points: requirements, spectra and control laws.
 
 An entry point of `idesign.requirements`, `idesign.spectra` or `idesign.control_laws` has the name of its key
-in the spec (a spectrum: of its `type`) and refers to a `Section`. The method `build` of the section makes
-what it asks for, and its `CODES` explain the errors that it raises.
+in the spec (a spectrum: of its `type`) and refers to a `Section`. The method `build` of the section builds
+its object, and its `CODES` explain the errors that it raises.
 """
 
 from __future__ import annotations
@@ -69,6 +69,6 @@ def codes() -> dict[str, dict[str, str]]:
     """Return the explanations of the codes of errors that installed packages raise: title, text, remedy."""
     sections = list[type[Section]]()
     for group in GROUPS:
-        with suppress(SpecError):  # the explanation of this error, too, is one of those that are asked for
+        with suppress(SpecError):  # `idesign explain` must explain this error, too
             sections += added(group).values()
     return {code: dict(entry) for section in sections for code, entry in section.CODES.items()}

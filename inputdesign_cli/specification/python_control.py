@@ -32,13 +32,13 @@ def from_control(
 
     In continuous time, a `sample_time` samples it behind a hold, and `delay` is its dead time, a number or
     rows of columns. `parameters` are the estimated entries of a state-space system: {"k": ("B", 1, 0)}.
-    Without, its transfer functions are the plant, and all their coefficients are estimated but `known`
-    ones. The `noise` is white of variance 1 by default; `blocks` are others of the spec: experiment,
+    Without them, its transfer functions are the plant, and all their coefficients except `known` ones are
+    estimated. The `noise` is white of variance 1 by default; `blocks` are others of the spec: experiment,
     accuracy, spectrum ..
 
     Raises `SpecError`: `not-supported` for another kind of object; `not-sampled` without a dt; `bad-
     argument` for an argument that does not go with the system; `improper-transfer`, `inaccurate-
-    conversion`; or of the spec.
+    conversion`; or an error of the spec.
     """
     import control
 

@@ -35,7 +35,7 @@ def json_schema() -> dict[str, Plain]:
     schema["anyOf"] = [
         {"required": ["plant", "noise"], "properties": variance},
         {"required": [KEY]},
-        # Only to be estimated from: the noise is estimated as well.
+        # A spec for an estimate alone: the noise is estimated as well.
         {"required": ["plant"], "properties": {key: {"not": {}} for key in OF_DESIGNS}},
     ]
     return {
@@ -67,7 +67,7 @@ def _tidy(node: Plain) -> Plain:
 
 
 def named_files(data: Plain, path: Path = ()) -> Iterator[tuple[Path, str]]:
-    """Find every text at a key that may name a file, with its path; a title is none, whatever it says."""
+    """Find every text at a key that may name a file, with its path; a title is never one."""
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for step, value in items:
         if isinstance(value, str) and step in _keys():
@@ -76,7 +76,7 @@ def named_files(data: Plain, path: Path = ()) -> Iterator[tuple[Path, str]]:
 
 
 def keep_inside(tree: Tree, confine: FilePath) -> None:
-    """Make a diagnostic of the tree of every file that lies outside `confine`."""
+    """Add a diagnostic to the tree for every file that lies outside `confine`."""
     for path, name in named_files(tree.data):
         if is_outside(tree.folder / name, confine):
             tree.diagnostics.append(outside(name, confine, format_key(path), tree.places.at(path)))

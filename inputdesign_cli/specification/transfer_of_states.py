@@ -1,4 +1,4 @@
-"""The transfer functions of a system in state space, by its poles and zeros; the response proves them."""
+"""The transfer functions of a system in state space, by poles and zeros; the response verifies them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ States = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 # Largest relative change of the response by cancelling a pole and a zero, and by the whole conversion.
 _CANCELS = 1e-9
 _DIFFERS = 1e-8
-# A sum is known to this share of its terms, and an eigenvalue to this share of the matrix.
+# Rounding of a sum relative to its terms, and of an eigenvalue relative to the norm of the matrix.
 _ROUNDING = 1e-12
 
 
@@ -22,13 +22,13 @@ def transfer_functions(
 ) -> list[list[Entry]]:
     """Return rows of columns of numerators and denominators without common factors.
 
-    Raises `SpecError`: `not-finite`; `inaccurate-conversion` if polynomials of floats have another
-    response than the states.
+    Raises `SpecError`: `not-finite`; `inaccurate-conversion` if polynomials in floating point do not have
+    the response of the states.
     """
     A, B, C, D = (np.asarray(part, dtype=float) for part in (A, B, C, D))
     if not all(np.isfinite(part).all() for part in (A, B, C, D)):
         raise bad_spec("not-finite", "the matrices of the system must be finite", key="plant")
-    import scipy.linalg  # not to be read with every spec
+    import scipy.linalg  # slow, and needed here alone
 
     if len(A):
         A, _, _, scale, _ = scipy.linalg.lapack.dgebal(A, scale=1, permute=0)
@@ -113,7 +113,7 @@ def _agree(entry: Entry, states: States, *, discrete: bool) -> bool:
     bends = bends[bends > 0]
     low, high = (bends.min() / 100, bends.max() * 100) if bends.size else (0.01, 100.0)
     grid = np.geomspace(max(low, 1e-12 * high), high, 200)
-    # Not at a root itself, where an undamped one divides by zero.
+    # The factor keeps clear of the roots: at an undamped one the response is infinite.
     w = np.concatenate([grid, bends * 0.7]) * 1.0012345
     points = np.exp(1j * w[w <= np.pi]) if discrete else 1j * w
     inverse = np.linalg.inv(points[:, None, None] * np.eye(len(A)) - A)

@@ -1,4 +1,4 @@
-"""The plan of a sweep: a grid of settings, a verb, and the key by which each point is known for good.
+"""The plan of a sweep: a grid of settings, a verb, and a permanent key of each point.
 
 A trade of time against amplitude against accuracy is a sweep with settings and a table of its own.
 """
@@ -34,14 +34,14 @@ from inputdesign_cli.sweeps.points import Layout, PointJob
 from inputdesign_cli.version import __version__
 
 Settings = Sequence[str] | Mapping[str, object]
-"""What is varied: texts as `--set` takes them, or keys and their values."""
+"""The settings that are varied: texts as `--set` takes them, or keys and their values."""
 MOST_POINTS = 1_000_000
 _KEY_LENGTH = 24
-_TRIED = 50
+_TRIED = 50  # points that are tried, evenly spread, before a spec is refused as a whole
 _WORD = re.compile(r"[A-Za-z_][\w.-]*")
-_LENGTHS = (0.25, 0.5, 1.0, 2.0)
-_AMPLITUDES = (0.5, 1.0, 2.0)
-# What the record reaches; without a record what the design does.
+_LENGTHS = (0.25, 0.5, 1.0, 2.0)  # factors on the length of the experiment in a trade
+_AMPLITUDES = (0.5, 1.0, 2.0)  # factors on its amplitude
+# The ratio that the record reaches, or without a record that of the design.
 _QUANTITIES = ("signal.worst_ratio", "objective.value")
 
 
@@ -177,7 +177,7 @@ def _text(value: object) -> str:
 
 
 def _data(text: str) -> object:
-    """Return the value of a text for `--set`; a text that cannot be read stays one."""
+    """Return the value of a text for `--set`, or the text itself if it cannot be read."""
     try:
         return read(text, "--set").data
     except SpecError:
@@ -207,7 +207,7 @@ class Plan:
         return self._keys[index]
 
     def names(self, index: int, directory: Path) -> dict[str, str]:
-        """Return how the run of a point in the `directory` of the sweep names the files of the spec."""
+        """Return the names of files in the run of a point below `directory`, by their names in the spec."""
         try:
             files = self.draft.files(self.draft.variant(self.grid.overrides(index)))
         except SpecError:
@@ -259,8 +259,8 @@ class Plan:
     def check_place(self, made_from: Sequence[str], root: Path) -> bool:
         """Refuse a directory with the sweep of another spec, of other keys, or of another command.
 
-        The same spec file, or a spec that says the same, may go on with other values of the same keys.
-        Return whether the file said something else then.
+        The same spec file, or a spec with the same content, may go on with other values of the same keys.
+        Return whether the spec has changed since then.
 
         Raises:
             OutputError: `output-other-run`.
@@ -297,13 +297,13 @@ def build_plan(
     text: str | None = None,
     overrides: Sequence[str] = (),
 ) -> Plan:
-    """Build the plan of a sweep from a spec and from settings as of `parse_settings`.
+    """Build the plan of a sweep from a spec and from settings as `parse_settings` reads them.
 
     Args:
-        spec: the file, or with `text` where it would lie.
+        spec: the file, or with `text` the place where it would be.
         overrides: changes of the spec itself; settings may give other values to the same keys.
         confine: the folder outside of which the spec may name no files.
-        text: the text of the spec, where it is in no file.
+        text: the text of the spec, if it is in no file.
 
     Raises:
         SpecError: the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
@@ -316,7 +316,7 @@ def build_plan(
     source = Path(STANDARD_STREAM) if text is not None else spec
     single = [setting.partition("=")[0].strip() for setting in fixed]
     grid, first = build_grid(draft.sweep(), axes, zipped=zipped, single=single), None
-    # What is wrong as a whole (a misspelt key) is refused, rather than fail in every point.
+    # An error of the spec as a whole, as a misspelt key, is refused before every point fails.
     for index in dict.fromkeys(i * (len(grid) - 1) // _TRIED for i in range(_TRIED + 1)):
         try:
             draft.spec(grid.overrides(index))
@@ -334,7 +334,7 @@ def trade_plan(
     """Return the plan of a sweep for the best accuracy at several lengths and amplitudes.
 
     Args:
-        file: that of the spec, as `overrides` and `confine`.
+        file: the file of the spec, with its `overrides` and `confine`.
         spec: the experiment, tried at a quarter to twice its length and half to twice its amplitude.
         words: "samples", "amplitude" or both.
 
@@ -347,7 +347,7 @@ def trade_plan(
         (found, *_) = error.diagnostics
         message = f"--trade looks for the best accuracy: {found.message}"
         hint = f"{found.hint}, or " * (found.code == "needs-limits") + "leave out --trade"
-        # The user has typed no setting of the trade: the key counts, not its place in them.
+        # The user has not typed the settings of the trade: the error names the key, not a place in them.
         raise spec.complain(found.code, message, hint=hint, key=found.key) from error
 
 
@@ -369,7 +369,7 @@ def _trade_settings(spec: Spec, words: Sequence[str]) -> list[str]:
 
 
 def trade_of(table: SweepTable, spec: Spec) -> Trade:
-    """Return the table of that sweep as a matrix."""
+    """Return the table of the sweep of `trade_plan` as a matrix."""
     samples = table.numbers("experiment.samples")
     found = np.full(table.rows, spec.experiment.samples, float) if samples is None else samples
     key = next((key for key in table.axes if key.startswith("limits.amplitude")), None)

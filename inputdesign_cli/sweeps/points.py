@@ -1,4 +1,4 @@
-"""The points of a sweep: each is computed once, and its files stand in the directory of the sweep.
+"""The points of a sweep: each is computed once, and its files lie in the directory of the sweep.
 
     sweep.yaml           the spec with its `sweep` block: `idesign sweep` on it repeats the sweep
     sweep.json           the grid of the sweep, and the status of its points
@@ -7,7 +7,7 @@
     failures/<key>.json  why a point has none
     .lock                a lock that holds as long as its process lives; .process names that process
 
-A point is done when its directory or its failure stands: both appear in one step. `<key>` is a hash of
+A point is done when its directory or its failure exists: both appear in one step. `<key>` is a hash of
 the resolved spec, of the files that it names, of the command and of the version of this package.
 """
 
@@ -81,7 +81,7 @@ class Layout:
         return self.root / "points" / key
 
     def failure(self, key: str) -> Path:
-        """Return the file that says why a point has no result."""
+        """Return the file with the reason why a point has no result."""
         return self.root / "failures" / f"{key}.json"
 
     def read(self, key: str, spec: str | None = None) -> dict[str, Any] | None:
@@ -172,7 +172,7 @@ def opened(root: Path) -> Iterator[Layout]:
                 hint = "wait for it, or choose another directory with -o"
                 raise OutputError.because("sweep-locked", message, hint)
             replace_text(root / OWNER, str(os.getpid()))
-            # What killed processes left half-written; only the holder of the lock may remove it.
+            # Remove half-written files of killed processes; only the holder of the lock may do so.
             for path in (*root.glob(".*.partial*"), *root.glob("failures/.*.partial*")):
                 path.unlink(missing_ok=True)
             for run in root.glob("points/*"):
@@ -190,7 +190,7 @@ LOST, BROKEN = "lost", "error"
 FAILURES = frozenset({*KINDS, LOST, BROKEN})
 """The statuses of points that were tried and have no result."""
 
-# So far below the temporary folder stand the data files, so that a name such as ../tables/r.csv stays in it.
+# Data files lie this deep in the temporary folder, so that a name such as ../tables/r.csv stays in it.
 _DEPTH = ["data"] * 8
 
 _alone = threading.Lock()
@@ -198,7 +198,7 @@ _alone = threading.Lock()
 
 @dataclass(frozen=True)
 class PointJob:
-    """Holds all that a worker needs for a point."""
+    """Holds the data that a worker needs for a point."""
 
     index: int
     key: str
@@ -207,7 +207,7 @@ class PointJob:
     verb: Verb
     figures: str
     names: Mapping[str, str]  # files that the spec names -> their names in the run
-    files: dict[str, bytes] | None = None  # what the spec names, for a machine that may not see it
+    files: dict[str, bytes] | None = None  # contents of these files, for a machine without them
 
 
 PointEnd = tuple[Mapping[str, object] | None, Mapping[str, bytes] | None]
@@ -216,7 +216,7 @@ PointEnd = tuple[Mapping[str, object] | None, Mapping[str, bytes] | None]
 
 def run_point(job: PointJob) -> PointEnd:
     """Compute a point, and return the files of its run."""
-    # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
+    # A worker of a cluster may have several threads; plots and timing need a single one.
     with _alone, contextlib.ExitStack() as stack:
         if job.files is None:
             return _compute(job, job.draft)

@@ -1,4 +1,4 @@
-"""Batch sweeps: every point once, whatever happens on the way, and sweep.csv with one row a point."""
+"""Batch sweeps: every point is computed once, in spite of interruptions; sweep.csv has one row a point."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PENDING = "pending"
 MOST_ENTRIES = 4
 """Lists and matrices up to this size are written out, one column an entry."""
 
-# These come first and in this order; what else a result has follows in its own order.
+# The first columns, in this order; other entries of a result follow in their own order.
 FIRST = (
     "objective.kind",
     "objective.value",
@@ -38,7 +38,7 @@ FIRST = (
     "samples",
 )
 LAST = ("time_s", "code", "reason", "run")
-# Settings, provenance, and what is long: not what one compares from point to point.
+# Settings, provenance and long entries, which are not compared from point to point.
 _LEFT_OUT = frozenset(
     {
         "format", "title", "status", "information", "spectrum", "solver", "environment", "timing_s",
@@ -93,9 +93,9 @@ def scalars(value: object, path: str = "") -> dict[str, object]:
 
 
 DAMAGED = "damaged"
-"""Of a listed point: what is there of it does not hold, so that it is computed again."""
-# While points are computed the table is written anew: first so soon that who follows the sweep sees it, later
-# not more often than this, and for no more than a thirtieth of the time.
+"""The status of a listed point whose files are damaged, so that it is computed again."""
+# Seconds until the table is first written during a sweep, least seconds until it is written again, and least
+# ratio of this pause to the time of writing.
 _FIRST, _REST, _SHARE = 2.0, 10.0, 30.0
 
 
@@ -132,10 +132,10 @@ class SweepRun:
         figure_format: the format of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
         watch: is called with this object after every point.
-        statuses: the number of points of each status, once it has run; `files` that were written then.
-        passed: points that were done before or are now; `computed` and `failed` count in this call.
+        statuses: the number of points of each status, after the run; `files`: the files written then.
+        passed: number of points done so far, before or in this call; `computed` and `failed`: in this call.
         damaged: why points of an earlier call were computed again.
-        replaced: whether the table there was of the same file with other values in the spec.
+        replaced: whether an earlier table of the same file with other values in the spec was replaced.
     """
 
     plan: Plan
@@ -149,7 +149,7 @@ class SweepRun:
     watch: Callable[[SweepRun], None] | None = None
     statuses: dict[str, int] = field(default_factory=dict, init=False)
     files: list[Path] = field(default_factory=list, init=False)
-    # By the key of a point that was looked at: its row, None while it is computed.
+    # Rows by the keys of the points looked at so far; None while a point is computed.
     rows: dict[str, dict[str, object] | None] = field(default_factory=dict, init=False)
     passed: int = field(default=0, init=False)
     computed: int = field(default=0, init=False)
@@ -180,7 +180,7 @@ class SweepRun:
             made_from = Origin([plan.source]).seen_from(Path(os.path.realpath(directory)))
             if not self.overwrite:
                 self.replaced = plan.check_place(made_from, directory)
-            if is_page(directory / PAGE):  # it is about what the sweep was before
+            if is_page(directory / PAGE):  # it shows the earlier sweep
                 (directory / PAGE).unlink()
             replace_text(directory / points.SUMMARY, json_text(plan.summary(made_from, {})))
             text = to_yaml({**plan.base, "sweep": plan.grid.block()})
@@ -217,14 +217,14 @@ class SweepRun:
                 due = time.monotonic() + max(_REST, _SHARE * (time.monotonic() - started))
 
     def _write_table(self) -> None:
-        """Write sweep.csv as things stand, and count the points by status."""
+        """Write sweep.csv with the present results, and count the points by status."""
         grid = self.plan.grid
         rows = [(point, self._row(self.plan.key(index))) for index, point in enumerate(grid.points)]
         replace_text(self.directory / points.TABLE, table_lines([axis.key for axis in grid.axes], rows))
         self.statuses = dict(sorted(Counter(str(row["status"]) for _, row in rows).items()))
 
     def _row(self, key: str) -> dict[str, object]:
-        """Return the row of a point, from its files where it is computed or was not looked at."""
+        """Return the row of a point; it is read from the files if it is not known."""
         try:
             return self.rows.get(key) or row_of(key, self.layout.read(key))
         except DataError:
@@ -247,7 +247,7 @@ class SweepRun:
             self._report()
 
     def _known(self, index: int, key: str) -> Mapping[str, object] | None:
-        """Return the known result of a point; nothing if that is damaged, or if it is to be tried again."""
+        """Return the known result of a point; None if it is damaged or is to be computed again."""
         try:
             content = self.layout.read(key, self.plan.resolved(index, self.directory))
         except DataError as error:
@@ -274,7 +274,7 @@ class SweepRun:
             self.layout.failure(job.key).unlink(missing_ok=True)
             self.rows[job.key] = row_of(job.key, self.layout.read(job.key))
         else:
-            if not lost:  # or else it is not the fault of the point: the next call tries it again
+            if not lost:  # a lost worker is no fault of the point: the next call tries it again
                 self.layout.write_failure(job.key, failure)
             self.rows[job.key] = row_of(job.key, failure)
             self._note_failure(job.index, failure)

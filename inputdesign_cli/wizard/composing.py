@@ -31,28 +31,28 @@ from inputdesign_cli.wizard.wishes import (
 )
 
 _MOST, LEAST = 5000, 50  # samples
-_MOST_IN_LOOP = 1000  # where a record is fitted to its limits at many plants, each in its loop
+_MOST_IN_LOOP = 1000  # samples if a record is fitted to its limits at many plants, each in its loop
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
 _UNUSED = (
     "how well the plant is known is not used: a Bode plot is designed at the plant as stated, and another "
     "plant needs other powers"
 )
-# Answers that go with every other, in place of answers that are not asked for yet.
+# Stand-ins for answers that are not given yet; they are compatible with every answer.
 _MEANWHILE = {
     "plant": "heater",
     "wish": "prediction within 5 % up to 1",
     "range": "plus/minus 1",
     "noise": "standard deviation 1",
 }
-# Orders of filtered noise, and numbers of sinusoids up to half the samples, from the simplest on.
+# Orders of filtered noise and numbers of sinusoids that are tried, the simplest first.
 _ORDERS, _LINES = (20, 40), (60, 120, 240)
-_ENOUGH = 1.02  # of the bound over every spectrum
+_ENOUGH = 1.02  # ratio to the bound over every spectrum
 _FIRST = "{type: fir, order: 20}"
-_WITHOUT_MEAN = "{type: multisine, lines: 60}"  # power at frequency 0 would move an integrator without end
-_LEAST_GAP = 1e-3  # smaller gaps are written as this
-_POSITIONS = 10  # the fewest of an input that keeps them
-_PERIODS = 5  # of a record for a Bode plot
-_BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
+_WITHOUT_MEAN = "{type: multisine, lines: 60}"  # power at frequency 0 would make an integrator diverge
+_LEAST_GAP = 1e-3  # the smallest gap that is shown
+_POSITIONS = 10  # the fewest positions of an input that keeps them
+_PERIODS = 5  # periods of a record for a Bode plot
+_BEYOND = 2.0  # a bound better by this factor ignores limits, and is not shown
 
 _NAMED = re.compile(rf"\s*({'|'.join(KEYS)})\s*[=:]\s*(.*)", re.I | re.S)  # "time=2 h"
 
@@ -63,13 +63,13 @@ Solve = Callable[[Spec], Result]
 class Draft:
     """Holds a spec as facts for its template, and the files next to it."""
 
-    facts: Mapping[str, object]  # what the template knows by name
+    facts: Mapping[str, object]  # facts of the template, by name
     files: Mapping[str, bytes]
-    spectrum: str | None  # as in a spec; None if the accuracy has the lines
+    spectrum: str | None  # its text in the spec; None if the accuracy states the lines
     folder: Path
     said: Mapping[str, str]  # the answers
-    there: float  # the time that may be taken
-    notes: tuple[str, ...] = ()  # what the user must know of the plant, a sentence each
+    there: float  # the time available
+    notes: tuple[str, ...] = ()  # remarks on the plant for the user, a sentence each
     why: str = "filtered noise"  # the comment on the spectrum
 
     @property
@@ -112,10 +112,10 @@ def compose(
     """Return the spec that follows from the answers.
 
     Args:
-        stem: of the name of the spec.
-        folder: of the spec; names of files are relative to it.
-        plant: what is known of it, if that is understood already.
-        remarks: on what was said beside the answers.
+        stem: the stem of the name of the spec.
+        folder: the folder of the spec; names of files are relative to it.
+        plant: the plant of the answers, if it is understood already.
+        remarks: remarks on parts of a sentence that answer no question.
 
     Raises:
         SpecError: `bad-answer`.
@@ -165,7 +165,7 @@ def compose(
 
 
 def _made(said: str, hold: int) -> str:
-    """Return the kind of signal: positions that last determine more at two levels."""
+    """Return the kind of signal: held positions give more information at two levels."""
     kind = asking.chosen("signals", said, _TYPES)
     return "binary" if kind == "multisine" and hold > 1 else kind
 
@@ -183,7 +183,7 @@ def _reason_of_sampling(plant: PlantAnswer, there: float) -> str:
 
 
 def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int) -> list[str]:
-    """Return remarks on what is taken unasked: a controller, or none, and what keeps its values under it."""
+    """Return remarks on defaults: the controller, or none, and held values of r under a controller."""
     if control is None:
         why = ", as the actuator keeps its positions" * (hold > 1)
         remark = (
@@ -199,7 +199,7 @@ def _of_controller(plant: PlantAnswer, control: str | None, said: str, hold: int
 
 
 def _points(span: Range) -> str:
-    """Return the comment that per cents of a range are points of the actuator, not a share of its middle."""
+    """Return the comment that per cents of a range refer to the actuator, not to the middle of the range."""
     low, high = (short(span.offset + side * span.amplitude) for side in (-1, 1))
     percent = span.unit == "%" and span.offset
     middle = short(span.offset)
@@ -207,7 +207,7 @@ def _points(span: Range) -> str:
 
 
 def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> list[str]:
-    """Return a remark on a record that does not take all the time there is, since it has `most` samples."""
+    """Return a remark on a record that does not use all the time available, since it has `most` samples."""
     whole = f"{short(duration)} of the {short(there)} {plant.time_unit} that there are"
     shorter = there > most * plant.sample_time and duration < there
     return [f"the record takes {whole}: a design of more than {most} samples takes long"] * shorter
@@ -215,7 +215,7 @@ def _of_length(plant: PlantAnswer, duration: float, there: float, most: int) -> 
 
 def _duration(there: float, most: float, step: float, hold: int, *, nonparametric: bool) -> float:
     """Return the length of a record in whole positions of the input, each of `hold` samples."""
-    # Lines of a response are one over the time apart: it takes all of it.
+    # The lines of a response lie one over the duration apart, so that it uses all the time.
     most = there if nonparametric else min(there, most)
     if hold == 1:
         return most
@@ -228,19 +228,19 @@ def _duration(there: float, most: float, step: float, hold: int, *, nonparametri
 def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     """Return the draft with the simplest spectrum that is within 2 % of every other at the plant as stated.
 
-    Where none is, it gets the simplest of the best. Filtered noise has power between the lines of a
-    multisine, so that its record does not repeat. A record that repeats would be explained nearly as well by
-    a dead time one period longer. A record that leaves other dead times open is taken only where all do.
+    If there is none, the draft gets the simplest of the best. A dead time one period longer would explain a
+    periodic record nearly as well. Filtered noise has power between the lines of a multisine, so that its
+    record is not periodic. A record that leaves other dead times open is taken only if all do.
 
     Raises:
-        IdesignError: nothing can be designed; in words of the answers.
+        IdesignError: nothing can be designed; the error is in words of the answers.
     """
     if draft.spectrum is None:
         return draft
     tried: list[tuple[Draft, float, float, bool]] = []
     most = max(draft.spec().experiment.samples // 2, 1)
     lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
-    # Each in the words of a spec and of a comment.
+    # Each spectrum as text of a spec and of a comment.
     orders = _ORDERS if draft.spectrum == _FIRST else ()
     spectra = [(f"{{type: fir, order: {n}}}", f"filtered noise of order {n}") for n in orders]
     spectra += [(f"{{type: multisine, lines: {n}}}", f"{n} sinusoids") for n in lines]
@@ -283,13 +283,13 @@ class Conversation:
         remarks: Sequence[str] = (),
         unclear: Sequence[str] = (),
     ) -> None:
-        """Begin with the answers that are known, from a sentence if `brief`; the rest as of `compose`."""
+        """Begin with the answers that are known, from a sentence if `brief`; the rest is as for `compose`."""
         self.answers, self._stem, self._folder = dict(known), stem, folder
         self.remarks, self.unclear = list(remarks), list(unclear)
         self._plant: PlantAnswer | None = None
         self._brief = brief
-        self._refused: dict[str, str] = {}  # the answer on a plant that may lack a quantity
-        self.draft: Draft | None = None  # of all answers, once they are there
+        self._refused: dict[str, str] = {}  # a refused answer on the plant, which may lack a quantity
+        self.draft: Draft | None = None  # the draft of all answers, once they are given
 
     @property
     def question(self) -> Question | None:
@@ -303,7 +303,7 @@ class Conversation:
     def answer(self, text: str) -> IdesignError | None:
         """Answer the question, and return the error of an answer, whose question then comes again.
 
-        Then the answer may be the rest of one that was refused.
+        The next answer may then complete one that was refused.
 
         Raises:
             OutputError: a file next to the spec cannot be written.
@@ -326,7 +326,7 @@ class Conversation:
         before = self._refused.get(key)
         error = self._added(heard.answers or {key: text})
         if error is None or (before and self._added({key: f"{before}, {text}"}) is None) or heard.unclear:
-            return None  # what is not understood may say what the sentence lacks
+            return None  # the part that is not understood may hold the missing quantity
         meant = question_of(text)
         if heard.answers or error.diagnostics[0].key != key or named or meant in (None, key):
             return error
@@ -334,10 +334,10 @@ class Conversation:
         return type(error)([replace(one, hint=f"{hint}; {one.hint}") for one in error.diagnostics])
 
     def _in_other_words(self, text: str, key: str, asked: Question) -> IdesignError | None:
-        """Add the answer to what was not understood, which is left out, with a remark, if there is none.
+        """Add the answer to the part that was not understood, or leave that out with a remark.
 
         Args:
-            key: of the question that the answer names; otherwise of the one that is asked.
+            key: the key of the question that the answer names, or else of the one that is asked.
 
         Raises:
             SpecError: `bad-answer`, it is not understood either.
@@ -353,7 +353,7 @@ class Conversation:
         said = dict(heard.answers)
         joined = {one: ", ".join(filter(None, (earlier.get(one), text))) for one, text in said.items()}
         error = None
-        # The answer adds to what is known, or else stands in its place.
+        # The answer is joined to the earlier one, or else replaces it.
         bare = re.fullmatch(rf"\s*{AMOUNT}\s*", text, re.I) is not None  # a time may answer several questions
         for more in (said,) if key != asked.key else (joined,) if bare else (joined, said):
             self.answers, self.unclear, self._refused = dict(kept), [*heard.unclear, *parts[1:]], refused
@@ -367,7 +367,7 @@ class Conversation:
         return None if self.unclear else error
 
     def _added(self, answers: Mapping[str, str]) -> IdesignError | None:
-        """Add answers; return the error of one that cannot be used, which is taken away again."""
+        """Add answers; return the error of one that cannot be used, which is removed again."""
         self.answers |= answers
         try:
             # The plant, which may be a log to be explored, is read once only.
@@ -380,11 +380,11 @@ class Conversation:
                 draft.validate()
                 self.draft = draft
         except OutputError:
-            raise  # no answer can help
+            raise  # no other answer helps
         except IdesignError as error:
             wrong = error.diagnostics[0].key
             if (refused := self.answers.pop(wrong, None)) is None:
-                return None  # it is about what stands in for an answer
+                return None  # the error is about a stand-in
             if wrong == "plant":
                 self._plant, self._refused = None, {wrong: refused}
             return error

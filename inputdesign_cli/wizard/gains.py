@@ -1,7 +1,7 @@
 """Find gains in a sentence: a change of the input, and the change of the output that it causes.
 
-"10 % more makes it 2 degC warmer" and "2 degC for every 10 %" are both "gain 2 degC per 10 %". Two sizes
-stand side by side. The words before, between and behind them say which is the cause, and its sign.
+"10 % more makes it 2 degC warmer" and "2 degC for every 10 %" are both "gain 2 degC per 10 %". A gain
+consists of two neighbouring sizes. The words around them show which is the cause, and the sign.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _ONE_OF = re.compile(
     rf"(?:(?:extra|additional|more|further)\s+)?(?={UNIT})",
     re.I,
 )
-"""What stands before a unit without a number, as in "each extra kilowatt"."""
+"""Words before a unit without a number, as in "each extra kilowatt"."""
 _MORE_OF = re.compile(rf"(\d)\s+(extra|additional|more|further)\s+({UNIT})", re.I)
 _NAMES = re.compile(r"\b(?:(?:pressure )?reducing|lower) valve\b", re.I)
-"""Names of valves that say nothing of how they move."""
+"""Names of valves that do not describe a movement."""
 
 
 def _stem(word: str) -> str:
@@ -70,19 +70,19 @@ _LEADS = _stems(
     "when if with for open close shut raise lower increase decrease reduce drop turn step move change each "
     "every"
 )
-"""What begins a change of the input, as in "when the valve opens 10 %"."""
+"""Words that begin a change of the input, as in "when the valve opens 10 %"."""
 _LINKS = _stems("per for when if with")
 _STANDS = _stems("at around near")
 _NOUNS = {"drop", "fall", "decline", "loss", "decrease"}
 _LETS = _stems("let make cause")
-_STATES = _stems("get become")  # verbs of what is compared, as in "gets 2 degC warmer"
+_STATES = _stems("get become")  # verbs before a comparative, as in "gets 2 degC warmer"
 _ARTICLES = {"the", "a", "an", "my", "our"}
 _NEVER = _stems(
     "may might can could must should would not never no cannot allowed most within between before than until "
     "but noise scatter margin limit peak kp ti gain integrates least reach used hope last "
     "year yesterday ago earlier once"
 )
-"""What stands in no gain: what may be, what is not, and sizes of something else."""
+"""Words that no gain contains: possibility, negation, and sizes of something else."""
 _CAUSAL = _stems(
     "give make bring cause mean add let yield produce lead result raise lift lower heat cool warm increase "
     "reduce drop"
@@ -98,9 +98,9 @@ _PLAIN = _stems(
 _UNDERSTOOD = (
     _PLAIN | _RISES | _FALLS | _LESS | _GREATER | _MORE | _CLOSING | _LEADS | _LINKS | _STANDS | _ABOUT
 )
-"""Words of a gain that are understood; others are said back."""
-_MOST_BETWEEN = 5  # words between a cause that nothing marks and the verb
-# Of what a unit per time is no speed at which something rises, and words for what is a speed itself.
+"""Words of a gain that are understood; others are returned in a remark."""
+_MOST_BETWEEN = 5  # words between an unmarked cause and the verb
+# Units whose quotient by time is no ramp of an output, and words for quantities that are speeds themselves.
 _FLOWS = {"l", "ml", "t", "kg", "g", "m³", "rad", "deg", "°", "rev"}
 _SPEEDS = _stems("speed velocity flow throughput faster slower")
 _GROWING = _stems("rise grow increase climb go fill move fall drop drain sink")
@@ -108,7 +108,7 @@ _GROWING = _stems("rise grow increase climb go fill move fall drop drain sink")
 
 @dataclass(frozen=True)
 class _Token:
-    """Holds a word, a sign or a number with its unit, and where it stands."""
+    """Holds a word, a sign or a number with its unit, and its place in the text."""
 
     text: str
     begin: int
@@ -123,12 +123,12 @@ class _Token:
 
 @dataclass(frozen=True)
 class Gain:
-    """Holds where a gain stands in a text, and its one form."""
+    """Holds the place of a gain in a text, and its standard form."""
 
     begin: int
     end: int
     form: str
-    assumed: str  # the size that is taken as a change of the input though nothing says so
+    assumed: str  # the size that is taken as the change of the input without a word for it
 
 
 def in_one_form(text: str) -> str:
@@ -155,7 +155,7 @@ def gains(text: str) -> Iterator[Gain]:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Holds two sizes that follow each other, and the words around them up to the next comma or size."""
+    """Holds two neighbouring sizes, and the words around them up to the next comma or size."""
 
     text: str
     first: _Token
@@ -181,14 +181,14 @@ class _Pair:
 
     @property
     def gain(self) -> Gain | None:
-        """Return the gain that the sizes are; None if they are none."""
+        """Return the gain that the two sizes state; None if they state none."""
         signs = (one for one in (*self.before[-1:], *self.between, *self.behind[:1]) if not one.size)
         if {one.stem for one in (*self.before, *self.between)} & _NEVER or any(
             set(one.text) & set("+-±–:=") for one in signs
         ):
             return None
         if any(one.text.lower() in ("to", "from") for one in (*self.before[-1:], *self.between[-1:])):
-            return None  # where it goes is no change
+            return None  # an end point is no change
         link = next((i for i, one in enumerate(self.between) if one.stem in _LINKS), None)
         if link is not None:
             return self._effect_first(link)
@@ -248,7 +248,7 @@ class _Pair:
         """Write the gain in one form, or return None if its sign is not clear.
 
         Args:
-            does: the words on the effect from its verb on; `compared`: those behind its size.
+            does: the words on the effect from its verb on; `compared`: the words behind its size.
             moved: the words on the cause.
         """
         rate, behind = self.rate or _RATE.match(self.text, effect.end), compared[0].stem if compared else ""
@@ -292,7 +292,7 @@ def _negative(
     effect: _Token, cause: _Token, does: list[_Token], compared: list[_Token], moved: list[_Token]
 ) -> bool | None:
     """Return whether a gain is negative; None if that is not clear. The arguments are as in `_written`."""
-    # "makes the cooler warmer", "10 degC of cooling": a word that may be a name, or a sign.
+    # "makes the cooler warmer", "10 degC of cooling": the word may be a name, or give the sign.
     if any(one.stem in _FALLS | _LESS for one in (*does[1:], *compared[1:3])):
         return None
     falls = any(one.stem in _LESS for one in compared[:1]) or any(one.stem in _FALLS for one in does[:1])
@@ -307,9 +307,9 @@ def _negative(
 
 
 def _verbs(words: Sequence[_Token]) -> list[int]:
-    """Return the places of the verbs that may say what an output does.
+    """Return the places of the verbs that may describe the output.
 
-    None stands behind an article. "drop" is a verb in "lets it drop", a noun in "raises the pressure drop".
+    No such verb follows an article. "drop" is a verb in "lets it drop", a noun in "raises the pressure drop".
     """
     found = list[int]()
     for i, one in enumerate(words):
@@ -321,5 +321,5 @@ def _verbs(words: Sequence[_Token]) -> list[int]:
 
 
 def _free(words: Sequence[_Token], at: int) -> bool:
-    """Return whether no article stands before a word, as it does before "the lower valve"."""
+    """Return whether a word has no article before it, unlike "lower" in "the lower valve"."""
     return at == 0 or words[at - 1].text.lower() not in _ARTICLES

@@ -1,6 +1,6 @@
 """One grammar of answers: words, a number behind or before them, and its unit. No word may stay unread.
 
-What cannot be read is a SpecError `bad-answer`.
+Text that cannot be read is a SpecError `bad-answer`.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from inputdesign_cli.wizard import gains
 from inputdesign_cli.wizard.gains import in_one_form
 from inputdesign_cli.wizard.questions import bad_answer
 
-# Sizes beyond these would overflow, or vanish, where they are squared.
+# Squares of sizes beyond these would overflow or vanish.
 LARGEST, SMALLEST = 1e15, 1e-15
 _DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"([-+]?{_DIGITS})"
 UNREAD = "_"
-"""What stands before a number that answers no question."""
-ALONE = r"(?<![\w.])"  # the number that follows is no part of another
+"""A mark before a number that answers no question."""
+ALONE = r"(?<![\w.])"  # before a number that is no part of another
 PLUS_MINUS = r"(?:plus(?:/| or | )minus|give or take|\+/?-|±)"
 # The unit of a number: "%", "bar", "degC", "m/s"; not a word of the answers.
-_UNIT = r"(?:[^\s,;|.:+±]|[.:](?=[^\s|]))"  # a letter of it
+_UNIT = r"(?:[^\s,;|.:+±]|[.:](?=[^\s|]))"  # a character of a unit
 _NO_UNIT = "to|around|about|at|by|and|up|over|per|within|not|no|never|white|peak|may|can|must"
 UNIT = rf"(?:\s*(?!(?:{_NO_UNIT})\b)(?![\d+±.-]){_UNIT}+)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
@@ -36,13 +36,13 @@ WITHIN = (
 )
 _MINUTE, _HOUR, _SHIFT, _DAY = 60.0, 3600.0, 28800.0, 86400.0
 VAGUE = 0.2
-"""The share within which a value that is "about" right is taken to be known."""
+"""The largest relative error that is assumed of a value with "about"."""
 _TIMES = {"us": 1e-6, "microsecond": 1e-6, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3, "s": 1.0,
           "sec": 1.0, "second": 1.0, "min": _MINUTE, "minute": _MINUTE, "h": _HOUR, "hr": _HOUR,
           "hour": _HOUR, "shift": _SHIFT, "d": _DAY, "day": _DAY, "week": 7 * _DAY}  # fmt: skip
 _FREQUENCIES = {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "rad/h": 1.0 / _HOUR, "mhz": 2e-3 * math.pi,
                 "hz": 2.0 * math.pi, "khz": 2e3 * math.pi}  # fmt: skip
-# Units whose differences convert into each other, relative to the first ones. A degree is a kelvin.
+# Groups of units whose differences convert into each other, in the first unit of each: a degree is a kelvin.
 _ALIKE: tuple[dict[str, float], ...] = (
     {"k": 1.0, "kelvin": 1.0, "mk": 1e-3, "degc": 1.0, "°c": 1.0, "celsius": 1.0, "degf": 5 / 9, "°f": 5 / 9},
     {"%": 1.0, "percent": 1.0},
@@ -73,7 +73,7 @@ LATE = (
     r"dead time|(?:transport |pure )?delay(?:ed by)?"
     r"|(?:reacts?|responds?|(?:begins?|starts?) to [a-z]+)(?: only)? after"
 )
-"""What is said of a dead time."""
+"""Words for a dead time."""
 _TIMED = rf"(?:time constant|lag|{LATE})"
 _SOME = rf"(?:only\s+)?\ba\s+few\s+(?P<unit>{UNIT_OF_TIME})"
 _FEW = re.compile(
@@ -87,7 +87,7 @@ _SETTLES = re.compile(
     rf"(?P<of>{OF})\s*(?P<number>{_DIGITS})(?:\s*(?:to|-|–)\s*(?P<high>{_DIGITS}))?\s*(?P<unit>{UNIT_OF_TIME})",
     re.I,
 )
-# Time constants of a lag until 98 % of the way, and from 10 to 90 %.
+# Numbers of time constants in which a lag settles within 2 %, and rises from 10 to 90 %.
 _SETTLED, _RISEN = 4.0, 2.2
 _OR_SO = re.compile(rf"({_DIGITS}\s*{UNIT_OF_TIME})\s+or\s+so\b", re.I)
 _SYMBOLS = {
@@ -158,7 +158,7 @@ _ONE_TIME = re.compile(
     r"(?P<behind>[^\d%]*)",
     re.I,
 )
-# What the other words of a clause say of its only time, and the form in which it is read.
+# Patterns of a clause around its only time (#), and the words under which that time is read.
 _TRIAL = r"\b(?:test|trial|experiment)s?\b"
 _TIMES_SAID = (
     (r"\bsettl|\bsteady\b|\bfully\b|\bfinal\b", "settles in"),
@@ -174,7 +174,7 @@ _TIMES_SAID = (
         "time constant",
     ),
 )
-# Words of such a clause that are understood; others are said back.
+# Words of such a clause that are understood; others are returned in a remark.
 _OF_TIMES = re.compile(
     rf"#|{ABOUT}|(?:settl|react|respo|answer|begin|start|first|test|trial|experiment|spend|reach|need|last|take)\w*$"
     r"|(?:steady|fully|final|value|state|after|later|only|cannot|more|than|up|longer|most|time|half|long)$",
@@ -195,10 +195,10 @@ _STANDING = re.compile(
 )
 _OUTPUT = r"\b(?:the\s+)?(?:level|temp(?:erature)?|concentration|output|sensor)\s+"
 OUTPUT_RESTS = re.compile(rf"{_OUTPUT}(?:(?:{RESTING}|kept|held)\s+)+(?:at|around|near)\s+{_SIZE_OF}", re.I)
-"""Where an output rests, as in "the level is kept at 60 %"."""
+"""The level of an output at rest, as in "the level is kept at 60 %"."""
 _ENDS_OF = rf"{NUMBER}\s*(?:{gains.UNIT})?\s*(?:to|-|–|\.\.|{PLUS_MINUS})\s*{NUMBER}"
 _OUTPUT_RANGE = re.compile(rf"{_OUTPUT}(?:(?:may|can|could|moves?|goes|go|from|is)\s+)*{_ENDS_OF}", re.I)
-# What is said of an input, and its form, as "12 bits up to 100 %" for "12 bits from 0 to 100 %".
+# Patterns of inputs and their standard forms, as "12 bits up to 100 %" for "12 bits from 0 to 100 %".
 _OF_INPUTS = (
     (rf"({_SIZE_OF})\s+up,?\s+(?:and\s+|or\s+)?\1\s+down", r"\1 either way"),
     (rf"\b(up (?:and|or) down) by ({_SIZE_OF})", r"by \2 \1"),
@@ -240,13 +240,13 @@ _BASE = (
     rf"(?:\s+of\s+(?:the\s+)?{DRIVE})?(?P<less>\s+less\b)?"
 )
 UP = "rises|grows|increases|climbs|goes up|warms|heats|raises|lifts"
-"""What an output does that moves upwards."""
+"""Verbs of an output that moves upwards."""
 _OF_SPEED = re.compile(
     rf"\b(?P<what>(?:angle|position|speed|velocity|flow)\s+)?(?:{UP}|changes)"
     rf"(?:\s+(?:by|with))?\s+(?P<size>(?:{ABOUT}\s*)?-?{_DIGITS}\s*(?P<unit>[^\s\d,;|/]+)/[a-z]+)(?=\s+per\b|\s*/)",
     re.I,
 )
-# What stands behind the number of each kind.
+# Patterns behind the number of each kind of quantity.
 _BEHIND = {
     "time": rf"(?:\s*{_TIME}|(?![\d.]|\s*(?:[%°'’″′½¼¾]|[a-z]+\s*/|[a-z]+ per\b"
     r"|(?:[mk]?hz|ks|samples?|rad|[nµμ]s|m)\b)))",
@@ -258,14 +258,14 @@ _BEHIND = {
     "any": rf"(?P<size>{UNIT})",
     "none": "",
 }
-# Words without content: they join others, or name what everything here is about.
+# Words without content: they join others, or name the subject of every sentence here.
 _FILLING = (
     "a an the of and with in at each all about is for by i want we it its this that there has have am are "
     "be been to my our me us on as so then please need needs would like should must may can will do does "
     "measured also tune design level temperature speed pressure flow position concentration "
     "sensor measurement take takes experiment"
 )
-# What no linear model has: a design for one says nothing of it.
+# Properties that no linear model has: a design for one ignores them.
 _NONLINEAR = (
     r"friction|stiction|stick[- ]slip|sticks?|sticky|backlash|hysteresis|dead[- ]?(?:band|zone)|saturat\w*"
     r"|non-?linear\w*"
@@ -281,7 +281,7 @@ BEYOND = re.compile(
     rf"(?:\s+(?:a (?:bit|little)|sometimes|at low speeds?|of {_DIGITS}[^,;]*))*)|(?P<leak>{_LEAKS})\b)",
     re.I,
 )
-"""What is said of the plant and no model of the wizard has: it is said back."""
+"""Properties of a plant that no model of the wizard has; a remark names them."""
 
 
 def orders(words: str, kind: str, within: str = WITHIN) -> tuple[str, str]:
@@ -296,18 +296,18 @@ def orders(words: str, kind: str, within: str = WITHIN) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Holds a value in units of the spec, and how it was said."""
+    """Holds a value in units of the spec, and details of its statement."""
 
     value: float
     share: float | None = None  # "within 30 %"
     about: bool = False
-    itself: bool = False  # the share is of this value alone, as that of a tolerance with a unit
-    size: str = ""  # the unit of what is measured
-    base: str = ""  # what a gain is per
+    itself: bool = False  # the share holds for this value alone, as does a tolerance with a unit
+    size: str = ""  # the unit of the quantity
+    base: str = ""  # the unit of the input of a gain
 
 
 class Phrase:
-    """Reads an answer piece by piece; `finish` refuses what nobody read.
+    """Reads an answer piece by piece; `finish` refuses a part that was not read.
 
     A method returns None if the text has no piece of its kind. Times become multiples of `clock` seconds,
     and sizes in other units become sizes in `unit`, where that is known.
@@ -348,7 +348,7 @@ class Phrase:
         if said.get("many"):
             value /= needed(float(said["many"]), self.key, "what the gain is per")
         share = float(said["share"]) / 100.0 if said["share"] else None
-        if said["share"] and not said.get("per_cent", "%"):  # of the same unit as the number
+        if said["share"] and not said.get("per_cent", "%"):  # in the unit of the number
             apart = self._scaled(float(said["share"]), said.get("share_unit") or said.get("unit", ""), kind)
             share = apart / max(abs(scaled), SMALLEST)
         about = re.search(ABOUT, said["words"], re.I) is not None
@@ -361,9 +361,9 @@ class Phrase:
         """Return the number behind these words, converted to the unit of the spec.
 
         Args:
-            kind: of the unit: time, frequency, rate, slope, gain, any (a size) or none.
+            kind: the kind of unit: time, frequency, rate, slope, gain, any (a size) or none.
             named: whether words without a number are refused.
-            unit: of a size in the spec, where it is another than that of the phrase.
+            unit: the unit of a size in the spec, if it is not that of the phrase.
         """
         found = self.quantity(words, kind, "(?P<share>)", unit)
         if found is None and named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
@@ -397,14 +397,14 @@ class Phrase:
         return needed(self._scaled(float(found[1]), unit, "time"), self.key, "the time")
 
     def finish(self, also: str = "") -> None:
-        """Refuse what was not read, except words without content and `also` (words between blanks)."""
+        """Refuse words that were not read, except words without content and `also` (separated by blanks)."""
         known = also.lower().split()
         for piece in BEYOND.sub(" ", self._left).split("|"):
             if any(word not in known for word in unread(piece)):
                 raise bad_answer(self.key, f'"{piece.strip(" ,;.:")}" is not understood')
 
     def sized(self, value: float, unit: str, wanted: str | None = None) -> float:
-        """Return a difference in units of the spec; where that has none, any unit is."""
+        """Return a difference in units of the spec; unchanged if either unit is not stated."""
         wanted = self._unit if wanted is None else wanted
         ours, theirs = (one.strip("()").lower() for one in (wanted, unit))
         group, other = (next((group for group in _ALIKE if one in group), None) for one in (ours, theirs))
@@ -424,7 +424,7 @@ class Phrase:
 
 
 def check_numbers(text: str, key: str) -> None:
-    """Refuse numbers that cannot be meant, that can be read in two ways, or that are shares of a signal."""
+    """Refuse numbers that are implausible, that can be read in two ways, or that are shares of a signal."""
     sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
     strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
     if strange is not None:
@@ -479,7 +479,7 @@ def in_figures(text: str) -> str:
 
 
 def taken_as(text: str) -> list[str]:
-    """Return how "a few minutes", "settles in 2 s", "noise +- 2" and "9 V gives 18 K" in a text are taken."""
+    """Return how "a few minutes", "settles in 2 s", "noise +- 2" and "9 V gives 18 K" are understood."""
     text, said = _counted(text), []
     for piece in _PIECE.finditer(text):
         form = _of_time(piece)
@@ -511,7 +511,7 @@ def _few(found: re.Match[str]) -> str:
 
 
 def _standing(found: re.Match[str]) -> str:
-    """Return an operating point that stands alone, unless its name is known: "feeder, at 45 %"."""
+    """Return an operating point apart from its name, "feeder, at 45 %", unless that is a known word."""
     if re.fullmatch(rf"{RESTING}|held|kept|point|which|that|it|i|we|and", found["name"], re.I):
         return found[0]
     if re.fullmatch(DRIVE, found["name"], re.I):
@@ -529,7 +529,7 @@ def _counted(text: str) -> str:
 
 
 def of_outputs(text: str) -> list[str]:
-    """Return what a text says of where an output rests, which is no operating point of the input."""
+    """Return the parts of a text on the level of an output at rest: it is no operating point of the input."""
     return [found[0].strip() for found in OUTPUT_RESTS.finditer(text)]
 
 
@@ -540,7 +540,7 @@ def _hours(found: re.Match[str]) -> str:
 
 
 def _of_time(piece: re.Match[str]) -> str:
-    """Return a clause whose only time is a settling time, a dead time or that of the experiment."""
+    """Return a clause with its only time named: as settling time, dead time, lag or time available."""
     found = _ONE_TIME.fullmatch(piece[0])
     if found is None or _TIMES_READ.search(piece[0]):
         return piece[0]
@@ -565,7 +565,7 @@ def _vague(text: str) -> bool:
 
 
 def _time_constant(found: re.Match[str], *, said: bool = False) -> str:
-    """Return the time constant of a settling time, in the words of an answer, or as it is `said` back."""
+    """Return the time constant of a settling time, in the form of an answer, or of a remark if `said`."""
     constants = _SETTLED if found["settled"] else _RISEN if found["risen"] else 1.0
     low, high = float(found["number"]), float(found["high"] or found["number"])
     if not 0.0 < low < high:
@@ -576,7 +576,7 @@ def _time_constant(found: re.Match[str], *, said: bool = False) -> str:
 
 
 def _middle(found: re.Match[str]) -> str:
-    """Return what is said to lie between two ends by their middle."""
+    """Return a quantity between two ends by their middle and its share."""
     one, other = float(found["low"]), float(found["high"])
     if not 0.0 < one < other:
         return found[0]
@@ -595,7 +595,7 @@ def unread(text: str) -> list[str]:
 
 
 def beyond_models(text: str) -> list[str]:
-    """Return remarks on what no model of the wizard has: friction and the like, and leaks."""
+    """Return remarks on properties that no model of the wizard has: friction and the like, and leaks."""
     said = list(BEYOND.finditer(text))
     rough, leaks = (
         ", ".join(dict.fromkeys(one[group].lower() for one in said if one[group]))

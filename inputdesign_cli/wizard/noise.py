@@ -1,4 +1,4 @@
-"""The noise of a spec: as it is stated, as data at rest show it, or as a log has it."""
+"""The noise of a spec: as it is stated, estimated from data at rest, or taken from the model of a log."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _LASTING = (
     r"|slow(?:ly)?"
 )
 _SLOWLY = rf"\b(?:{_CHANGES} )?slow(?:ly)?\b(?: {_CHANGES})?"
-_FADING = 0.2  # of the time constant of the plant: how long noise lasts of which nothing is said
-_SAME_STEP = 0.01  # of rows and samples
+_FADING = 0.2  # assumed correlation time of noise, as a share of the time constant of the plant
+_SAME_STEP = 0.01  # relative difference at which rows and samples count as equally far apart
 _DEVIATION = "(?:(?:noise )?(?:standard deviation|deviation|std|rms|sigma)|noise)"
-_WHITE = 3.0  # correlations above this number of standard deviations colour the noise
+_WHITE = 3.0  # a correlation of more than this number of standard deviations is not that of white noise
 _FEWEST = 20  # rows of data at rest
-_STRONGEST = 0.98  # correlation from one sample to the next
+_STRONGEST = 0.98  # largest correlation from one sample to the next
 _SAID = "the output drifts, as you said"
-_STEADY = 1e-3  # D(1) below it is that of an integrator
-_LONG = 100_000  # samples after which no pole of a log remembers anything
+_STEADY = 1e-3  # a D(1) below it counts as an integrator
+_LONG = 100_000  # samples after which the impulse response of a log's noise has decayed
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,19 @@ class _Level:
 
     deviation: float
     why: str
-    fades: float | None = None  # seconds of its correlation, as stated: 0 for white noise
-    pole: float = 0.0  # as measured
-    guessed: bool = False  # it has a colour that nobody knows
-    rounded: bool = False  # it is the least that noise can be
+    fades: float | None = None  # its correlation time as stated, in time_unit; 0 for white noise
+    pole: float = 0.0  # the pole that data at rest show
+    guessed: bool = False  # its colour is not known
+    rounded: bool = False  # the deviation is a lower bound, due to rounding
     drifts: bool = False
-    slow: bool = False  # it fades as slowly as the plant answers
+    slow: bool = False  # its correlation time is the time constant of the plant
 
 
 def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list[str]:
     """Return the lines of `noise` from the answers, and from the model of a log where they leave it open.
 
-    Of noise whose colour nobody knows a colour is taken, which costs a parameter. Noise that lasts has more
-    power where plants answer than white noise of its size, so that white noise would promise too much.
+    Noise of unknown colour gets a pole, which costs a parameter. Correlated noise has more power at the
+    frequencies of a plant than white noise of its size, so that white noise would promise too much.
 
     Raises:
         SpecError: `bad-answer`.
@@ -93,17 +93,17 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
 
 
 def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: bool, drifts: bool) -> list[str]:
-    """Return the spec's lines of noise with the spectrum seen in a log, scaled to the stated size.
+    """Return the spec's lines of noise with the spectrum of a log's model, scaled to the stated size.
 
-    A resolution is the least that noise can be, and the log may show more. Noise that drifts in the log and
-    is said not to is white; noise that is said to drift beyond the log gets an integrator.
+    A resolution is a lower bound on noise, and the log may show more. If the log drifts but the answer denies
+    it, the noise is white; if only the answer has a drift, the noise gets an integrator.
     """
     noise, plant = explored.noise, explored.plant
     assert plant.kind != "regression"
     A = _per_output(plant.A if plant.kind == "polynomial" else (1.0,), plant.outputs)
     variance = noise.covariance(len(A))
     powers = np.diag(variance)
-    if not moves:  # relative to the white e of each output
+    if not moves:  # the noise power over that of e, for each output
         impulse = np.eye(1, _LONG)[0]
         rows = zip(_per_output(noise.C, len(A)), _per_output(noise.D, len(A)), A, strict=True)
         gains = [np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows]
@@ -127,7 +127,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
 
 
 def _moves(noise: Noise) -> bool:
-    """Return whether noise drifts, or is correlated so long that it looks like drift in a record."""
+    """Return whether noise drifts, or has so long a correlation time that it resembles drift."""
     longest = min(abs(float(np.sum(row))) for row in _per_output(noise.D, 1))
     return bool(np.any(noise.drift)) or longest < _STEADY
 
@@ -206,8 +206,8 @@ def _resolution(said: Phrase) -> float | None:
 def _at_rest(path: Path, plant: PlantAnswer) -> _Level:
     """Return the level of the noise in the column y of a file in which u, if it is there, rests.
 
-    Noise with one pole is assumed where rows are not as far apart as samples. Its correlation then fades by
-    the same factor in the same time.
+    If rows are not as far apart as samples, noise with one pole is assumed. Its correlation decays by the
+    same factor in the same time.
     """
     from inputdesign_cli.questions.building.tables import read_samples
     from inputdesign_cli.records import read_sheet

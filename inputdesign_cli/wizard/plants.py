@@ -1,6 +1,6 @@
 """The plant of an answer: stated, estimated from a step response, or explored in a log.
 
-What cannot be used is a SpecError `bad-answer`, or a DataError about a file.
+An answer that cannot be used is a SpecError `bad-answer`, or a DataError about a file.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ RISES = (
     rf"(?:{_WHAT} )?(?:{UP}"
     rf"|(?:reacts|responds|changes)(?= (?:by|with)\b|\s*{ABOUT}))(?: {_WHAT})?(?: by| with)?"
 )
-# Names of what is said of a plant -> words, and the kind of unit. What rises in a time integrates.
+# Quantities of a plant -> their words, and the kind of their unit. A rise per time means an integrator.
 QUANTITIES = {
     "rise": (RISES, "speed"),
     "slope": (r"integrat\w+(?: (?:with|gain|slope|by))*", "slope"),
@@ -55,51 +55,51 @@ NO_DELAY = (
 )
 COLUMN = r"(?!(?:Kp|T[id]|M_?s|tau_c)\b)[a-z]\w*\s*=\s*(?:[^,;.|]|\.(?=\S))+"
 """A column of a file with its name, as in "u=valve", and no setting of a controller."""
-_SLOWER = 4.0  # times the dead time: how fast a plant that integrates is held
-_SYSTEM = {"num", "den", "delay", "dt"}  # of python-control
-_HARDLY = 0.5  # of a sample: as good as no dead time in a log
-_NEARLY = 2.0  # points of fit that a model may lose which rules of tuning know
-_LEAST_ROWS = 10  # of a step response
-_LONGER = 2.0  # a time constant of more records than this is none
-_NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
+_SLOWER = 4.0  # closed-loop time constant over the dead time, for the controller of an integrator
+_SYSTEM = {"num", "den", "delay", "dt"}  # names as in python-control
+_UNDELAYED = 0.5  # samples: a shorter dead time of a log counts as none
+_FIT_LOSS = 2.0  # points of fit that a model may lose if rules of tuning apply to it
+_LEAST_ROWS = 10  # rows of a step response
+_LONGEST_LAG = 2.0  # times the step response: a longer time constant means an integrator
+_NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # the block in a model.yaml
 _REJECTED = (
     "tests reject a gain, a time constant and a dead time ({}): the plant has another structure, or its "
     'level drifts, and neither the values nor their errors are to be trusted; "log {}" explores other '
     "structures"
 )
 _AS_SAID = "plant:  # as you said"
-# What plants often have and words leave out.
+# Parts of plants that descriptions often omit.
 _UNNAMED = {"dead_time": "dead time", "time_constant": "lag of the actuator"}
 
 
 @dataclass(frozen=True)
 class PlantAnswer:
-    """Holds what is known of the plant."""
+    """Holds the plant of an answer."""
 
-    lines: tuple[str, ...]  # of the spec, with comments
+    lines: tuple[str, ...]  # lines of the spec, with comments
     slow: float  # its slowest time constant, in time_unit
-    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of the parameters
-    values: Mapping[str, float] = field(default_factory=dict)  # of the parameters
-    controller: str | None = None  # of its usual operation, as YAML
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # by parameter
+    values: Mapping[str, float] = field(default_factory=dict)  # by parameter
+    controller: str | None = None  # the controller in its usual operation, as YAML
     files: Mapping[str, bytes] = field(default_factory=dict)  # to be written next to the spec, by name
     covariance: str | None = None  # the name of the file with the covariance of the estimate
-    sampling: float | None = None  # time_unit between samples, where that is known already
-    why_sampling: str = "as the plant is sampled"  # the reason for these
-    tunable: bool = False  # whether rules of tuning know it
+    sampling: float | None = None  # the sample time in time_unit, if it is known already
+    why_sampling: str = "as the plant is sampled"  # the reason for it
+    tunable: bool = False  # whether rules of tuning apply to it
     integrates: bool = False  # it has a pole at 0
-    undelayed: bool = False  # one lag with hardly a dead time, whose loop these would make as fast as can be
+    undelayed: bool = False  # one lag with hardly a dead time: such rules would give an excessive gain
     channels: int = 1  # the larger number of its inputs and outputs
-    explored: Spec | None = None  # the model of a log, which has its noise
+    explored: Spec | None = None  # the model of a log, with its noise
     called: Mapping[str, str] = field(default_factory=dict)  # names of channels in a log
     source: str = ""  # the name of the data file
-    against: tuple[str, ...] = ()  # what the data say against the model, a sentence each
-    heard: tuple[str, ...] = ()  # how the answer was taken, a sentence each
-    time_unit: str = "s"  # of a record; all times of the spec are in it
-    units: tuple[str, str] = ("", "")  # of output and input, as the gain has them
+    against: tuple[str, ...] = ()  # evidence of the data against the model, a sentence each
+    heard: tuple[str, ...] = ()  # remarks on how the answer was understood, a sentence each
+    time_unit: str = "s"  # the unit of all times in the spec, from a record
+    units: tuple[str, str] = ("", "")  # units of output and input, as in the gain
 
     @property
     def clock(self) -> float:
-        """Return the seconds in the unit of time."""
+        """Return the unit of time in seconds."""
         return SECONDS[self.time_unit]
 
     @property
@@ -109,7 +109,7 @@ class PlantAnswer:
 
     @property
     def doubts(self) -> list[str]:
-        """Return what the data say against the model, a sentence each."""
+        """Return the evidence of the data against the model, a sentence each."""
         return [f"against the model of {self.source}: {one}" for one in self.against]
 
     def sampled_for(self, wish: str) -> PlantAnswer:
@@ -186,7 +186,7 @@ def plant_of_words(text: str, head: str = _AS_SAID) -> PlantAnswer:
         raise bad_answer("plant", "the dead time is negative")
     vague = [name for name in values if name not in own and (whole or found[name].about)]
     if part is None and list(own) == list(values)[-1:] and not vague and not found[list(values)[-1]].itself:
-        part, own = own.popitem()[1], {}  # a share at the end is that of all quantities
+        part, own = own.popitem()[1], {}  # a share at the end holds for all quantities
     shares = own if part is None else dict.fromkeys(values, part) | own
     if not all(0.0 < share < 0.9 for share in shares.values()):
         raise bad_answer("plant", "within must be more than 0 and less than 90 %")
@@ -218,7 +218,7 @@ def plant_of_words(text: str, head: str = _AS_SAID) -> PlantAnswer:
 
 
 def _integrating(plant: PlantAnswer) -> PlantAnswer:
-    """Return an integrator behind a lag and a dead time, held by a slow PI of Skogestad's rule meanwhile."""
+    """Return an integrator behind a lag and a dead time, under a slow PI controller by Skogestad's rule."""
     values = plant.values
     late = values.get("dead_time", 0.0) + values.get("time_constant", 0.0)
     if not late:
@@ -282,7 +282,7 @@ def system_of(path: Path) -> PlantAnswer:
         raise bad_answer("plant", f"the system of {path.name} is sampled (dt), and is to be in s")
     num, den = (np.trim_zeros(part, "f") or part for part in parts)
     late = found.get("delay", 0.0)
-    with in_their_words({}, "plant"):  # it says what no plant can have
+    with in_their_words({}, "plant"):  # the file describes no possible plant
         continuous = {"numerator": num, "denominator": den, "delay": late}
         Spec.from_dict({"plant": {"continuous": continuous, "sample": "zoh"}}, design=False)
     while num[-1] == den[-1] == 0.0:  # a zero at zero that cancels a pole
@@ -311,7 +311,7 @@ def system_of(path: Path) -> PlantAnswer:
 
 
 def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dict[str, float], list[str]]:
-    """Name every coefficient that is to be estimated; a pole at zero is known, and so is the first of den."""
+    """Name every coefficient that is to be estimated; a pole at zero and the first entry of den are known."""
     values: dict[str, float] = {}
     rows = []
     for letter, part in (("b", num), ("a", den)):
@@ -369,7 +369,7 @@ def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     model, failed = identified.files["model.yaml"], identified.result["identification"]["failed"]
     values = dict(identified.result["identification"]["theta"])
     lasts = float(t[-1] - t[begun])
-    if values["time_constant"] > _LONGER * lasts:
+    if values["time_constant"] > _LONGEST_LAG * lasts:
         raise bad_answer(
             "plant",
             f"the output in {path.name} still goes on as an integrator would, {short(lasts)} {unit} after "
@@ -393,7 +393,7 @@ def _stepped(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
 def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     """Explore a log as `idesign explore` does; the model is a file next to the spec.
 
-    A gain, a lag and a dead time, which rules of tuning know, are taken where they do nearly as well.
+    A gain, a lag and a dead time, to which rules of tuning apply, are taken if they fit nearly as well.
     """
     from inputdesign_cli import questions
     from inputdesign_cli.plant.loop import INTEGRATES
@@ -406,25 +406,25 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
     assert spec.plant.kind != "regression"
     channels, heard = max(spec.plant.inputs, spec.plant.outputs), ""
     if channels == 1 and process is None:
-        with suppress(IdesignError):  # not every log determines all three
+        with suppress(IdesignError):  # some logs do not determine all three
             simple = questions.explore([path], named, structure="fopdt")
             judged = (one.results.result["validation"] for one in (simple, found))
             fits = [one["simulation_fit_percent"] or 0.0 for one in judged]  # none: it diverges
-            if not simple.reasons and fits[0] >= fits[1] - _NEARLY:
+            if not simple.reasons and fits[0] >= fits[1] - _FIT_LOSS:
                 found, (spec, process) = simple, _read(simple, name)
                 heard = f"another structure fits {path.name} a little better than gain, lag and dead time do"
     text = found.results.files["model.yaml"].decode()
     lag = None if process is None else process.time_constant
-    late = 0.0 if process is None else process.dead_time - 0.5 * spec.sample_time  # that is the converter's
+    late = 0.0 if process is None else process.dead_time - 0.5 * spec.sample_time  # without the hold
     return PlantAnswer(
         (f"include: [{name}]  # the plant, explored in {path.name}",),
         lag or 20.0 * spec.sample_time,
-        files={name: _NOISE_BLOCK.sub("", text).encode()},  # that stands in the spec
+        files={name: _NOISE_BLOCK.sub("", text).encode()},  # the noise is written into the spec
         covariance=name if channels == 1 else None,
         sampling=spec.sample_time,
         tunable=process is not None,
         integrates=bool(np.any(np.abs(build_model(spec).plant_points) < INTEGRATES)),
-        undelayed=lag is not None and late <= _HARDLY * spec.sample_time,
+        undelayed=lag is not None and late <= _UNDELAYED * spec.sample_time,
         channels=channels,
         explored=spec,
         called={channel: header for channel, header in columns.items() if channel != "time"},
@@ -436,7 +436,7 @@ def _explored(path: Path, stem: str, columns: Mapping[str, str]) -> PlantAnswer:
 
 
 def _read(found: Exploration, name: str) -> tuple[Spec, Process | None]:
-    """Return the model of an exploration as a spec, and its plant if rules of tuning know it."""
+    """Return the model of an exploration as a spec, and its plant if rules of tuning apply to it."""
     from inputdesign_cli.questions.building.controllers import process_of
 
     spec = parse_spec(found.results.files["model.yaml"].decode(), name, design=False)

@@ -20,13 +20,13 @@ from inputdesign_cli.specification.yaml.reader import read
 
 @dataclass(frozen=True)
 class Question:
-    """Holds a question, the answers that it allows, its default, and what the answer sets."""
+    """Holds a question, the answers that it allows, its default, and the sections of a spec that it sets."""
 
     key: str
     asks: str
     allowed: str
     default: str | None = None
-    unsaid: str = ""  # what a default means that is taken without asking; it is asked beyond a sentence, too
+    unsaid: str = ""  # the meaning of a default that is taken unasked; it is asked after a sentence, too
     pieces: list[str | list[str]] = field(default_factory=list)  # see questions.yaml
     sets: tuple[str, ...] = ()  # sections of the spec
 
@@ -64,7 +64,7 @@ def in_other_words(part: str) -> Question:
 
 
 def known_from(answers: Mapping[str, str]) -> dict[str, str]:
-    """Return the answers that the answer `plant` gives: a log shows the noise, and whether it drifts."""
+    """Return the answers that the answer `plant` implies: a log shows the noise, and whether it drifts."""
     explored = answers.get("plant", "").strip().lower().startswith("log ")
     return {"noise": AS_LOGGED[0], "drift": "not known"} if explored else {}
 
@@ -76,7 +76,7 @@ def needed_of(answers: Mapping[str, str]) -> list[str]:
 
 
 def taken_for_granted(answers: Mapping[str, str]) -> list[str]:
-    """Return a remark on the questions that a sentence leaves open and nobody was asked."""
+    """Return a remark on the questions that a sentence leaves open and that were not asked."""
     unsaid = [one.unsaid for one in QUESTIONS if one.unsaid and one.key not in answers]
     return [f"taken for granted: {', '.join(unsaid)}"] if unsaid else []
 
@@ -96,7 +96,7 @@ def complete(answers: Mapping[str, str]) -> dict[str, str]:
 
 
 def bad_answer(key: str, why: str) -> SpecError:
-    """Return the error that names the question and what is allowed."""
+    """Return the error that names the question and the allowed answers."""
     asked = question(key)
     return SpecError.because("bad-answer", f"{asked.asks} ({key}): {why}", f"allowed: {asked.allowed}", key)
 
@@ -105,7 +105,7 @@ Choice = TypeVar("Choice")
 
 
 def chosen(key: str, text: str, choices: Mapping[str, Choice]) -> Choice:
-    """Return what an answer chooses by its words; a SpecError `bad-answer` for other words."""
+    """Return the choice of an answer by its words; a SpecError `bad-answer` for other words."""
     if text.lower() not in choices:
         raise bad_answer(key, f'"{text}" is none of these')
     return choices[text.lower()]
@@ -123,7 +123,7 @@ def file_of(key: str, path: Path) -> Path:
 class Answers:
     """Holds the answers by question, and the places of answers in a file (else of its beginning).
 
-    `remarks` are on what a sentence says beside its answers, `unclear` its parts that are not understood.
+    `remarks` are on parts of a sentence that answer no question, `unclear` its parts that are not understood.
     """
 
     texts: dict[str, str] = field(default_factory=dict)
@@ -133,7 +133,7 @@ class Answers:
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """Give errors inside the place of the answer that they are about."""
+        """Add to errors inside the place of the answer that they are about."""
         try:
             yield
         except IdesignError as error:
@@ -192,7 +192,7 @@ def in_their_words(said: Mapping[str, str], key: str = "") -> Iterator[None]:
 
     Args:
         said: the answers.
-        key: of the question that an error is about where it has no key.
+        key: the question of an error without a key.
     """
     try:
         yield
@@ -205,7 +205,7 @@ def in_their_words(said: Mapping[str, str], key: str = "") -> Iterator[None]:
 def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     if one.code == "bad-answer" and one.key in KEYS:
         return one
-    # In open loop the only controller is that of the wish, and none holds a plant that integrates.
+    # In open loop the only controller is that of the wish, and none stabilises a plant that integrates.
     held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
     by_code: dict[str, str] = _FAULTS["codes"] | ({} if held else _FAULTS["open"])
     found = (name for path, name in _SECTIONS.items() if f"{one.key}.".startswith(f"{path}."))
@@ -213,7 +213,7 @@ def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     asked = question(blamed or key or "wish")
     begins = f"{asked.asks} ({asked.key}): "
     if one.message.startswith(begins):
-        return one  # by a block inside
+        return one  # an inner block has reworded it
     place = one.location if one.location and not one.location.file.startswith("<") else None
     remedy = _FAULTS["hints"].get(one.code, "")
     if one.code == "admissible-not-positive":
@@ -223,7 +223,7 @@ def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
         remedy = f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
     elif asked.key == "plant" and (named := _COLUMNS.search(one.hint)):
         remedy = f"write behind the file: columns {named[1]}"
-    elif one.code == "infinite-information" and asked.key != "loop":  # a controller holds it already
+    elif one.code == "infinite-information" and asked.key != "loop":  # a controller is there already
         remedy = ""
     hint = "; ".join(filter(None, (remedy, f"allowed: {asked.allowed}")))
     message = begins + _in_words(_FAULTS["messages"].get(one.code, one.message))

@@ -1,6 +1,6 @@
 """A whole wish in a sentence, taken apart into pieces that answer questions.
 
-What is left over is asked for in other words where it may matter, and said back otherwise.
+Other parts are asked for in other words if they may matter, and else returned in a remark.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _TURNS = (
 """The questions that a sentence may answer, in the order in which their pieces are taken out of it."""
 _QUANTITIES = {name: f"<{kind}: {words}>" for name, (words, kind) in plants.QUANTITIES.items()}
 _PLANT = "|".join(_QUANTITIES.values())
-# <NUMBER> and the like in a pattern of a piece.
+# Values of <NUMBER> and the like in a pattern of a piece.
 _MACROS = {**vars(grammar), **vars(plants), **vars(wishes), "PLANT": _PLANT}
 _MACRO = re.compile(r"<([A-Z_]+|[a-z]+: [^<>]*)>")
 _GROUP = re.compile(r"(?<!\\)\((?!\?)|\(\?P<\w+>")
 _ENDS = re.compile(r"(?<!\bca)(?<!\bapprox)[,;:.](?:\s+|$)|\s+and\s+(?=(?:i|we|the)\b)", re.I)
-# What is left is asked for again if it has a number or a negation, or words whose number is missing.
+# A rest is asked for again if it has a number or a negation, or words whose number is missing.
 _MATTERS = re.compile(
     r"\d|^%|^one\b|n't\b|\b(?:two|three|four|five|six|eight|ten|twelve|twenty|thirty|"
     r"not?|never|without|except|unless|neither|nor|but|minus|negative|opposite|revers\w*|"
@@ -51,14 +51,14 @@ _PLAIN = (
     "am allowed move moves moved voltage valve heater pump where started begins began start run runs running "
     "we just only like which that when after happens sits stands use keep has some per almost"
 )
-# Words of a clause that says how long the experiment may take.
+# Words of a clause on the time available for the experiment.
 _OF_TIME = re.compile(
     r"(?:experiment|test|trial|record)\w*|time|available|free|plant|have|got|i've|we've|i'd|get|gets|spend|use|give|"
     r"most|least|max(?:imum)?|long(?:er|est)?|no|not|more|than|up|less|fine|okay?|enough|total|altogether|all|within|"
     r"during|over|last|run|runs|there's|duration|only|just|roughly|but|loop|pid?|\W+",
     re.I,
 )
-# The size of a device says nothing of its dynamics.
+# The size of a device, which does not describe its dynamics.
 _RATED = re.compile(
     r"\b\d+(?:\.\d+)?\s*-?(?:k?W|k?VA?|A|hp|l|m3|litres?)\s+"
     r"(?:(?:DC|AC|brush(?:ed|less)|electric|three-phase|servo)\s+)*"
@@ -67,7 +67,7 @@ _RATED = re.compile(
     r"(?:k?W|k?VA?|A|hp|l|m3|litres?)\b",
     re.I,
 )
-# A move that takes away: "closing the valve by 5 %", "when the valve closes 5 %", "gives 20 degC less".
+# A move with a negative sign: "closing the valve by 5 %", "when the valve closes 5 %", "gives 20 degC less".
 _LESS = re.compile(
     rf"^(?:when |if )?(?:(?:i|we|the {grammar.DRIVE}) )?(?:(?:is|are) )?"
     r"(?:clos|shut|lower|reduc(?!ing valve))\w*"
@@ -75,7 +75,7 @@ _LESS = re.compile(
     r"|\bless$",
     re.I,
 )
-# What names the output: "PI level loop", "temperature noise", "raises the level", "noise of the speed".
+# Names of the output: "PI level loop", "temperature noise", "raises the level", "noise of the speed".
 _CONTROLLED = re.compile(
     rf"\b({grammar.SIGNAL})\s+(?:loop|control(?:ler)?|regulator|noise|scatters|(?:has|with)\s+\S+\s+\S*\s*noise)\b"
     rf"|\b(?:{grammar.UP}|noise (?:of|on|in))\s+the\s+({grammar.SIGNAL})\b"
@@ -92,7 +92,7 @@ _BARE = re.compile(rf"^(?:{_JOINS}\s+)*|(?:[\s,;.:]+{_JOINS}\b)*[\s,;.:]*$", re.
 
 @dataclass(frozen=True)
 class Heard:
-    """Holds what a sentence says: answers by question, and remarks on what answers none.
+    """Holds the content of a sentence: answers by question, and remarks on parts that answer none.
 
     `unclear` are parts that are not understood, and may change the meaning of the rest.
     """
@@ -109,14 +109,14 @@ def question_of(text: str) -> str | None:
 
 @cache
 def _pieces(key: str) -> tuple[tuple[str, str], ...]:
-    """Return the patterns of the pieces that answer a question, and what each piece says."""
+    """Return the patterns of the pieces that answer a question, and templates of their answers."""
     listed = [one if isinstance(one, list) else [one, ""] for one in question(key).pieces]
     return tuple((_expanded(pattern), template) for pattern, template in listed)
 
 
 @cache
 def _unwanted() -> re.Pattern[str]:
-    """Return the pattern of what is not wanted, as in "avoid two levels": it answers no question."""
+    """Return the pattern of wishes that are negated, as in "avoid two levels": it answers no question."""
     levels = "|".join(pattern for pattern, _ in _pieces("signals"))
     return re.compile(
         r"\b(?:avoid\w*\b|(?:do not|don't|must not|should not|never|can ?not|can't)"
@@ -183,18 +183,18 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     """Return the answers by question, or none if the text answers fewer questions than `least`.
 
     Raises:
-        SpecError: `bad-answer` for numbers that cannot be meant, and for controllers other than PI and PID.
+        SpecError: `bad-answer` for implausible numbers, and for controllers other than PI and PID.
     """
     check_numbers(text, "plant")
     if other := _OTHER_LAWS.search(text):
         raise bad_answer("wish", f'"{other[0]}": settings are found for PI and PID')
-    found: dict[str, list[tuple[int, str]]] = {}  # where each piece begins, and what it says
+    found: dict[str, list[tuple[int, str]]] = {}  # the places and the answers of pieces
     said, named = _with_names(in_figures(text))
     left = grammar.OUTPUT_RESTS.sub(_taken, BEYOND.sub(_taken, said))
     unwanted = [part[0].strip() for part in _unwanted().finditer(left)]
     left = _unwanted().sub(_taken, left)
     pieces = [(key, *piece) for key in _TURNS for piece in _pieces(key)]
-    # Names of files and columns come first: "good.csv" says nothing of a margin.
+    # Names of files and columns come first: "good.csv" states no margin.
     for key, pattern, template in sorted(pieces, key=lambda piece: r"\S+\." not in piece[1]):
         while piece := _first(pattern, left, key):
             says = piece.expand(template or (r"\g<said>" if "said" in piece.re.groupindex else r"\g<0>"))
@@ -231,7 +231,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
     ]
     remarks += _of_the_wish(answers.get("wish", ""), text)
     controlled = {(one[1] or one[2] or one[3]).lower() for one in _CONTROLLED.finditer(text)}
-    in_words = re.match(r"(?!log |step )\S+ ", answers.get("plant", ""))  # and neither a file nor a template
+    in_words = re.match(r"(?!log |step )\S+ ", answers.get("plant", ""))  # neither a file nor a template
     if in_words and len(controlled) == 1 and not controlled & {"output", "sensor", "measurement"}:
         answers.setdefault("names", *controlled)  # a log has a column of that name
     if "wish" in answers and wishes.unbounded(answers["wish"]):
@@ -241,7 +241,7 @@ def in_sentence(text: str, least: int = 2) -> Heard:
 
 
 def _of_content(part: str) -> list[str]:
-    """Return the words of a part of a sentence that have content and are no part of what is understood."""
+    """Return the words of a part of a sentence that have content and need a remark."""
     words = (word.strip(",;:()") for word in part.split())
     return [word for word in words if unread(word) and word.lower() not in _PLAIN.split()]
 
@@ -262,7 +262,7 @@ def _of_experiment(piece: re.Match[str], text: str) -> bool:
 
 
 def _of_the_wish(wish: str, text: str) -> list[str]:
-    """Return remarks on how a wish is taken where the text says less than that."""
+    """Return remarks on how a wish is taken if it goes beyond the text."""
     found = []
     if wish.count("parameters within") > len(re.findall(r"\bparameters\b", text, re.I)):
         found.append("every parameter is to be known within the smallest per cent that was named")
@@ -272,7 +272,7 @@ def _of_the_wish(wish: str, text: str) -> list[str]:
 
 
 def _taken(piece: re.Match[str]) -> str:
-    """Return what stands in the place of a piece, as long as it is: the part of it that is left."""
+    """Return the text in place of a piece, of the same length: the part of it that is left."""
     rest = piece.groupdict().get("rest") or ""
     before = piece.start("rest") - piece.start() if rest else len(piece[0])
     return ("|" * before + rest).ljust(len(piece[0]), "|")
@@ -290,14 +290,14 @@ def not_understood(*parts: str) -> SpecError:
 
 
 def spread(answers: Answers, sentence: str | None = None) -> bool:
-    """Add what a sentence says to answers, of which none is replaced.
+    """Add the answers of a sentence to answers, of which none is replaced.
 
-    Return whether it says more than what the plant is.
+    Return whether it answers more than the question about the plant.
 
     Without a sentence the answer on the plant may be one.
 
     Raises:
-        SpecError: `bad-answer` as `in_sentence`, or for a sentence that says nothing beside a plant.
+        SpecError: `bad-answer` as `in_sentence`, or for a sentence without answers beside a plant.
     """
     known = sentence is not None and "plant" in answers.texts
     with answers.located():

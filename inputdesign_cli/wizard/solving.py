@@ -1,6 +1,6 @@
-"""What a design comes to in the user's words: is it enough, and what would do.
+"""The verdict on a design in the user's words: whether it is enough, and which length would be.
 
-Every number is that of a design that was computed. `templates/verdict.txt` has the sentences.
+Every number comes from a design that was computed. `templates/verdict.txt` has the sentences.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.wizard.composing import LEAST, Solve
 
-_MOST_OF = 0.99  # of a limit, which then binds
+_BINDING = 0.99  # a limit binds if this share of it is used
 _LIMITS = {"rate": "the rate", "amplitude.output": "the output"}
-_ROOM, _TRIES = 1.1, 3
-_LONGER = 2.0  # times as many samples, at most, from one try to the next
+_ROOM, _TRIES = 1.1, 3  # factor on the length that theory asks for; designs that are tried
+_LONGER = 2.0  # largest factor on the length from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
 
 
 def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> list[str]:
-    """Say whether a design is enough for what is asked, and which length would do, at its estimates, too.
+    """Return whether a design is accurate enough, also at its estimates, and which length would be.
 
     Args:
-        there: the time that may be taken, in its unit, where the experiment is shorter.
+        there: the time available, in time_unit, if the experiment is shorter.
     """
     signal, robust, kept = result["signal"], result.get("robust", {}), spec.accuracy.loop
     ratio, amplitude = float(signal["worst_ratio"]), spec.limits.amplitude
@@ -38,7 +38,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     does = _length_that_does(spec, ratio * _scatter(result), solve)
     loop = next((item["loop"] for item in result.get("requirements", []) if "loop" in item), None)
     known = [*robust.get("floor", {}).get("worst", ()), robust.get("searched", {})]
-    # Plants that leave the controller no margin, even if they were known exactly.
+    # Plants at which the controller has no margin, even if they were known exactly.
     fresh, lost = robust.get("fresh") or {}, len(robust.get("floor", {}).get("lost", ()))
     without_margin = [f"{lost} of the {robust.get('scenarios')} other plants that were tried"] if lost else []
     without_margin += [f"{fresh['lost']} of {fresh['draws']} more"] if fresh.get("lost") else []
@@ -52,7 +52,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "there": there,
         "allowed": allowed,
         "moved": max(signal.get("input_peak", [allowed])),
-        "binding": [words for name, words in _LIMITS.items() if shares.get(name, 0.0) >= _MOST_OF],
+        "binding": [words for name, words in _LIMITS.items() if shares.get(name, 0.0) >= _BINDING],
         "robust": robust,
         "limits_output": amplitude.output is not None,
         "fresh": fresh,
@@ -90,12 +90,12 @@ def _warnings(result: Result, *codes: str) -> list[str]:
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
     """Return the length in samples of a designed record that meets the requirements, or None.
 
-    Records with few samples a parameter do not count: their estimates scatter more than is stated.
+    Records with few samples per parameter do not count: their estimates scatter more than in theory.
 
     Args:
-        ratio: of errors, at estimates too; one is enough.
+        ratio: the ratio of the error to the admissible one, at estimates too; one is enough.
     """
-    # Errors fall with the root of the length, but not in records hardly longer than the plant is slow.
+    # Errors fall with the root of the length, except in records hardly longer than the time constant.
     samples = max(int(np.ceil(spec.experiment.samples * ratio**2 * _ROOM)), LEAST)
     for _ in range(_TRIES):
         if ratio <= 1.0 and samples >= spec.experiment.samples:
@@ -119,7 +119,7 @@ def decibels(peak: float) -> str:
 
 
 def lasting(seconds: float) -> str:
-    """Write a time in the unit in which one says it."""
+    """Write a time in a usual unit: s, min or h."""
     if seconds >= 2 * _HOUR:
         return f"{seconds / _HOUR:.3g} h"
     return f"{seconds / _MINUTE:.3g} min" if seconds >= 2 * _MINUTE else f"{seconds:.3g} s"

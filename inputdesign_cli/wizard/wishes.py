@@ -1,6 +1,6 @@
-"""What the model is for and what the experiment may use, as entries of a spec.
+"""The purpose of the model and the limits of the experiment, as entries of a spec.
 
-What cannot be understood is a SpecError `bad-answer`.
+An answer that cannot be understood is a SpecError `bad-answer`.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from inputdesign_cli.wizard.grammar import (
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 
-_NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations
+_NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % limits of real and complex errors, in deviations
 _LINES = 20
-_FASTER = 4.0  # than a plant without a dead time: its loop
-_HIGHER = 2.0  # than the corner frequency of a plant: up to there it is to be predicted
-_SAFE = 6.0  # dB of |S|, which keep a gain margin of 2 and a phase margin of 29 degrees
+_FASTER = 4.0  # time constant of a plant without dead time over that of its loop
+_HIGHER = 2.0  # upper end of the band of a prediction over the corner frequency of the plant
+_SAFE = 6.0  # dB of |S|, for a gain margin of 2 and a phase margin of 29 degrees
 _LEAST_BITS, _MOST_BITS = 2, 32
 LOOP = r"\b(?:loop|control(?:ler)?|regulator)\b"
 _WITHIN = {
@@ -50,7 +50,7 @@ NAMES_A_LOOP = re.compile(rf"(?:{SIGNAL} )?{LOOP}", re.I)
 _MIDDLE = 0.05
 
 IN_UNIT = r"(?:\s*(?:\bin\s+|\(\s*(?:in\s+)?)(?P<in_unit>[^\s\d,;:.()|]+)\)?)?"
-"""The unit behind what moves, as in "valve in %" and "valve (%)"."""
+"""The unit behind a name of an input, as in "valve in %" and "valve (%)"."""
 STANDS = rf"(?:{RESTING}\s+)*(?:(?:held|kept)\s+)?(?:around|about|at|near)"
 MOVES = (
     r"(?:(?:i|we|it|and|which|that|may|can|could|might|should|(?:is )?allowed to|be)\s+)*"
@@ -67,7 +67,7 @@ ACTUATOR = rf"(?:(?!(?:the|our|my|move|may|can|by|from|around|when|open|if|i)\b)
 
 @dataclass(frozen=True)
 class Range:
-    """Holds the amplitude about an operating point, and what moves there, in which unit."""
+    """Holds the amplitude about an operating point, and name and unit of the input."""
 
     amplitude: float
     offset: float
@@ -123,7 +123,7 @@ def input_range(text: str, plant: PlantAnswer | None = None) -> Range:
 
 
 def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dict[str, dict[str, str]]:
-    """Return names and units of the channels: as stated, else as a log, the range and the gain show them."""
+    """Return names and units of the channels: as stated, or else from a log, the range and the gain."""
     names = [f"{letter}{i + 1}" for letter in "uy" for i in range(plant.channels)]
     named = {"u1": (span.name or _OF_UNIT.get(span.unit, ""), span.unit), "y1": ("", plant.units[0])}
     named |= {channel: name_and_unit(header) for channel, header in plant.called.items()}
@@ -146,7 +146,7 @@ def channels_of(said: Mapping[str, str], plant: PlantAnswer, span: Range) -> dic
 
 
 def _drives(name: str, span: Range) -> bool:
-    """Return whether a name is that of an input: of what the range names, or of a drive such as a valve."""
+    """Return whether a name is that of the input of the range, or of a drive, as a valve."""
     called = name.lower() == span.name.lower() or re.fullmatch(ACTUATOR, name, re.I) is not None
     return called and re.fullmatch(SIGNAL, name, re.I) is None
 
@@ -169,7 +169,7 @@ def controller(text: str, plant: PlantAnswer, *, keeps: bool = False) -> str | N
     """Return the controller of the experiment as YAML; None in open loop.
 
     Args:
-        keeps: whether the actuator keeps positions, as it does under no controller.
+        keeps: whether the actuator keeps positions, which excludes a controller.
     """
     known = {"as the plant": None if keeps else plant.controller, "open": None}
     if text.lower() in known:
@@ -218,10 +218,10 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
 
     Args:
         controlled: whether the experiment runs under a controller.
-        duration: of the experiment, in the unit of time of the plant.
+        duration: the duration of the experiment, in the unit of time of the plant.
     """
     said = Phrase(text, "wish", plant.clock)
-    said.take(r"\bfor (?:an?|the|my|our) [a-z][^,;]*$")  # which plant, for the reader
+    said.take(r"\bfor (?:an?|the|my|our) [a-z][^,;]*$")  # the plant, for the reader only
     if said.take(LOOP) or re.search(r"\bPID?\b", text, re.I):
         return _loop(said, plant, controlled)
     part = said.share()
@@ -315,7 +315,7 @@ def unbounded(text: str) -> bool:
 
 
 def _margin(said: Phrase) -> str:
-    """Return the margin of a loop as an entry of the spec; a number says how safe a safe margin is."""
+    """Return the margin of a loop as an entry of the spec; a number overrides the words "safe margin"."""
     safe = said.take(r"\b(?:safe|usual|good)\b(?:\s*margins?\b)?") is not None
     factor = said.take(rf"\bgain margin\b\s*(?:(?:of|at least|above)\s+)*{ALONE}{NUMBER}(\s*dB\b)?")
     if factor is not None:
@@ -347,7 +347,7 @@ def _margin(said: Phrase) -> str:
 
 
 def _pid(said: Phrase, *, stated: bool) -> str | None:
-    """Return the settings "Kp 1, Ti 60, Td 5" as YAML, or None without settings, unless they are stated."""
+    """Return the settings "Kp 1, Ti 60, Td 5" as YAML; None without settings, unless they must be stated."""
     gain = said.after("Kp", "none")
     times = {name: said.after(name, "time") for name in ("Ti", "Td")}
     there = [name for name, time in times.items() if time is not None]

@@ -1,1 +1,1 @@
-"""One file a section of the spec: what it may hold, and the types of its values."""
+"""A file for each section of the spec: its keys, and the types of their values."""

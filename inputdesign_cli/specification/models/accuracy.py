@@ -1,4 +1,4 @@
-"""`accuracy:`, what the model must reach: requirements, criteria, or both."""
+"""`accuracy:`, the demands on the model: requirements, criteria, or both."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
 
 DEFAULT_CONFIDENCE = 0.95
-# The least number of draws on the rarer side of a probability.
-_LEAST_TELLING = 4
+# The least expected number of draws on the rarer side of a probability.
+_LEAST_RARE = 4
 _PROBABILITY = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 _NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
 
@@ -71,7 +71,7 @@ class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     def check(self) -> Iterator[PathDiagnostic]:
         """Check that there are enough draws and runs to estimate the probability."""
         rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
-        least = math.ceil(_LEAST_TELLING / rare - 1e-9)
+        least = math.ceil(_LEAST_RARE / rare - 1e-9)
         for key, count, none in (("draws", self.draws, ""), ("runs", self.runs, ", or 0 for none")):
             if count < least and not (none and count == 0):
                 message = f"{{key}} is {count}: too few to estimate a probability of {self.exact or 0.5:g}"

@@ -293,7 +293,7 @@ Text = Annotated[
     str, Strict(), BeforeValidator(as_text), WithJsonSchema({"type": ["string", "number", "boolean"]})
 ]
 FILE_FORMAT = "path"
-"""What the JSON schema calls a text that names a file."""
+"""The format by which the JSON schema marks the name of a file."""
 FileName = Annotated[
     str,
     Strict(),
@@ -321,7 +321,7 @@ Harmonics = Annotated[
     | Annotated[Several[Index], AfterValidator(rising), tag("list")],
     by_tag(lambda value: "list" if depth(value) else "word" if isinstance(value, str) else "count"),
 ]
-"""How many harmonics of a period, "odd", or which."""
+"""A number of harmonics of a period, "odd", or a list of harmonics."""
 
 # Matrices of numbers
 _ROWS = nested(2, "a matrix", "write rows: [[1, 0], [0, 1]]")
@@ -365,11 +365,11 @@ _OneOrRows = Annotated[Annotated[T, tag("1")] | Annotated[_Rows[T], tag("3")], _
 
 Numerator = Annotated[_Coefficients, holds(check_not_zero)]
 Denominator = Annotated[_OneOrList[_Leading], AfterValidator(product_exists), _FACTORS]
-"""One polynomial or a list of factors, in whatever variable."""
+"""One polynomial or a list of factors, in q^-1 or in s."""
 MonicPerOutput = Annotated[_OneOrList[_Monic], _PER_OUTPUT]
 StablePerOutput = Annotated[_OneOrList[_Stable], _PER_OUTPUT]
 StableMatrix = Annotated[_OneOrRows[Annotated[_Monic, holds(check_no_growth)]], _MATRIX]
-"""Stable but for integrators."""
+"""A stable polynomial, integrators aside, or a matrix of them."""
 GainMatrix = Annotated[_OneOrRows[_Coefficients], _MATRIX]
 RowsMatrix = Annotated[
     _Rows[_Coefficients],

@@ -83,7 +83,7 @@ def _single(value: dict[str, object]) -> str:
 SingleController = Annotated[
     transfer.DiscreteTransfer | PidController | ContinuousController, pick(_single), _WORDING
 ]
-"""From one output to one input."""
+"""A controller from one output to one input."""
 
 
 class SingleLoop(Section):
@@ -169,7 +169,7 @@ class ClosedLoopError(Section):
 
 
 MOST_DECIBELS = 100.0
-"""A peak of |S| of a hundred thousand: the loop may be as near to instability as that."""
+"""The largest peak of |S| that a spec may state, in dB."""
 
 
 class Simc(Section):
@@ -197,7 +197,7 @@ class Tuning(Section, one_of=(("simc", "amigo"),)):
 _Peak = Annotated[
     fields.Positive, Field(le=MOST_DECIBELS), Wording("a number", "beyond it no margin is left; write 6, say")
 ]
-# A phase margin of 60 degrees takes a peak of |S| of one, and every peak is above.
+# A phase margin of 60 degrees would need a peak of |S| of one, but every peak is larger.
 _Degrees = Annotated[
     fields.Positive, Field(lt=60.0), Wording("a number", "write degrees between 0 and 60: 45, for example")
 ]

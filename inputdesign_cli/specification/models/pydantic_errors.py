@@ -153,7 +153,7 @@ def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> li
     if kind == "missing":
         return [_missing(path, declared_at(root, location[:-1]).section)]
     if kind == "too_short" and error["input"]:
-        return []  # pydantic does not count the items that are wrong, which have errors of their own
+        return []  # pydantic does not count wrong items, which have their own errors
     declared = declared_at(root, location)
     types = [tag.removeprefix(_TYPE) for tag in declared.alternatives if tag.startswith(_TYPE)]
     if types and isinstance(error["input"], dict):
@@ -192,7 +192,7 @@ def _wrong_value(
     if kind == "too_short":
         empty = describe(value).replace("a ", "an empty ")
         return "wrong-shape", f"{{key}} is {empty}; it needs at least one entry", hint
-    # Of a list that is nested wrongly, "not a list" would mislead.
+    # "not a list" would mislead about a list that is nested wrongly.
     mistaken = kind == "union_tag_invalid" and isinstance(value, list)
     if kind == "too_long" and isinstance(value, list):
         return "wrong-shape", f"{{key}} must be {what}, not {len(value)}", hint or "write as many"

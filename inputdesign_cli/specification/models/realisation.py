@@ -129,13 +129,13 @@ class Signal(Section):
         """Check that every setting belongs to the type of signal."""
         for key in self.stated(*_ONLY_FOR):
             types = _ONLY_FOR[key]
-            if self.type in own(_GROUP) and self.type not in types:  # other kinds use what they like
+            if self.type in own(_GROUP) and self.type not in types:  # kinds of other packages may use any
                 message = f"{{key}} does not go with type: {self.type}"
                 hint = f"it belongs to type: {types[0]}; remove it, or change the type"
                 yield PathDiagnostic("unsuitable-key", message, hint, (key,), at_key=True)
 
 
-# `return` is a word of Python, which no attribute of a class body can be named.
+# `return` is a keyword of Python, so that no class body can declare it as an attribute.
 _RETURN: Plain = fields.Flag | None
 Signal.model_fields["return"] = FieldInfo.from_annotated_attribute(
     _RETURN, optional("Whether the record ends at the operating point.")

@@ -31,8 +31,8 @@ CARRIER = "diagnostics"
 class PathDiagnostic:
     """One thing that is wrong. `{key}` in message and hint stands for the full dotted name of `path`.
 
-    The path is seen from the model that says so, from the root of the file in the end. `at_key` points at
-    the key and not at its value. `keys` are the parts of `path` that it is about, if not all. `meant` is
+    The path begins at the model that reports it; callers extend it to the root of the file. `at_key` points
+    at the key and not at its value. `keys` are the keys below `path` that it is about, if not all. `meant` is
     the key that an unknown one probably stands for.
     """
 
@@ -63,7 +63,7 @@ def fail(code: str, message: str, hint: str = "") -> PydanticCustomError:
 
 @dataclass(frozen=True)
 class Wording:
-    """What a value of a type must be, "a list of coefficients", and how to mend one that is not."""
+    """Words for the values of a type ("a list of coefficients"), and a hint for other values."""
 
     what: str
     hint: str = ""
@@ -113,7 +113,8 @@ class Section(BaseModel):
 
     A subclass that is one of several alternatives names its `family` as a class argument and calls itself
     by a `phrase` in diagnostics ("type: fir"); the phrase is its tag in the union of the alternatives.
-    Further class arguments are groups of keys: exactly one, one or more, at most one of each is given.
+    Further class arguments are groups of keys, of which exactly one (`one_of`), at least one (`some_of`) or
+    at most one (`not_both`) is given.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
@@ -150,7 +151,7 @@ class Section(BaseModel):
     ELSEWHERE: ClassVar[Mapping[str, str]] = {}
     """Common keys that this section does not have -> a hint on its own keys."""
     CODES: ClassVar[Mapping[str, Mapping[str, str]]] = {}
-    """Of a section from another package: the codes of its errors, with title, text and remedy."""
+    """Codes of the errors of a section from another package, with title, text and remedy."""
 
     def stated(self, *keys: str) -> tuple[str, ...]:
         """Return the keys that have a value."""
@@ -225,5 +226,5 @@ class Shorthand:
 
 
 def optional(description: str, **more: Plain) -> Plain:
-    """Return the field of a key that may be absent; it is None then."""
+    """Return the field of a key that may be absent; its value is then None."""
     return Field(default=None, description=description, **more)

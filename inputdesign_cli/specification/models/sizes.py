@@ -13,7 +13,7 @@ from inputdesign_cli.specification.models.wording import show
 
 
 def magnitude(least: float, most: float) -> AfterValidator:
-    """Allow zero, and numbers of this size: products of a few others would overflow."""
+    """Allow zero and magnitudes from `least` to `most`: products of a few larger ones would overflow."""
 
     def check(value: float) -> float:
         if value and not least <= abs(value) <= most:

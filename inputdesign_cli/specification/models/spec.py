@@ -126,7 +126,7 @@ class Spec(Section):
     ) -> Spec:
         """Return the spec with other values at dotted keys, as `with_`; diagnostics about them name a `file`.
 
-        `design` is as for `from_dict`, by default as of this spec.
+        `design` is as for `from_dict`, by default that of this spec.
         """
         for key in changes:
             if "=" in key:

@@ -51,7 +51,7 @@ def check_gain(entries: TermMatrix, *path: str) -> Iterator[PathDiagnostic]:
 def check_proper(
     above: TermMatrix, below: fields.PolynomialMatrix, levels: int, *path: str
 ) -> Iterator[PathDiagnostic]:
-    """Check that no entry has a numerator of higher degree (descending in s), written in nested `levels`."""
+    """Check that every entry is proper, descending in s; `levels` is the depth of nesting as written."""
     for (i, j), terms in ((at, above[at[0]][at[1]]) for at in np.ndindex(fields.size_of(below))):
         high, low = len(terms) - leading(terms) - 1, len(below[i][j]) - 1
         if high > low:
@@ -162,7 +162,7 @@ class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-
 
 
 def transfer_kind(value: dict[str, Plain]) -> str:
-    """Return the tag of a mapping of the file: in q^-1 or in s."""
+    """Return the tag of a transfer function as the file has it: in q^-1 or in s."""
     return ContinuousTransfer.phrase if "continuous" in value else DiscreteTransfer.phrase
 
 

@@ -9,9 +9,9 @@ from inputdesign_cli.specification.models.wording import synonym
 from inputdesign_cli.specification.yaml.scalars import NUMBER
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
-"""How long each `time_unit` is."""
+"""The length of each `time_unit` in seconds."""
 
-# Per second, in rad.
+# Units of frequency in rad/s.
 _RADIANS = {"mHz": 2e-3 * math.pi, "Hz": 2 * math.pi, "kHz": 2e3 * math.pi, "rpm": math.pi / 30}
 _WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*([%A-Za-z\u00b0\u00b5\u03bc/]+)")
 

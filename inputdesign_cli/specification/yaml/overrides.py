@@ -1,4 +1,4 @@
-"""What is joined to a spec: files by `include: model.yaml`, then values by `--set key.path=value`."""
+"""Additions to a spec: files by `include: model.yaml`, then values by `--set key.path=value`."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from inputdesign_cli.specification.yaml.reader import MAX_DEPTH, Tree, read
 KEY = "include"
 # The parts of these blocks belong together and cannot be joined from two files.
 _WHOLE = ("plant", "noise")
-# An estimate holds at its own sample time only: two files may state the same one.
+# An estimate holds at its own sample time only. Two files may both state these keys if they agree.
 _CLOCK = ("sample_time", "time_unit")
 
 
 def apply_includes(tree: Tree, known: Collection[str], confine: FilePath | None) -> None:
     """Add the blocks of included files that the spec does not have; join other mappings key by key.
 
-    A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
-    the `known` blocks: it may be any file of the machine. Raises `SpecError`: A name is no text, or a file
-    cannot be read, holds no blocks or includes others.
+    A key that stands in both becomes a diagnostic of the tree. Errors show no content of a file without any
+    of the `known` blocks: it may be any file of the machine. Raises `SpecError`: A name is no text, or a
+    file cannot be read, holds no blocks or includes others.
     """
     if not isinstance(tree.data, dict) or KEY not in tree.data:
         return
@@ -112,7 +112,7 @@ def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
 
 
 def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
-    """Put plain values at dotted keys of the tree, in place, as of a `file`; None removes a key.
+    """Put plain values at dotted keys of the tree, in place; diagnostics name `file`. None removes a key.
 
     Raises `SpecError` (`bad-override`): a key leads nowhere.
     """
@@ -154,7 +154,7 @@ def _resolve(data: Plain, key: str, override: str) -> Path:
 
 
 def _put(tree: Tree, path: Path, value: Tree) -> None:
-    """Put the data of `value` at a path; all that is new has the first place of its text."""
+    """Put the data of `value` at a path; new keys are located at the beginning of its text."""
     places, (file, *_) = tree.places, value.places.files
     root = value.places.values.get(path)
     place = Location(file, 1, 1, root.text if root else "")

@@ -64,7 +64,7 @@ class Places:
         return self.keys[known] if at_key and known in self.keys else self.values.get(known)
 
     def copy(self) -> Places:
-        """Return places that may change while these stay."""
+        """Return an independent copy."""
         return Places(list(self.files), dict(self.keys), dict(self.values))
 
     def adopt(self, other: Places, path: Path) -> None:

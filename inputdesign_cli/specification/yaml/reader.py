@@ -20,7 +20,7 @@ from inputdesign_cli.specification.yaml.scalars import clip, resolve
 MAX_DEPTH = 64
 MAX_NODES = 100_000
 
-# The parser written in C is some ten times faster. Without resolvers a tag other than these was written out.
+# The parser written in C is about ten times faster. Without resolvers, any other tag stands in the text.
 _TAGS = {"DEFAULT_SCALAR_TAG": "scalar", "DEFAULT_SEQUENCE_TAG": "list", "DEFAULT_MAPPING_TAG": "mapping"}
 _Loader: Plain = type(
     "_Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {**_TAGS, "yaml_implicit_resolvers": {}}
@@ -49,10 +49,10 @@ _MEANINGS = (
 
 @dataclass
 class Tree:
-    """The nested dicts, lists and scalars of a text, their places, and what was wrong on the way.
+    """The nested dicts, lists and scalars of a text, their places, and the errors found while reading.
 
-    `diagnostics` did not stop the reading; `broken` are the paths where something is lost; `included` are the
-    files whose blocks it has, as it names them: relative names start in the `folder`.
+    `diagnostics` did not stop the reading; `broken` are the paths whose content is lost. `included` are the
+    files whose blocks it has, by the names in the text: relative ones start in the `folder`.
     """
 
     data: Plain = field(default_factory=dict)
@@ -114,7 +114,7 @@ class _Document:
         return self.location(node.start_mark.line + 1, node.start_mark.column + 1)
 
     def check_size(self, text: str) -> None:
-        """Refuse a large text by its events, before its nodes (`yaml-limit`, `several-documents`)."""
+        """Refuse a text that is too large before its nodes are built (`yaml-limit`, `several-documents`)."""
         depth = documents = 0
         for event in yaml.parse(text, Loader=_Loader):
             documents += isinstance(event, yaml.DocumentStartEvent)
@@ -186,7 +186,7 @@ class _Document:
     def _complain(
         self, code: str, message: str, hint: str, path: Path, place: Location, lost: Path | None = None
     ) -> None:
-        # The value is read all the same: what else is wrong with it is worth saying.
+        # The value is read all the same, so that its other errors are reported, too.
         self.tree.diagnostics.append(Diagnostic(code, message, hint, format_key(path), place))
         if lost is not None:
             self.tree.broken.add(lost)

@@ -1,8 +1,8 @@
 """The value of an unquoted word by the core rules of YAML 1.2, and why a word is not a number.
 
 PyYAML follows YAML 1.1, where `1e-3` is text, `no` is false, `1:30` is ninety and `010` is eight. Here
-`true` and `false` are the only booleans, `1e-3` is a number, and whatever reads differently from one YAML
-reader to the next (`010`, `0x10`, `1_000`) stays text, so that the field that wanted a number can say so.
+`true` and `false` are the only booleans, and `1e-3` is a number. Words that YAML readers read differently
+(`010`, `0x10`, `1_000`) stay text, so that a field for a number can refuse them.
 """
 
 from __future__ import annotations
