@@ -48,13 +48,16 @@ def discrete(deviation: float, time: float, step: float) -> tuple[float, float]:
     )
 
 
-def drifting(pole: float) -> float:
-    """Return c of (1 - c q^-1) / ((1 - a q^-1)(1 - q^-1)) e, noise with the pole a and a drift.
+def drifting(variance: float, pole: float) -> tuple[float, float]:
+    """Return the variance of e and c of (1 - c q^-1) / ((1 - a q^-1)(1 - q^-1)) e, noise that also drifts.
 
-    The variance of e is kept. In a sample the drift moves by `DRIFT_STEP` standard deviations of
-    e/(1 - a q^-1).
+    It is the sum of the noise with a pole a and this variance of its e, and of an independent random walk that
+    moves by `DRIFT_STEP` of the noise's standard deviation in a sample. The spectral factor is exact.
     """
-    return 1.0 - DRIFT_STEP * ((1.0 - pole) / (1.0 + pole)) ** 0.5
+    walk = DRIFT_STEP**2 / (1.0 - pole**2)  # the variance of a move over that of e
+    root = (1.0 - pole) * (walk * (4.0 + walk * (1.0 + pole) ** 2)) ** 0.5
+    factor = (2.0 + walk * (1.0 + pole**2) + root) / 2.0
+    return variance * factor, (1.0 + walk * pole) / factor
 
 
 def _numbers(value: Plain, sizes: tuple[float, float] = QUANTITIES) -> list[float]:
@@ -71,12 +74,14 @@ def _filter(noise: dict[str, Plain], step: Plain) -> dict[str, Plain]:
         return {"variance": 1.0}  # validation reports these values
     rows = [discrete(s, T, steps[0]) for s, T in np.broadcast(deviations, times)]
     shapes = [[1.0, -pole] if pole else [1.0] for _, pole in rows]
-    curves = [[1.0, -drifting(pole)] for _, pole in rows]
+    drifts = bool(noise.get("drift"))
+    sums = [drifting(*row) if drifts else (row[0], 0.0) for row in rows]
+    curves = [[1.0, -zero] for _, zero in sums]
     several = isinstance(noise[_SIZE], list) or isinstance(noise.get(_TIME), list)
-    moving = {"C": curves if several else curves[0]} if noise.get("drift") else {}
+    moving = {"C": curves if several else curves[0]} if drifts else {}
     if several:
-        return {"variance": np.diag([one for one, _ in rows]).tolist(), "D": shapes, **moving}
-    return {"variance": rows[0][0], "D": shapes[0], **moving}
+        return {"variance": np.diag([one for one, _ in sums]).tolist(), "D": shapes, **moving}
+    return {"variance": sums[0][0], "D": shapes[0], **moving}
 
 
 def _faults(

@@ -87,8 +87,9 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
             f"  standard_deviation: {short(level.deviation)}  # {why}",
             f"  correlation_time: {short(fades)}  # {colour}",
         ]
+    variance, zero = drifting(variance, pole) if drifts else (variance, 0.0)
     lines = ["noise:", f"  variance: {short(variance)}  # {why}", *_drift(drifts, _SAID)]
-    lines += [f"  C: [1, {short(-drifting(pole))}]"] * drifts
+    lines += [f"  C: [1, {short(-zero)}]"] * drifts
     return lines + [f"  D: [1, {short(-pole)}]  # {colour if fades else why}"] * bool(pole)
 
 

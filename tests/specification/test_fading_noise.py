@@ -60,17 +60,20 @@ def test_the_spec_keeps_the_words_and_can_be_read_again():
     assert code_of(spec.with_, **{"noise.variance": 2.0}) == "conflicting-keys"
 
 
-@pytest.mark.parametrize("fades", [0.0, 20.0, 300.0])
-def test_noise_may_drift_besides_and_moves_by_a_fifth_in_a_sample(fades):
-    """With a pole a and C = 1 - c q^-1, C/(D (1 - q^-1)) e moves by (1 - c)/(1 - a) e in the long run."""
+@pytest.mark.parametrize("fades", [0.0, 20.0, 300.0, 5e3, 5e5])
+def test_noise_that_drifts_is_the_stated_noise_and_a_random_walk(fades):
+    """The spectrum is the sum of both; the walk moves by a fifth of the standard deviation in a sample."""
     time = f", correlation_time: {fades}" if fades else ""
     text = "sample_time: 10\nplant: {continuous: {gain: 1, time_constant: 99}, sample: zoh}\n"
     plain, moving = (
         parse_spec(f"{text}noise: {{standard_deviation: 0.5{time}{more}}}\n", design=False).noise
         for more in ("", ", drift: true")
     )
-    assert (moving.variance, moving.D, moving.drift) == (plain.variance, plain.D, True)
-    step = np.sqrt(moving.variance) * sum(moving.C) / sum(moving.D)
-    assert step == pytest.approx(0.2 * 0.5, rel=1e-9)
-    # What does not drift is the fading noise: C tends to 1 - q^-1 where nothing moves.
-    assert moving.C[1] == pytest.approx(-1.0, abs=0.21)
+    assert (moving.D, moving.drift) == (plain.D, True)
+    delay = np.exp(-1j * np.geomspace(1e-6, np.pi, 40))
+    fading = plain.variance / np.abs(np.polyval(plain.D[::-1], delay)) ** 2
+    found = (
+        moving.variance * np.abs(np.polyval(moving.C[::-1], delay) / np.polyval(moving.D[::-1], delay)) ** 2
+    )
+    walk = (0.2 * 0.5) ** 2
+    assert found == pytest.approx(np.abs(1.0 - delay) ** 2 * fading + walk, rel=1e-7)

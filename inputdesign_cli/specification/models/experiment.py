@@ -50,7 +50,7 @@ class NoiseShape(Section):
     drift: fields.PerChannel[fields.Flag] = Field(
         default=False,
         description="Whether the noise integrates as well; one for all outputs, or a list. Beside "
-        "standard_deviation it moves by a fifth of that in a sample.",
+        "standard_deviation it adds a random walk that moves by a fifth of that in a sample.",
     )
     variance: fields.Variance | None = optional("Variance of e, or its covariance matrix.")
     standard_deviation: fields.PerChannel[fields.Deviation] | None = optional(
