@@ -61,7 +61,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     peaks = np.max(entries, axis=0, initial=0.0)
-    there = [(i, j) for i, j in pairs if peaks[i, j] > NOTHING * peaks.max()]
+    there = [(i, j) for i, j in pairs if i == j or peaks[i, j] > NOTHING * peaks.max()]
     for number, (i, j) in enumerate(there[:MOST]):
         label = f"|Φ{style.lowered(i + 1, j + 1)}|"
         _plot_power(above, w, entries[:, i, j], lines=curves.lines, number=number, label=label)
@@ -71,7 +71,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     of = f"power of each line of {curves.symbol}"
     above.set_ylabel(of if curves.lines else f"density of {curves.symbol}")
     shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
-    _scale(above, shown, float(np.median(shown)))
+    _scale(above, shown, float(np.median(shown)) if shown.size else 0.0)  # no line without power
     style.legend_above(above)
     values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
     for number in range(min(r, MOST)):

@@ -101,9 +101,11 @@ def test_lines_stand_as_stems_of_their_power(page):
     assert any("0.1925" in label for label in lines_by_label(axes))
 
 
-def test_a_spectrum_of_no_lines_is_an_empty_page():
+@pytest.mark.parametrize(("lines", "inputs"), [(0, 1), (0, 2), (5, 2)])
+def test_a_spectrum_of_no_power_is_an_empty_page(lines, inputs):
     """What a design is that needs no excitation."""
-    nothing = SpectrumCurves(np.zeros(0), np.zeros((0, 1, 1)), lines=True, band=(0.0, 1.0))
+    w, none = np.linspace(0.1, 1.0, lines), np.zeros((lines, inputs, inputs))
+    nothing = SpectrumCurves(w, none, lines=not lines, band=(0.0, 1.0))
     assert draw(nothing).startswith(b"\x89PNG")
 
 
