@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, parse_spec
@@ -38,6 +39,26 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
         return np.max(r_u / (0.05 * np.abs(B / F)[:, 0]))
 
     assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
+
+
+def test_noise_alone_may_be_what_the_data_still_need(tmp_path):
+    """Without excitation N samples of an ARX system add N / (1 - a1^2) to the information on a1."""
+    rng, N = np.random.default_rng(0), 1000
+    u, e = 0.3 * rng.standard_normal(N), rng.standard_normal(N)
+    y = scipy.signal.lfilter([0, 1], [1, -0.5], u) + scipy.signal.lfilter([1], [1, -0.5], e)
+    np.savetxt(tmp_path / "a.csv", np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+    bound = 0.025
+    found = assess(
+        parse_spec(
+            f"plant: {{A: [1, -0.5], B: [0, 1]}}\nnoise: {{variance: 1}}\nexperiment: {{samples: {N}}}\n"
+            f"accuracy: {{standard_deviation: {{a1: {bound}}}}}\nspectrum: {{type: white}}\n"
+        ),
+        tmp_path / "a.csv",
+    )
+    judged, estimate = found.results.result["assessment"], found.results.result["identification"]
+    assert (found.verdict, judged["top_up_status"]) == ("missed", "nothing_needed")
+    both = estimate["standard_deviation"]["a1"] ** -2 + N / (1 - estimate["theta"]["a1"] ** 2)
+    assert judged["left"] == pytest.approx(both**-0.5 / bound, rel=1e-3)
 
 
 @pytest.mark.first(1)

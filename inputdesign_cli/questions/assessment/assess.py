@@ -201,6 +201,8 @@ def _topped_up(
     design = topped.outcome.saying(remarks)
     reached = 0.0 if signal is None else signal.worst_ratio or 0.0
     left = max([one.worst_ratio for one in design.requirements or ()] + [reached])
+    if topped.outcome.status == "nothing_needed":  # the loop's own noise does it: no spectrum has a ratio
+        left = question.ratio(question.experiment.whiten_matrix(topped.information))
     often = _experiments(question, topped.information) if left > 1.0 + _REACHED else None
     completed = _assessed(judged, top_up_status=design.status, left=left, experiments=often)
     outcome = replace(
