@@ -8,6 +8,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec, solve
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.frequency_responses import silent_lines_answer
 from inputdesign_cli.identification.periodic_response import Periods, excited_lines
@@ -109,6 +110,7 @@ def test_without_lines_in_the_spec_the_data_say_which_they_are(write):
     plain = parse_spec(TEXT.replace("accuracy", "# accuracy").replace("signal", "# signal"), design=False)
     results = identify(plain, write(table(u, y)), frequency_response=True)
     assert results.result["frequency_response"]["frequencies"] == 12
+    assert summary(results.outcome, "s", []).split()[-2:] == ["12", "frequencies"]  # without a file, too
     assert "deviations" not in results.tables
     found = identify(parse_spec(TEXT), write(table(u, y))).result  # a model, whatever is asked of the lines
     assert "requirements" not in found
