@@ -149,8 +149,8 @@ def _estimated(
     reason = bad_spec(
         "no-structure",
         "no stable model explains the record",
-        hint="record it in a loop; remove a drift (--detrend linear); or is it an integrator: --structure "
-        "integrator",
+        hint="remove a drift (--detrend linear); or is it an integrator: --structure integrator; of an "
+        "unstable plant a spec states A and the controller: idesign identify DATA --spec SPEC",
         key="y",
     )
     made = list[tuple[bool, tuple[Candidate, ...], Estimate, Model]]()

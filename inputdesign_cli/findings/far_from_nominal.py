@@ -24,6 +24,7 @@ _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
 # The probability that a normal variable is farther than five standard deviations from its mean.
 _FIVE_DEVIATIONS = 5.733e-7
 _AWAY, _LISTED = 4.0, 4
+_LOWEST = 1e-6  # of the band
 _SOME = np.array([0.013, 0.37, 1.9])  # frequencies at which two plants are compared
 
 ANOTHER = doubt(
@@ -174,6 +175,8 @@ def _apart(
         share = np.where(apart > beyond, apart / size, 0.0)
         at = int(np.argmax(share))
         opposite = bool(share[0] > 1.0 and (old[0].conj() * new[0]).real < 0.0)
-        place = f"G{units.entry(i, j)} at {units.named(float(w[at]))}"
+        # Beside an integrator the grid comes as near to zero as it can: the number says nothing.
+        place = "the lowest frequencies" if w[at] < _LOWEST * w[-1] else units.named(float(w[at]))
+        place = f"G{units.entry(i, j)} at {place}"
         found.append((float(share[at]), place, opposite))
     return found

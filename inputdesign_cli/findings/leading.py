@@ -10,6 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from inputdesign_cli.explore.drift import slopes_of
+from inputdesign_cli.explore.relation import unstable_pole
 from inputdesign_cli.finding import NOTE, Finding, undecided
 from inputdesign_cli.findings.places import Record, argument
 from inputdesign_cli.findings.refuted_structure import DRIFT, PLANT
@@ -24,6 +25,7 @@ _ASSESS = "idesign assess SPEC "
 _AGAIN = _ASSESS + "{logs} "
 _ALONE = _ASSESS + "{last}"
 _EXPLORE = "idesign explore {columns}{logs}"
+_STATED = _AGAIN + " # after that: the plant is unstable, and explore looks for stable ones"
 _NEXT = {
     # Samples that are wrong or of another system upset every test.
     "samples-repeated": _ALONE,
@@ -98,6 +100,8 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     option = str(alike[0].figures.get("option", "--without ROWS"))
     if option == "--without" and "{rows}" in command:  # too many rows to be listed
         command = _EXPLORE
+    if command == _EXPLORE and any(unstable_pole(data.parts, i) for i in range(data.y.shape[1])):
+        command = _STATED
     middle, files = float(data.time[len(data.time) // 2]), [*map(argument, data.paths or ("DATA",))]
     figures = {
         "columns": data.columns_option,

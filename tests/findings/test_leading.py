@@ -208,6 +208,34 @@ def test_every_kind_that_leaves_a_verdict_open_names_a_command():
         assert "{" not in first.command.replace("{numerator", "")
 
 
+@pytest.mark.parametrize(("pole", "explores"), [(0.7, True), (1.2, False)])
+def test_an_unstable_plant_is_not_explored(pole, explores, tmp_path, monkeypatch):
+    """Its spec lacks a lag. Beside the integrator of the spec no frequency is named that means zero."""
+    monkeypatch.chdir(tmp_path)
+    rng, N = np.random.default_rng(0), 400
+    r, e = rng.choice([-2.0, 2.0], N), 0.3 * rng.standard_normal(N)
+    loop = np.polyadd(np.polymul([1, -pole], [1, -0.6]), [0, 0.4, 0])  # of y = 0.4 q^-1 u / A, u = r - y
+    y = scipy.signal.lfilter([0, 0.4], loop, r) + scipy.signal.lfilter([1], loop, e)
+    table = np.column_stack([r, r - y, y])
+    np.savetxt("log.csv", table, delimiter=",", header="r1,u1,y1", comments="", fmt="%.9g")
+    found = assess(
+        parse_spec("""
+plant: {A: [1, -1], B: [0, 0.5]}
+noise: {variance: 0.09}
+experiment: {samples: 400, controller: {numerator: [1], denominator: [1]}}
+cost: {input_power: 1}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 4}
+"""),
+        "log.csv",
+    )
+    assert found.verdict == "undecided"
+    command = found.results.outcome.assessment.next
+    assert command.startswith("idesign explore log.csv" if explores else "idesign assess SPEC log.csv")
+    (far,) = (one for one in found.results.findings if one.code == "another-plant")
+    assert ("e-13 rad" in far.message, "lowest frequencies" in far.message) == (False, True)
+
+
 @pytest.mark.parametrize(
     ("codes", "first"),
     [
