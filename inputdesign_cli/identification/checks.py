@@ -45,6 +45,8 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
         SpecError: `constant-input`, `constant-output`; it has the `names` of the parameters.
     """
     static = f"only a static gain could be seen, not {', '.join(names)} each"
+    if u.shape[1] > 1:
+        static = "it shows no dynamics of its own, whatever the other inputs show"
     for letter, signals, code, says in (
         ("u", u, "constant-input", static),
         ("y", y, "constant-output", "it shows neither the input nor noise"),

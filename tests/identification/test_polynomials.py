@@ -213,6 +213,7 @@ def test_bad_data_is_refused_and_the_channel_named(change, code, named):
     found = refused(identify, arx(), *change(u, y))
     assert found[0].code == code
     assert named in found[0].message
+    assert ("b1[1,1]" in found[0].message) == (named == "b1[1,1]")  # what another input shows is not denied
 
 
 @pytest.mark.parametrize(
