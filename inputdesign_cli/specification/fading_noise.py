@@ -51,8 +51,8 @@ def discrete(deviation: float, time: float, step: float) -> tuple[float, float]:
 def drifting(variance: float, pole: float) -> tuple[float, float]:
     """Return the variance of e and c of (1 - c q^-1) / ((1 - a q^-1)(1 - q^-1)) e, noise that also drifts.
 
-    It is the sum of the noise with a pole a and this variance of its e, and of an independent random walk that
-    moves by `DRIFT_STEP` of the noise's standard deviation in a sample. The spectral factor is exact.
+    It is the sum of noise with the pole a and this `variance` of its e, and of an independent random walk. In
+    a sample the walk moves by `DRIFT_STEP` of the noise's standard deviation. The spectral factor is exact.
     """
     walk = DRIFT_STEP**2 / (1.0 - pole**2)  # the variance of a move over that of e
     root = (1.0 - pole) * (walk * (4.0 + walk * (1.0 + pole) ** 2)) ** 0.5
