@@ -9,23 +9,23 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
 
-# Where an input rests beyond one cut, another may leave steps on either side, with what comes after them.
+# Cuts in per cent. If an input rests beyond one, another may leave steps on both sides, with their responses.
 _CUTS = (60, 50, 40, 70, 30)
-# Where an input steps in blocks of one kind only, fewer or more of them may part its steps.
+# Numbers of blocks. If an input steps in every second block only, another number may divide its steps.
 _BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
-# An input whose rms about its level is less than this share of that in all records rests.
+# An input rests if its rms about its level is less than this share of its rms in all records.
 _STILL = 0.2
 
 
 def divided(parts: Parts) -> tuple[Parts, Parts, str]:
     """Return the records that estimate, the records that judge, and their division.
 
-    Beginning and end are parted as a rule. Where an input rests in one of the two, blocks take turns. Where
-    it rests in any blocks as well, the whole record does both.
+    As a rule the beginning estimates and the end judges. If an input rests in one of them, blocks alternate.
+    If it rests in these blocks as well, the whole record does both.
     """
     ends = np.cumsum([len(y) for _, y in parts])
     for share in _CUTS:
-        # Of a record that ends before the cut, all.
+        # A record that ends before the cut belongs to the first side.
         at = [
             max(share * int(ends[-1]) // 100 - int(end) + len(y), 0)
             for end, (_, y) in zip(ends, parts, strict=True)

@@ -1,7 +1,7 @@
 """Find outputs that drift along one line through all records, in addition to the response to the inputs.
 
-Lines that are removed from u and y separately are no remedy. The response of the plant to the input contains
-a line of its own.
+To remove lines from u and y separately is no remedy. The response of the plant to the input contains a line
+of its own.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
 from inputdesign_cli.explore.sweep import Regressed, sweep, whitened, whitening
 
-_HIGHEST = 3
-# Of longer records means over stretches give a slope as well: a line is slow.
+_HIGHEST = 3  # the highest order of the plant
+# Longer records are averaged over stretches, since a line is slow.
 _MOST_SAMPLES = 1500
-# A line counts if it is _CERTAIN deviations from none, by the likelihood ratio, and it rises by _RISES times
-# its scatter.
+# A line counts if its slope is _CERTAIN deviations from zero, by the likelihood ratio, and it rises by _RISES
+# times its scatter.
 _CERTAIN, _RISES = 3.5, 1.0
-# A root of the noise that fades by fewer time constants within the records may be that of a random walk,
-# whose residuals look so beside all that was estimated.
+# A root of the noise that decays by fewer time constants within the records may be that of a random walk:
+# a fit of further terms makes the residuals of a random walk look stationary.
 _WALKS = 40.0
 
 
 def slopes_of(parts: Parts, *, known: bool = False) -> Array:
-    """Return the slopes (p,), a sample, of the lines along which outputs y (n, p) drift; zero for no line.
+    """Return the slopes (p,), per sample, of the lines along which outputs y (n, p) drift; zero for no line.
 
     If they are `known` to drift, any slope counts.
     """
@@ -44,14 +44,14 @@ def slopes_of(parts: Parts, *, known: bool = False) -> Array:
 def _line(parts: Parts, known: bool) -> float:
     """Return the slope of one output; zero unless it is far from none in noise of any colour.
 
-    The residual of an output-error model with a line is whitened by an autoregression. The likelihood ratio
-    of the whitened records judges, with the plant estimated anew beside a level alone: a plant that is slower
-    than the record, or leaks, may explain what looks like a line.
+    The residual of an output-error model with a line is whitened by an autoregression. A likelihood ratio of
+    the whitened records decides. Its other model has a level without a line and a plant that is estimated
+    anew: a plant that is slower than the record, or leaks, may explain an apparent line.
     """
     samples, longest = sum(len(y) for _, y in parts), max(len(y) for _, y in parts)
     highest = max(min(_HIGHEST, samples // 12), 1)
     best = sweep(parts, highest, line=True).best
-    # A line that goes beyond what the output does is that of a plant which integrates.
+    # A line that exceeds the range of the output is the response of a plant that integrates.
     reach = max(float(np.ptp(y)) for _, y in parts)
     if not np.isfinite(best.slope) or abs(best.slope) * longest >= reach:
         return 0.0
@@ -63,12 +63,12 @@ def _line(parts: Parts, known: bool) -> float:
     A = whitening(errors)
     if float(np.max(np.roots(A).real, initial=0.0)) > 1.0 - _WALKS / samples:
         return 0.0
-    white = whitened(parts, A) or parts  # records that are all shorter than the noise lasts
+    white = whitened(parts, A) or parts  # all records may be too short for the filter
     line = sweep(white, highest, line=True).best
     level = Regressed(white, line.order).output_error(line.delays, line.F)
     undriven = Regressed([(u[:, :0], y) for u, y in white], line.order).output_error((), level.F)
     count, flat = sum(len(y) for _, y in white), np.concatenate([y - y.mean() for _, y in white])
-    # If no input is answered, a plant that slowly returns from its start would explain any line.
+    # If the output responds to no input, a slow decay from an initial state would explain any line.
     answered = _gain(undriven.loss, level.loss, count) > _CERTAIN**2
     without = level.loss if answered else float(np.mean(flat**2))
     return best.slope if _gain(without, line.loss, count) > _CERTAIN**2 else 0.0

@@ -23,10 +23,10 @@ from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametris
 
 Parts = Sequence[tuple[Array, Array]]
 NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)
-"""What ends the estimate of one structure, not that of others: warnings of arithmetic may be errors."""
+"""Errors that end the estimate of one structure, but not of others: warnings of arithmetic may be raised."""
 
 _BY_CHANCE = 0.05
-# A mode that loses less than this over the whole record is not distinguishable from one on the limit.
+# A mode that loses less than this over the whole record is not distinguishable from an undamped one.
 _LEAST_DECAY = 0.01
 
 
@@ -66,7 +66,7 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
         counted = samples >= (delay if late is None else late)
         unexplained, level = counted & (samples < delay), y[counted].mean(axis=0) if np.any(counted) else 0.0
         part, by = ((moves, y - y.mean(axis=0)),), np.eye(y.shape[1])
-        with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
+        with np.errstate(over="ignore", invalid="ignore"):  # unstable models may overflow
             left = Records(plant, part, weights=by).begun_freely(delay).at(form.theta).errors
             predicted = Records(kind, part).begun_freely(kind.lateness(model.theta)).at(model.theta).errors
         missing.append(np.where(unexplained[:, None], y - level, left))

@@ -22,7 +22,7 @@ from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.estimators import Estimate, identify
 from inputdesign_cli.plant import Model, PolynomialModel
 
-_MOST_SAMPLES = 10_000
+_MOST_SAMPLES = 10_000  # samples that give the estimate
 # Structures of each output that are tried if the first cannot be estimated from the whole record.
 _MOST_TRIED = 3
 # Lines are estimated together with the model up to this number of records; beyond it they count as known.
@@ -35,13 +35,13 @@ class Found:
 
     Attributes:
         outputs: the result for each; `taken` is the candidate that the model is made of.
-        model: of all channels, estimated on the whole record; inputs that never move have no part in it.
-        estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
-            stand in all.
+        model: a model of all channels, from the whole record; inputs that never move have no effect in it.
+        estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) their
+            positions in all records.
         validation: the fits of the same structures, estimated on one part, to the other.
         split: the part that estimates and the part that judges; without one the whole record does both.
         still: inputs (from zero) that never move.
-        slopes: (p,), a sample, of the line through all records that was removed from each output.
+        slopes: (p,), slope per sample of the line through all records that was removed from each output.
     """
 
     outputs: tuple[Chosen, ...]
@@ -57,7 +57,7 @@ class Found:
 
     @property
     def moving(self) -> list[int]:
-        """Return the other inputs."""
+        """Return the inputs (from zero) that move."""
         return [j for j in range(self.model.inputs) if j not in self.still]
 
     @property
@@ -90,9 +90,9 @@ def explore_records(
     """Return the model that records u (n, r), y (n, p) support, samples `step` apart.
 
     Args:
-        feedback: whether u(t) may answer y(t).
+        feedback: whether u(t) may depend on y(t).
         ramp: whether the outputs are known to drift along lines.
-        only: the structure to take.
+        only: the only family of structures to try; None: all.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
@@ -142,9 +142,9 @@ def _output(parts: Parts, output: int) -> list[tuple[Array, Array]]:
 def _estimated(
     found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool
 ) -> tuple[tuple[Candidate, ...], Estimate, Model]:
-    """Return the best structures and their estimate from the whole record; the next where it is not certain.
+    """Return the best structures with a certain and steady estimate from the whole record, and the estimate.
 
-    Where all of them stand on the limit of stability, the first that is stable: it is like an integrator.
+    Without one, the first steady ones are taken, otherwise the first stable ones: they are like integrators.
     """
     reason = bad_spec(
         "no-structure",
@@ -176,7 +176,7 @@ def _estimated(
         plant, deviations = model.in_plant, np.sqrt(np.diag(estimate.covariance))
         if steady and certain(model.theta[plant], deviations[plant], model.dead_times[plant], step):
             return made[-1][1:]
-    # No spec holds an unstable plant without its loop.
+    # A spec cannot describe an unstable plant without its loop.
     stable = [one for one in made if output_error_form(one[3]).radius <= 1.0]
     if not stable:
         raise reason
@@ -197,7 +197,7 @@ def _together(
         return estimate, structure.at(estimate.theta, estimate.noise)
 
     if len(taken) > 1:
-        # Where one output has several minima, a search for all of them seldom leaves a wrong one.
+        # If an output has several minima, a search for all outputs together seldom leaves a wrong one.
         each = [identified(c.model, _output(used, i))[1] for i, c in enumerate(taken)]
         taken = tuple(replace(c, model=model) for c, model in zip(taken, each, strict=True))
     inputs = used[0][0].shape[1]
@@ -209,7 +209,7 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
     first = found[0].best.orders.physical
     for kind in (first, not first):
         every = [[c for c in one.candidates if c.orders.physical == kind] for one in found]
-        # What is open on one part seldom is certain on the whole: after the best it is left out.
+        # A structure that is uncertain on one part is seldom certain on the whole: only the best one may be.
         ranked = [
             own[:1] + [c for c in own[1:] if c.certain and c in one.good][: _MOST_TRIED - 1]
             for own, one in zip(every, found, strict=True)
@@ -221,7 +221,7 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
     """Join models of single outputs, of one kind of structure, into one model with all outputs.
 
-    Sampled single models have the `moving` inputs only, and the others no effect; process models have all.
+    Polynomial models have the `moving` inputs only; others get no effect. Process models have all inputs.
     """
     processes = [(c.orders, c.model.theta) for c in taken if c.orders.physical is True]
     if processes:

@@ -1,9 +1,8 @@
-"""Regressions without a model: do inputs excite a plant, move the outputs, answer them; is it unstable?
+"""Regressions without a model: do inputs excite a plant, move the outputs, depend on them; is it unstable?
 
 Past innovations of the outputs help to predict an input in a loop only ([ljung-1999], Section 13.4). Two
 signals that wander, drift, or follow one cycle agree for long though neither moves the other
-([granger-newbold-1974]). What is new in the output from sample to sample then answers nothing that the input
-does.
+([granger-newbold-1974]). The innovations of the output then do not depend on the input.
 """
 
 from __future__ import annotations
@@ -19,25 +18,25 @@ from inputdesign_cli.explore.fits import Parts, output_error_form
 from inputdesign_cli.identification.checks import check_noisy, check_varying
 from inputdesign_cli.plant import Model
 
-_LAGS, _PER_LAG, _PER_INPUT = 20, 12, 10
-# Levels: an input answers, an input helps to predict an output.
+_LAGS, _PER_LAG, _PER_INPUT = 20, 12, 10  # the most lags; samples per lag, and per lag and input
+# Significance levels: an input depends on outputs; an input helps to predict an output.
 _CERTAIN, _HELPS = 1e-4, 1e-3
 # An input follows from outputs and its own past if they leave less than this share of its power.
 _FOLLOWS = 1e-9
-# What is new in u and in y goes together beyond this correlation.
+# Innovations of u and y depend on each other beyond this correlation.
 _TOGETHER = 0.1
 # A jump is this multiple of an input's median innovation; fewest samples to compare jumps with the rest.
 _JUMP, _FEWEST = 6.0, 5
-# In -2 log likelihood: what the choice among some thousands of structures and delays gains by chance.
+# The gain of -2 log likelihood by chance in a choice among some thousands of structures and delays.
 _BY_CHOICE = 25.0
-_HIGHEST = 5
+_HIGHEST = 5  # the highest order of an ARX model
 # Standard deviations beyond the circle, and the step, in deviations, for the derivative of a pole.
 _BEYOND, _STEP = 5.0, 0.01
-# What would grow by less over the whole record may be drift, or several integrators, without a loop.
+# A mode that grows by a smaller factor over the whole record may be drift, or several integrators.
 _GROWN = 1e4
 _DEPENDENT = 1e-9
-# Samples to choose a structure, at least; and of a regressor beside the other delays, which is none of them.
-_FEWEST_SAMPLES, _FAINT = 30, 1e-9
+# The fewest samples to choose a structure. The least squared singular value, per delay, of exciting inputs.
+_FEWEST_SAMPLES, _INDEPENDENT = 30, 1e-9
 _UNKNOWN = ("gain and dynamics",)
 
 
@@ -45,14 +44,14 @@ def answers_output(parts: Parts) -> list[tuple[int, float]]:
     """Return the inputs u (n, r) that answer outputs y (n, p), with the probability of that by chance.
 
     Each input is regressed on its own past and the other inputs', then on past innovations of the outputs as
-    well. An input that follows from outputs and its own past without an error is a controller, too.
+    well. An input that follows exactly from outputs and its own past is the output of a controller, too.
     """
     lags = _lags(parts)
     kept = _centred(parts, 3 * lags)
     if not kept:
         return []
     own = np.concatenate([past(u, 2 * lags) for u, _ in kept])
-    more = np.concatenate([past(e, lags) for e in _new(kept, lags)[1]])
+    more = np.concatenate([past(e, lags) for e in _innovations(kept, lags)[1]])
     targets = np.concatenate([u[2 * lags :] for u, _ in kept])
     laws, at_once = only_answers(parts), _moved_at_once(kept, lags)
     chances = [
@@ -89,17 +88,17 @@ def only_answers(parts: Parts) -> list[int]:
     return [
         j
         for j, (x, power) in enumerate(zip(u.T, powers.tolist(), strict=True))
-        if power > 0.0 and _left(own, x) > 1e-3 * power and _left(every, x) <= _FOLLOWS * power
+        if power > 0.0 and _rss(own, x) > 1e-3 * power and _rss(every, x) <= _FOLLOWS * power
     ]
 
 
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
     """Return for each input the probability, by chance, that it answers y(t) between jumps of its own.
 
-    Past inputs hold all that a controller has made of past outputs between two steps of its reference.
-    Innovations of u and of y go together there. If y answered u at once, it would do so at the jumps as well.
+    Between two steps of its reference, a controller moves u by present innovations of y, beside their pasts.
+    If y depended on u at once instead, innovations at the jumps would have the same ratio.
     """
-    new_u, new_y = (np.concatenate(new) for new in _new(parts, lags))
+    new_u, new_y = (np.concatenate(new) for new in _innovations(parts, lags))
     found = []
     for x in new_u.T:
         jumps, chance = np.abs(x) > _JUMP * np.median(np.abs(x)), 1.0
@@ -119,20 +118,20 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def like_answers(parts: Parts, output: int, j: int) -> bool:
-    """Return whether u(t) may have been made from y(t): both have innovations at once, and u was not set.
+    """Return whether u(t) may depend on y(t): both have simultaneous innovations, and u is not prescribed.
 
-    An input that is held, white, or follows from its own past was set without a look at the output.
+    An input that is held, white, or follows from its own past was prescribed independently of the output.
     """
     moves = np.concatenate([np.diff(u[:, j]) != 0.0 for u, _ in parts])
     lags = _lags(parts)
     long = _centred(parts, 3 * lags)
     if not long or np.mean(moves) < 0.5:
         return False
-    new_u, new_y = (np.concatenate(new) for new in _new(long, lags))
+    new_u, new_y = (np.concatenate(new) for new in _innovations(long, lags))
     size = float(np.linalg.norm(new_u[:, j]) * np.linalg.norm(new_y[:, output]))
     lagged = np.concatenate([past(u[:, j : j + 1], 5) for u, _ in long])
     now = np.concatenate([u[5:, j] for u, _ in long])
-    own = _left(lagged, now) <= 1e-6 * float(now @ now)
+    own = _rss(lagged, now) <= 1e-6 * float(now @ now)
     white = _by_chance(np.ones((len(now), 1)), lagged, now) > 0.01
     return abs(float(new_u[:, j] @ new_y[:, output])) > _TOGETHER * max(size, 1e-300) and not (own or white)
 
@@ -140,11 +139,11 @@ def like_answers(parts: Parts, output: int, j: int) -> bool:
 def _by_chance(own: Array, more: Array, target: Array) -> float:
     """Return the probability that columns `more` explain as much by chance beside `own` (n, m).
 
-    It follows from the likelihood ratio, or from a smaller score test: a target that is held moves at few
-    samples only. The covariance of the score allows for errors of any size at any time ([white-1980]).
+    The smaller of likelihood ratio and score statistic counts, since a held target moves at few samples only.
+    The covariance of the score allows for errors whose variance changes with time ([white-1980]).
     """
     both = np.column_stack([own, more])
-    alone, together = _left(own, target), _left(both, target)
+    alone, together = _rss(own, target), _rss(both, target)
     if alone <= 1e-12 * float(target @ target) or len(target) <= both.shape[1]:
         return 1.0  # the input follows from its own past: a deterministic signal
     ratio = (len(target) - both.shape[1]) * float(np.log(alone / max(together, 1e-300)))
@@ -155,7 +154,7 @@ def _by_chance(own: Array, more: Array, target: Array) -> float:
     return float(scipy.special.chdtrc(more.shape[1], min(ratio, score)))
 
 
-def _left(*regression: Array) -> float:
+def _rss(*regression: Array) -> float:
     """Return the sum of squares of the residual of a target (n,) regressed on columns (n, m)."""
     (errors,) = residuals(*([one] for one in regression))
     return float(errors @ errors)
@@ -181,7 +180,7 @@ def _lagged(parts: Parts, lags: int) -> tuple[Array, Array, Array, Array] | None
     return now[0], now[1], before[0], before[1]
 
 
-def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
+def _innovations(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
     """Return the residuals of inputs and outputs regressed on their pasts, (n - lags, ..) each."""
     rows = [np.column_stack([past(u, lags), past(y, lags)]) for u, y in parts]
     return residuals(rows, [u[lags:] for u, _ in parts]), residuals(rows, [y[lags:] for _, y in parts])
@@ -190,8 +189,8 @@ def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
 def unhelpful(model: Model, parts: Parts) -> list[int]:
     """Return the outputs (from zero) whose prediction the simulated effect of the inputs does not improve.
 
-    An output is predicted from its own past, a level and a line, and besides from the simulation of the model
-    (F-test). With no parameter more, the error of the simulation is predicted from its own past as well.
+    An output is predicted from its own past, a level and a line, with and without the simulation of the model
+    (F test). Without a further parameter, the error of the simulation is predicted from its own past as well.
     """
     lags = min(_LAGS, sum(len(y) for _, y in parts) // _PER_LAG)
     long = [part for part in parts if len(part[1]) > 3 * lags]
@@ -215,7 +214,7 @@ def _idle(signals: Sequence[Sequence[Array]], lags: int) -> bool:
     more = np.column_stack([own, x, pasts[1]])
     errors = np.column_stack([np.concatenate(levels), pasts[2]])
     alone, along, simulated = (
-        max(_left(rows, target[:, 0]), 1e-300) for rows, target in ((own, y), (more, y), (errors, rest))
+        max(_rss(rows, target[:, 0]), 1e-300) for rows, target in ((own, y), (more, y), (errors, rest))
     )
     free = y.size - more.shape[1]
     statistic = (alone - along) / (lags + 1) / (along / max(free, 1))
@@ -275,7 +274,7 @@ def order_of_excitation(parts: Parts, most: int = 50) -> int:
         columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
         columns = columns - columns.mean(axis=0)
         scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-150)
-        if np.linalg.svd(columns / scale, compute_uv=False)[-1] ** 2 > _FAINT * delays:
+        if np.linalg.svd(columns / scale, compute_uv=False)[-1] ** 2 > _INDEPENDENT * delays:
             return delays
     return 1
 
@@ -292,14 +291,14 @@ def left_of_inputs(parts: Parts) -> list[float]:
     )
     power = np.maximum(np.sum(every[0] ** 2, axis=0), 1e-300)
     others = [np.concatenate(np.delete(every, j, axis=2), axis=1) for j in range(inputs)]
-    return [_left(other, every[0][:, j]) / power[j] for j, other in enumerate(others)]
+    return [_rss(other, every[0][:, j]) / power[j] for j, other in enumerate(others)]
 
 
 def unstable_pole(parts: Parts, output: int) -> tuple[complex, float] | None:
     """Return the unstable pole of one output y (n, p), and the deviation of its radius; None: it is stable.
 
-    The order is that which BIC prefers. A loop that holds an unstable plant excites it, and the predictor of
-    an ARX model is stable wherever its poles are ([ljung-1999], Section 13.4).
+    BIC chooses the order. A loop that stabilises an unstable plant excites it, and the predictor of an ARX
+    model is stable wherever its poles are ([ljung-1999], Section 13.4).
     """
     long = [(u, y[:, output : output + 1]) for u, y in _centred(parts, 4 * _HIGHEST)]
     best, found = np.inf, None

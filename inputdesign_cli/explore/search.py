@@ -48,12 +48,12 @@ _AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
 _WORST_ERROR = 1e6  # per cent; beyond this a fit says nothing
 # The largest deviation of a parameter of the plant, in shares of its value.
 _UNCERTAIN = 0.5
-# What a parameter must take off the variance of prediction errors, however long the record is; and what
-# gains, time constants and dead times are worth by the same measure, beside polynomials.
-_WORTH, _NAMED = 0.01, 0.02
+# The least relative decrease of the prediction-error variance per parameter, for records of any length; the
+# advantage of gains, time constants and dead times over polynomials, in the same measure.
+_LEAST_PRICE, _PHYSICAL = 0.01, 0.02
 _MOST_SAMPLES = 4000
 _HIGHEST, _HIGHEST_ARX = 5, 8
-# Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
+# The fewest samples per parameter; steps of a search; rounds of whitening, in open and in closed loop.
 _PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
 # A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
 _SETTLES, _RUN_OFF = 5, 2
@@ -74,7 +74,7 @@ class Candidate:
         ranges: the 95 % interval of each delay.
         estimation, validation: per cent that the simulation explains of the two parts.
         prediction: per cent one step ahead, on the second part.
-        criterion: log of the variance of the prediction errors, and the price of the parameters.
+        criterion: log of the variance of the prediction errors, plus the price of the parameters.
         steady: whether its plant is stable, as far as the record shows.
         certain: whether no parameter of the plant deviates by more than half its value.
         failed: names of the tests of its residuals that fail.
@@ -139,7 +139,7 @@ def ranked(
         return by_prediction or (own <= most and 1e4 - own**2 >= _EXPLAINED * explained)
 
     def preference(c: Candidate) -> tuple[float, ...]:
-        by = c.criterion - _NAMED * c.orders.physical if is_good(c) else -c.validation
+        by = c.criterion - _PHYSICAL * c.orders.physical if is_good(c) else -c.validation
         return not is_good(c), not c.steady, not c.certain, not c.converged, by
 
     every = tuple(sorted(usable, key=preference))
@@ -153,8 +153,8 @@ class _Records:
     Attributes:
         first, judging: records of one output; the first `late` samples of each that judges are left out.
         white: the first part through the autoregression of its noise; `swept` its regressions.
-        C, D: the noise beside a plant.
-        feedback: whether inputs answer the outputs.
+        C, D: the noise model of structures that have none of their own.
+        feedback: whether inputs depend on the outputs.
         step: the sample time.
     """
 
@@ -194,8 +194,8 @@ class _Records:
         model = model.at(model.theta, noise)
         plant, judged, physical = model.in_plant, fits(model, self.judging, self.late), bool(shape.physical)
         unknowns = shape.size + (0 if physical else len(shape.delays))
-        # What BIC asks for a parameter, and a share at least.
-        price = max(float(np.log(self.samples)) / self.samples, _WORTH)
+        # The price of a parameter by BIC, or a fixed share if that is larger.
+        price = max(float(np.log(self.samples)) / self.samples, _LEAST_PRICE)
         if shape.physical is True:
             ranges = shape.ranges(model.theta[plant], deviations)
         else:
@@ -229,10 +229,10 @@ def explore_structure(
 
     Args:
         first, second: records to estimate from and to judge by.
-        feedback: whether u(t) may answer y(t).
+        feedback: whether u(t) may depend on y(t).
         step: the sample time.
         physical: whether plants in s are tried.
-        only: the structure to take.
+        only: the only family of structures to try; None: all.
     """
     first, second = (cut(parts, busiest(parts, _MOST_SAMPLES)) for parts in (first, second))
     records = _prepared(first, second, feedback, step, only)

@@ -101,29 +101,29 @@ def _monic(order: int) -> Array:
 
 _NAMES = {0: "integrator", 1: "FOPDT", 2: "SOPDT"}
 _LAGGING = "integrator with a lag"
-# Numerators and denominators in s by their parameters, descending.
+# Denominators in s by their parameters, in descending powers.
 _BELOW = {0: ("1", "0"), 1: ("{T}", "1"), 2: ("{T}**2", "2*{zeta}*{T}", "1")}
-# Poles in z of the starts.
+# Moduli of poles in z from which a search starts lie between these.
 _FASTEST, _SLOWEST = 1e-3, 1.0 - 1e-4
-_LEAST = 0.05  # of a sample, the shortest dead time of a start
-_ZERO = 0.5
+_LEAST = 0.05  # the shortest dead time of a start, in samples
+_ZERO = 0.5  # Tz of a start, relative to T
 # A dead time this near below a whole number of samples is that number.
 _ROUNDED = 0.01
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
-_LONGEST = 1e6
+_LONGEST = 1e6  # the longest delay, in samples
 
 
 @dataclass(frozen=True)
 class Process:
-    """A process model of one output: of each input a gain K, a dead time L, and poles by T and zeta.
+    """A process model of one output: for each input a gain K, a dead time L, and poles by T and zeta.
 
     Attributes:
         delays: the lag of the first sample that each input moves.
-        lags: the number of poles with a time constant, none to two; none: K / s.
-        rising: whether the output integrates what a lag of order one gives.
+        lags: the number of poles with a time constant, zero to two; zero: K / s.
+        rising: whether an integrator follows a first-order lag.
         step: the sample time.
         zero: whether the numerator is K (Tz s + 1).
-        noise: the order of C and D, none for white noise.
+        noise: the order of C and D, zero for white noise.
     """
 
     delays: tuple[int, ...]
@@ -218,7 +218,7 @@ class Process:
         below = self._below(s) if self.lags else []
         found: list[float] = []
         for gain, row, delay in zip(gains, near.B, near.delays, strict=True):
-            # A lag of first order that begins between two samples shares its first two coefficients.
+            # A first-order lag that begins between two samples divides its gain between two coefficients.
             shares = self.order == 1 == self.lags and row[0] * row[1] > 0.0
             late = max(delay - 1 + (row[1] / (row[0] + row[1]) if shares else 0.0), _LEAST) * self.step
             found += [float(gain), *below, *([_ZERO * below[0]] if self.zero else []), late]
@@ -244,7 +244,7 @@ def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance:
             for j in range(1, len(row.delays) + 1)
         ]
         every = [name for names in own for name in names.values()]
-        values |= dict(zip(every, theta.tolist(), strict=False))  # those of the noise follow
+        values |= dict(zip(every, theta.tolist(), strict=False))  # C and D follow
         top = ("{K}*{Tz}", "{K}") if row.zero else ("{K}",)
         above.append([[text.format(**names) for text in top] for names in own])
         texts = (*_BELOW[row.lags], *(("0",) if row.rising else ()))

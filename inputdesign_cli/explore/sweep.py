@@ -2,7 +2,7 @@
 
 The regressions follow [steiglitz-mcbride-1965]. The products of all lags of y and u, through 1/F, give
 the errors of every delay at once. Levels, drift and the state at the start of each record are projected out.
-Before a record the inputs count as what they are at its beginning.
+Before a record the inputs count as constant at their first values.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from inputdesign_cli.identification.stability import reflected
 from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.plant.filtering import filtered
 
-_WIDE, _ROUNDS, _POLISH, _BESIDE = 3, 8, 3, 5
+_WIDE, _ROUNDS, _POLISH, _BESIDE = 3, 8, 3, 5  # wide sweeps; rounds for F, and per near delay; near delays
 _RIDGE = 1e-12
-# Where no coefficient of F changes by more, the rounds have settled.
+# The rounds have settled if no coefficient of F changes by more.
 _SETTLED = 1e-6
-# So many orders in a row that BIC does not prefer end a sweep.
+# A sweep ends after this number of successive orders that BIC does not prefer.
 _WORSE = 2
-# The longest delay that is tried, in samples and in shares of the longest record.
+# The longest delay that is tried: in samples, and the longest record divided by _SHARE, or first by _LONG.
 _MOST_DELAY, _SHARE, _LONG = 300, 2, 6
 _CONFIDENCE = 0.95
-# Time constants of a root within a record, below which it may as well integrate.
+# A root that decays by fewer time constants within a record may as well integrate.
 _FADES = 8.0
-_MOST_NOISE = 2
+_MOST_NOISE = 2  # the highest order of C and D
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Regression:
         F: (n + 1,).
         B: (r, n + 1), from the lags `delays` (r,) on.
         loss: mean square of the output error.
-        slope: the slope of a line besides, a sample, where one was asked for.
+        slope: the slope per sample of a line, if one was asked for.
     """
 
     F: Array
@@ -103,7 +103,7 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
     samples, most = sum(len(y) for _, y in parts), max(min(_MOST_DELAY, longest // _SHARE), 1)
     begin, found, price = (max(least, 1),) * inputs, dict[int, Regression](), list[float]()
     for n in range(1, highest + 1):
-        # What acts before the longest delay is unknown: it counts, or all samples before are left out.
+        # Inputs before a record act during a delay: short delays use all samples, long ones skip the first.
         short = (min(longest // _LONG, most), 0)
         wide: dict[int, list[tuple[int, int] | None]] = {1: [short, (most, most)], 2: [short, None]}
         denominators = [np.ones(1), *(found[k].F for k in [n - 1] if k)]
@@ -174,13 +174,13 @@ class Regressed:
         return [block[:, -1] - block[:, :-1] @ solution for block in blocks]
 
     def _near(self, delays: Sequence[int]) -> list[tuple[int, int]]:
-        """Return the lags of B behind a dead time of any size."""
+        """Return for each input the first lag of B, and one past its last, at given delays."""
         return [(delay, delay + self.n + 1) for delay in delays]
 
     def _blocks(
         self, F: Array, ranges: Sequence[tuple[int, int]], *, through: bool, skipped: int = 0
     ) -> Iterator[Array]:
-        """Yield of every record the columns and the target (n, m + 1), its own unknowns projected out.
+        """Yield for every record the columns and the target (n, m + 1), its own unknowns projected out.
 
         Args:
             ranges: the first lag of each input, and the one after the last.
@@ -204,7 +204,7 @@ class Regressed:
             for x, (low, high) in zip(inputs, ranges, strict=True):
                 columns += [shifted(x, lag, [samples]) for lag in range(low, high)]
             own = [held, *(shifted(impulse, lag, [samples]) for lag in range(n))]
-            # Before a long delay acts what held before the record, which may differ from its first value.
+            # During a long delay the input before the record acts, which may differ from its first value.
             late = (low for low, high in ranges if samples // _LONG < low < samples and high - low <= n + 2)
             own += [shifted(arrived, low, [samples]) for low in late]
             unknown, _ = np.linalg.qr(np.stack(own, axis=1)[skipped:])
@@ -237,9 +237,9 @@ class Regressed:
     def losses(
         self, F: Array, delays: Sequence[int], j: int, reach: tuple[int, int], skipped: int = 0
     ) -> Array:
-        """Return the squares left (high - low + 1,) by each delay of input j in reach: one factor for all.
+        """Return the sums of squares (high - low + 1,) of residuals for each delay of input j in `reach`.
 
-        The other delays stay fixed, and `skipped` samples are left out. Zero: it cannot be computed.
+        The other delays stay fixed, and `skipped` samples are left out. All are zero if not computable.
         """
         b, (low, high), ranges = self.n + 1, reach, self._near(delays)
         ranges[j] = (low, high + b)
@@ -276,7 +276,7 @@ def _solved(gram: Array) -> tuple[Array, float]:
 
 
 def delay_ranges(parts: Parts, model: Regression, *, least: int, most: int) -> tuple[tuple[int, int], ...]:
-    """Return the delays of each input within 95 % confidence by the likelihood ratio, and its own."""
+    """Return the 95 % confidence interval of each delay by the likelihood ratio, its estimate included."""
     samples, found = sum(len(y) for _, y in parts), []
     limit = scipy.special.chdtri(1, 1.0 - _CONFIDENCE)
     for j, own in enumerate(model.delays):

@@ -1,6 +1,6 @@
-"""What speaks for or against data, a model or a design: a file holds the kinds of one cause.
+"""Findings for or against data, a model or a design: a file holds the kinds of one cause.
 
-A file says when its finding holds and what its sentence is. It is found by its place: nothing else lists it.
+A file decides when its findings hold and words their messages. It is found by its place: nothing lists it.
 """
 
 from contextlib import suppress
@@ -19,7 +19,7 @@ def kinds() -> dict[str, FindingKind]:
     """Return every kind of finding by its code, and what other packages add."""
     for module in iter_modules(__path__):
         import_module(f"{__name__}.{module.name}")
-    with suppress(SpecError):  # the explanation of this error, too, is one of those that are asked for
+    with suppress(SpecError):  # explanations are needed even if a plug-in is broken
         for point in points("idesign.findings").values():
             loaded(point)
     return dict(sorted(KINDS.items()))
@@ -33,14 +33,14 @@ def explanations() -> dict[str, Explanation]:
 
 
 def with_added(results: Results) -> Results:
-    """Return the results with what functions of other packages find in them.
+    """Return the results with the findings that functions of other packages add.
 
     Each entry point of `idesign.findings` refers to a function that takes the results and returns findings.
-    The verdict is there before them.
+    The results have their verdict already.
 
     Raises:
-        SpecError: `bad-plug-in`, what is referred to cannot be loaded, or fails. Or it gives something other
-            than notes and doubts with declared codes and finite figures.
+        SpecError: `bad-plug-in`, a function cannot be loaded, or fails. Or it gives something other than
+            notes and doubts with declared codes and finite figures.
     """
     for point in points("idesign.findings").values():
         find = loaded(point)

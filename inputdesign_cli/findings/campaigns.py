@@ -65,7 +65,7 @@ PART_BETWEEN_MINIMA = note(
     "Apply the part.",
 )
 NEARLY = 0.9
-"""A part of less than this share of its power is named."""
+"""A part with less than this share of its planned power is reported."""
 
 
 @finding(NOTE, "record-withdrawn", "Nothing.")
@@ -96,7 +96,7 @@ def hardly_followed(
         likeness: correlation with the plan; from `like` on a record follows its plan.
         follows: whether the record may be one of the plan.
         other: the file of a plan that the record follows better.
-        scale: at which the plan was applied; 1 up to chance.
+        scale: the factor on the applied plan; 1 if it may be chance.
     """
     fact = f"{given} and {plan} have a correlation of {likeness:.2f}"
     if other is not None:
@@ -124,8 +124,8 @@ def estimate_not_used(kind: FindingKind, share: float | None, why: str) -> list[
     one.
 
     Args:
-        share: of the way from the last estimate to this one; None if no model on the way can be used.
-        why: the accuracy cannot be evaluated at this one; empty where its poles are the reason.
+        share: usable part of the way from the last estimate to this one; None if no model on it can be used.
+        why: the reason why the accuracy cannot be evaluated at this one; empty if it is the poles.
     """
     fact = why or "its poles are too near to the unit circle, or outside"
     way = "no model" if share is None else f"the model at {100 * share:.0f} %"
@@ -146,7 +146,7 @@ def campaign_refuted(
     """The campaign ends because the data refute the model. More samples would not help.
 
     Args:
-        samples: applied, of at most `end`.
+        samples: number of applied samples, of at most `end`.
         records: the files that count.
     """
     listed = shlex.join(argument(str(directory / name)) for name in records)
@@ -171,13 +171,13 @@ def planned_otherwise(
     """Return findings for a plan that is not as the spec asks.
 
     Args:
-        file: of the plan.
+        file: the file of the plan.
         why: the reason why there is no design; empty if there is one.
         capped: whether the plan meets less than is asked.
         share: power of the part over that of its plan.
         beyond: whether a sample costs more than the cap; it costs `part_cost`.
         fragile: whether a robust last part was wanted and not found.
-        parts: whether it is to separate minima.
+        parts: whether the part is to separate minima.
     """
     percent, cost = f"{file} has {100 * share:.0f} % of the planned power", f"{part_cost:.4g} a sample"
     return [

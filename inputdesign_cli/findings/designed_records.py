@@ -1,4 +1,4 @@
-"""What a user should know before applying the record of a design, of a given spectrum or of a top-up."""
+"""Findings on the record of a design, of a given spectrum or of a top-up, before it is applied."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.signal.settings import Quantiser
 
-_FALLS_SHORT = 5e-3
-_FAR = 0.1  # from the bound over all records, as a share
-_SEEN = 0.01  # of the largest move
-_DEAR = 1.0  # beyond the cost of the design, relative to it
+_FALLS_SHORT = 5e-3  # relative excess of a ratio that is reported
+_FAR = 0.1  # relative distance from the bound over all records that is reported
+_NOTABLE = 0.01  # share of the largest move that is reported
+_EXPENSIVE = 1.0  # cost beyond that of the spectrum, relative to it, that is reported
 
 RECORD_UNDETERMINED = doubt(
     "record-undetermined",
@@ -80,7 +80,7 @@ def length_of_record(record: Record, asked: int, block: int) -> list[Finding]:
     """Return a finding if a record is longer than was asked for, or dear for want of samples.
 
     Args:
-        asked: its samples by the spec, or by the spectrum.
+        asked: the number of samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
     """
     size, times = len(record.samples), 1.0 + record.extra_power
@@ -89,7 +89,7 @@ def length_of_record(record: Record, asked: int, block: int) -> list[Finding]:
     if size > asked + block:
         fact = f"{size} samples, to one per cent, where the spectrum alone needs {asked}"
         return [RECORD_LONGER.found(fact, where="signal", samples=size, of_spectrum=asked)]
-    dear = record.extra_power > _DEAR
+    dear = record.extra_power > _EXPENSIVE
     return RECORD_DEAR.when(dear, f"{times:.3g} times as much", where="signal.samples", times=times)
 
 
@@ -115,7 +115,7 @@ def short_windows(kind: FindingKind, seen: int, remembered: float, distance: flo
     Args:
         seen: samples in a window of the bound.
         remembered: the slowest time constant of the plant in samples.
-        distance: of the record from the bound, as a share.
+        distance: relative distance of the record from the bound.
     """
     fact = f"the slowest time constant is {remembered:.3g} samples, and a window of the bound has {seen}"
     far = distance is not None and distance > _FAR and remembered > seen
@@ -147,15 +147,15 @@ def noise_moves_input(kind: FindingKind, deviations: Array, peaks: Sequence[floa
     """The controller passes noise on to the input. Limits on single samples do not count it.
 
     Args:
-        deviations: (r,) of the inputs by the noise alone.
-        peaks: (r,) of the inputs without noise.
+        deviations: (r,), standard deviations of the inputs by the noise alone.
+        peaks: (r,), peaks of the inputs without noise.
     """
     beside = list(enumerate(zip(deviations.tolist(), peaks, strict=True), start=1))
     fact = " and ".join(
         f"{size:.3g} to u{j}, whose peak is {peak:.3g} without it" for j, (size, peak) in beside
     )
     fact = f"it adds a standard deviation of {fact}"
-    seen = any(size > _SEEN * peak for _, (size, peak) in beside)
+    seen = any(size > _NOTABLE * peak for _, (size, peak) in beside)
     return kind.when(seen, fact, where="limits.amplitude", deviations=deviations.tolist())
 
 
@@ -164,7 +164,7 @@ def level_rounded(kind: FindingKind, quantisers: Sequence[Quantiser], peak: floa
     """The record moves about another level than signal.offset. A converter has only values of its own.
 
     Args:
-        quantisers: one an input, in a converter's own units.
+        quantisers: one for each input, in the converter's own units.
         peak: the largest move from the level; a shift of a small share of it is not worth a note.
     """
     return [
@@ -175,7 +175,7 @@ def level_rounded(kind: FindingKind, quantisers: Sequence[Quantiser], peak: floa
             offset=one.offset,
         )
         for j, one in enumerate(quantisers, start=1)
-        if abs(one.operating_point - one.offset) > _SEEN * peak
+        if abs(one.operating_point - one.offset) > _NOTABLE * peak
     ]
 
 
@@ -195,11 +195,11 @@ def level_notes(
     """Return what the user should know before the record is applied.
 
     Args:
-        levels: by channel, what was taken away from the data.
-        point: what the record varies about by input; None for zero.
-        means: (r,), of the inputs as they were recorded; None: not known.
-        swings: (r,), the largest deviations of the inputs from their means: zero within them is no level far
-            away, and means of short records say little.
+        levels: the levels that were subtracted from the data, by channel.
+        point: the levels of the inputs about which the record varies; None for zero.
+        means: (r,), means of the recorded inputs; None: not known.
+        swings: (r,), the largest deviations of the inputs from their means. Smaller means are not reported,
+            since means of short records are uncertain.
     """
     found = _about_levels(point) if point is not None and levels else []
     if means is None or (point is not None and not levels):  # the spec states it

@@ -1,4 +1,4 @@
-"""What a user should know of a design, or of a given excitation, before a number of it is trusted."""
+"""Findings on a design, or on a given excitation, before its numbers are trusted."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from inputdesign_cli.signal.limits import Bounds
 _ROUNDING = 1e-9
 # An input with less than this share of the power has none.
 _NOTHING = 1e-9
-# Time constants that an experiment has at least, for its spectrum to say what it reaches.
+# The shortest experiment, in slowest time constants, whose accuracy its spectrum predicts.
 _SETTLED = 2.0
 # Below this share of its largest price, power at a frequency is called free of charge.
 _FREE = 1e-3
 # Samples a parameter below which first-order theory understates errors by a tenth or more.
 _FEW = 20
-_SUPPORT = 1e-3
-_NEAR = 0.9  # of the |S| that is allowed
+_SUPPORT = 1e-3  # share of the power from which a line counts
+_NEAR = 0.9  # share of the allowed |S|
 
 
 @finding(NOTE, "no-excitation-needed", "Use a record of normal operation, or ask for more accuracy.")
@@ -181,9 +181,9 @@ def limits_not_kept(
     """Return a finding for each limit that the excitation does not keep.
 
     Args:
-        limits: on powers.
+        limits: the limits on powers.
         samples: the length of the experiment, at most `longest`.
-        power: of the excitation, by channel.
+        power: the powers of the excitation, by channel.
         signal: the statements about its record, whose samples have the `bounds`; None without one.
     """
     channels = {"input": power.input, "output": power.output, "excitation": power.excitation}

@@ -1,4 +1,4 @@
-"""How an estimate was found, how sure its parameters are, and what it cannot be asked."""
+"""How an estimate was found, how certain its parameters are, and whether its accuracy can be evaluated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 
-# Of a standard deviation: nearer to where an expression ends, an estimate was stopped there.
+# An estimate nearer than this share of a standard deviation to the end of an expression was stopped there.
 _ASIDE = 0.001
 # A first residual beyond this number of standard deviations is reported.
 _SEEN_AT_ONCE = 3.0
@@ -151,7 +151,7 @@ def unasked(kind: FindingKind, why: str) -> list[Finding]:
 
 
 def noise_probability(estimate: Estimate) -> float:
-    """Return the probability of residuals as coloured, if the noise model were right."""
+    """Return the probability that residuals are as coloured by chance if the noise model is right."""
     return min(test.probability for test in estimate.tests.scores if test.fault == "noise")
 
 
@@ -164,7 +164,7 @@ def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> 
     Tests, covariance and verdict hold for this larger model.
 
     Args:
-        probability: of the residuals with the noise of the spec; None if none other was estimated.
+        probability: probability of the residuals with the noise of the spec; None if it was not enlarged.
     """
     if probability is None:
         return []

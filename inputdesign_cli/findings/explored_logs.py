@@ -22,28 +22,29 @@ from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
-# Unexplained share of an input's power, by the others, below which minima that swap effects are many.
+# Below this share of an input's power that the other inputs do not explain, many minima swap their effects.
 _FOLLOWS = 0.02
 # A parameter is not determined at all where it deviates by more than this share of its value.
 _UNDETERMINED = 100.0
-# A simulation that explains less of data it has not seen is no model; one that is refuted needs more.
+# The least fit to unseen data, in per cent, below which a model is doubted, a refuted model, and a surely
+# refuted one.
 LEAST_FIT, HALF, _MOSTLY = 5.0, 50.0, 90.0
 _SURELY = 1e-6  # the probability below which tests refute a model that explains more than half, too
-# The static gain is within so many deviations of none, that at some frequency of the record is not; and the
-# first is larger by this factor: G still rises there towards low frequencies.
+# The static gain is less than _OPEN deviations from zero, but |G| at some frequency of the record more than
+# _CLEAR, and smaller by the factor _RISING: G still rises towards low frequencies.
 _OPEN, _CLEAR, _RISING = 3.0, 4.0, 2.0
-_FREQUENCIES, _STATIC = 40, 1e-6
-# A rival of a twentieth of the likelihood, -2 log of that, and how far its G is off, in shares of its peak.
+_FREQUENCIES, _STATIC = 40, 1e-6  # the frequency of the static gain, relative to the lowest of the record
+# The excess of a rival with a twentieth of the likelihood; the least change of its G, relative to the peak.
 _AS_LIKELY, _ELSEWHERE = 2.0 * float(np.log(20.0)), 0.1
 _TESTS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
 def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
-    """Return why the inputs of records leave the plant open.
+    """Return the reasons why the inputs of records do not determine the plant.
 
     Args:
         parts: all records, u (n, r), y (n, p).
-        loop: whether inputs answer the outputs.
+        loop: whether inputs respond to the outputs.
     """
     moving = [(u[:, found.moving], y) for u, y in parts]
     inverses = [] if loop else _inverses(found, moving)
@@ -118,7 +119,7 @@ def doubtful_model(
         integrates: whether the user says that the plant is an integrator.
     """
     unstable = _unstable(parts)
-    if unstable:  # what stable models say of such a plant is wrong
+    if unstable:  # stable models of an unstable plant are wrong
         return unstable
     return [
         *_unjudged(found),
@@ -147,7 +148,7 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
         output = signal_name("y", i, found.model.outputs)
         luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
-        # What wanders leaves any simulation: whether inputs help to predict it decides there.
+        # A wandering output leaves any simulation; whether inputs help to predict it is tested instead.
         little = not found.wanders[i] and fit < max(LEAST_FIT, luck)
         fact = f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone"
         doubtful += kind.when(little, fact, where=output, fit_percent=fit, chance_percent=luck)
@@ -218,7 +219,7 @@ def _like_integrators(
     rising = []
     for i, j in ((i, j) for i in range(model.outputs) for j in found.moving):
         size, deviations = np.abs(G[:, i, j]), np.sqrt(np.maximum(variance[:, i, j], 0.0))
-        # |G| is clear where it rises, and its end is not.
+        # |G| is certain at a frequency where it rises, and the static gain is not.
         clear = (size > _CLEAR * deviations) & (_RISING * size < size[0])
         if not (np.all(np.isfinite(size + deviations)) and size[0] < _OPEN * deviations[0] and np.any(clear)):
             continue

@@ -13,7 +13,7 @@ from inputdesign_cli.identification.response_chance import perhaps_zero
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
-_MORE = 0.05  # per cent of the output, below which structures explain the same
+_MORE = 0.05  # per cent of the output by which a structure explains more
 
 
 def explored_structures(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> list[Finding]:

@@ -23,8 +23,8 @@ from inputdesign_cli.plant import Model
 _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
 # The probability that a normal variable is farther than five standard deviations from its mean.
 _FIVE_DEVIATIONS = 5.733e-7
-_AWAY, _LISTED = 4.0, 4
-_LOWEST = 1e-6  # of the band
+_AWAY, _LISTED = 4.0, 4  # least standard deviations of a listed parameter; the most listed
+_LOWEST = 1e-6  # share of the band below which a frequency is not named
 _SOME = np.array([0.013, 0.37, 1.9])  # frequencies at which two plants are compared
 
 ANOTHER = doubt(
@@ -53,7 +53,7 @@ class Distance:
 
     Attributes:
         listed: the parameters that are farthest, with their values and deviations.
-        share, place: how much G differs at most, of the larger one, and where; zero if no error of G has r_u.
+        share, place: largest difference of G, relative to the larger one, and where; zero without r_u of G.
         exact: whether the spec states no uncertainty.
         outside: the parameters beyond the uncertainty of the spec, with their values.
     """
@@ -80,11 +80,11 @@ def from_nominal(
     """Return how far an estimate lies from the plant of the spec.
 
     Args:
-        nominal, estimated: of one structure.
-        errors: what has r_u and a band, entry by entry.
+        nominal, estimated: models of one structure.
+        errors: the model errors with r_u and a band, entry by entry.
         information: (k, k) in their coordinates, the inverse covariance of the difference of the two.
-        asked: whether they have an r_adm, below which a difference of G matters to nothing.
-        nominal_covariance: (k, k), how uncertain the plant of the spec is; None if it counts as known.
+        asked: whether they have an r_adm, below which a difference of G does not matter.
+        nominal_covariance: (k, k), covariance of the plant of the spec; None if it counts as exact.
     """
     of_plant = np.flatnonzero(estimated.in_plant)
     order = _nearest_order(nominal, estimate.theta, of_plant.tolist())
@@ -125,10 +125,10 @@ def from_nominal(
 def _nearest_order(nominal: Model, theta: Array, of_plant: Sequence[int]) -> NDArray[np.int_]:
     """Return the order (k,) of the parameters of the spec's plant that is nearest to an estimate.
 
-    Two lags may change their names: G stays the same.
+    Two lags may be exchanged without a change of G.
     """
     order, values = np.arange(theta.size), np.asarray(nominal.theta)
-    with np.errstate(all="ignore"):  # an exchange may make a plant that no spec states
+    with np.errstate(all="ignore"):  # an exchange may make an invalid plant
         G = nominal.plant_at(_SOME)
         for a, b in combinations(of_plant, 2):
             other = order.copy()

@@ -20,9 +20,9 @@ from inputdesign_cli.plant import TransferMatrix
 
 # Share of samples above which a frozen sensor biases a model; fit (%) below which spikes do.
 _BIASING, _HALF = 0.02, 50.0
-# The error that rounding may leave in a level, as a share of the deviation of the output.
+# The bias of a level by rounding that matters, as a share of the output's deviation; harmonics in its bound.
 _ROUNDED_OFF, _HARMONICS = 0.03, 50
-# Moves of inputs up to so many samples before explain spikes, if they leave less than this share of squares.
+# Input moves up to _BEFORE samples earlier explain spikes if they leave less than _LEFT of their squares.
 _BEFORE, _LEFT = 6, 0.25
 
 SPIKES = refuted(
@@ -102,7 +102,7 @@ def follows_inputs(errors: Array, samples: Sequence[int], u: Array) -> bool:
 
 
 def rounding_error(step: float, noise: float) -> float:
-    """Return the largest mean error of rounded samples of a level, behind Gaussian noise of that deviation.
+    """Return the largest bias of the mean of rounded samples: a level with Gaussian noise of that deviation.
 
     It is a sawtooth of the level with harmonics (d / (pi k)) exp(-2 (pi k s / d)^2), step d and noise s
     ([widrow-kollar-2008]). Their sum bounds it, and so does half a step.

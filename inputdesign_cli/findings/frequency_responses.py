@@ -20,7 +20,7 @@ from inputdesign_cli.identification.periodic_response import PeriodDrift, Period
 from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.units import Units
 
-# At how many of the frequencies no model is right any more.
+# The share of frequencies far outside the discs that contradicts a model.
 _MOST_FAR = 0.1
 # A shift of the response by the start that is worth a finding, in standard deviations.
 _SHIFTED, _ROUNDING = 0.2, 1e-9
@@ -32,8 +32,8 @@ REMEDY = "apply the signal.csv of the spec, and record u as it was applied"
 UNLIKE = 0.5
 """Inputs of which more than this share differs from period to period do not repeat, even in a loop."""
 # Silent lines are worth a finding below this probability, times the number of tests.
-_SPEAKS = 0.01
-# A response that a nonlinearity would change by much is doubted earlier, by the odd lines alone.
+_SIGNIFICANT = 0.01
+# A nonlinearity that would change the response by much is reported below this probability of the odd lines.
 _DOUBT = 0.05
 # The two tests of odd lines: their power, and their likeness to a cube.
 _WAYS = 2
@@ -129,7 +129,7 @@ def noise_leaks(kind: FindingKind, ratio: float) -> list[Finding]:
     """Leakage of noise exceeds the required accuracy. The limits forbid the power that compensates it.
 
     Args:
-        ratio: of the deviation of a record to the admissible one.
+        ratio: ratio of the deviation of a record to the admissible one.
     """
     fact = f"the deviation is {ratio:.7g} times the admissible one"
     return kind.when(ratio > 1.0 + _ROUNDING, fact, where="limits", ratio=ratio)
@@ -150,7 +150,7 @@ class Distorted:
 
     Attributes:
         shares: (L,), at every line.
-        probability: that noise alone has as much at the silent lines.
+        probability: the probability that noise alone has as much at the silent lines.
         cubed: the signal, for example u1, whose cube the silent lines resemble; empty if the shares rest on
             the power alone.
     """
@@ -181,10 +181,10 @@ def distorted(
     """Return the error of G over the admissible one (L,); None if odd lines contain no more than noise.
 
     Args:
-        shares: by the power at silent lines.
-        of_cube: shares by the cubes of the outputs that have a one in (p,).
+        shares: (L,), the error by the power at silent lines.
+        of_cube: returns the error by the cubes of the outputs that have a one in (p,).
     """
-    # That noise alone has as much at any output, in either test.
+    # The probability that noise alone has as much at any output, in either test.
     each = silent["odd"].probability, cube.probability
     power, like = (min(_WAYS * float(one.min()) * one.size, 1.0) for one in each)
     alike = _WAYS * cube.probability.size * cube.probability < _DOUBT
@@ -196,7 +196,7 @@ def distorted(
         source = int(cube.source[output])
         signal = f"y{output + 1}" if source < 0 else f"u{source + 1}"
     found = Distorted(np.asarray(both), min(power, like), signal)
-    small = min(_chance(silent, "odd"), like) < _SPEAKS
+    small = min(_chance(silent, "odd"), like) < _SIGNIFICANT
     return found if (min(power, like) < _DOUBT if found.matters else small) else None
 
 
@@ -221,7 +221,9 @@ def silent_lines_answer(kind: FindingKind, silent: Mapping[str, SilentLines]) ->
     for parity, found in silent.items():
         chance, rms = _chance(silent, parity), ", ".join(f"{value:.3g}" for value in found.rms)
         fact = f"{parity} lines have rms {rms} (probability of chance {chance:.2g})"
-        seen += kind.when(chance < _SPEAKS, fact, where=parity, probability=chance, rms=found.rms.tolist())
+        seen += kind.when(
+            chance < _SIGNIFICANT, fact, where=parity, probability=chance, rms=found.rms.tolist()
+        )
     return seen
 
 
@@ -262,7 +264,7 @@ def spiked_periods(
     """A few samples dominate the differences between periods. No verdict is possible.
 
     Args:
-        places: where the samples of each of them stand, in words.
+        places: the places of the samples of each, in words.
     """
     spiked = []
     for one, place in zip(found, places, strict=True):
@@ -279,8 +281,8 @@ def drifting_periods(
     """Outputs drift from period to period. Drift leaks into every line and changes the response.
 
     Args:
-        moved: (L,), the change over what is admitted, at frequencies w in the unit of the user.
-        lined: whether a line was taken away already.
+        moved: (L,), the change over the admissible error, at frequencies w in the unit of the user.
+        lined: whether a line was subtracted already.
     """
     at = int(np.argmax(moved))
     share, frequency = float(moved[at]), float(w[at])
@@ -313,9 +315,9 @@ def within_chance(
     The true deviation lies between two limits (95 %), and the admissible one is between them too.
 
     Args:
-        ratio: the largest one of a deviation to the admissible one; `limits`: of the true one.
-        frequency: of the largest ratio, in the unit of the user.
-        enough: how many periods are needed, in words.
+        ratio: the largest estimated deviation over the admissible one; `limits`: 95 % limits of the true one.
+        frequency: the frequency of the largest ratio, in the unit of the user.
+        enough: the number of periods needed, in words.
     """
     fact = (
         f"at {frequency:.4g} {units.per_time} the deviation is {ratio:.4g} of the admissible one, and the "

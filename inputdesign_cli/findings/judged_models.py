@@ -17,10 +17,10 @@ _SURELY = 1e-6
 
 
 def other_plants(found: Fits, data: Record) -> list[Finding]:
-    """Return why a model is not of these data, output by output.
+    """Return the reasons why a model does not describe these data, output by output.
 
-    A poor fit alone is no fault of the model, since the noise may be strong, unless past inputs explain the
-    rest.
+    A poor fit alone is no fault of the model, since the noise may be strong. It is one if past inputs explain
+    the rest.
     """
     doubts = list[Finding]()
     for i, fit in enumerate(found.simulation):

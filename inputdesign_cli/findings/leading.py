@@ -1,4 +1,4 @@
-"""Find what invalidates the other objections to an estimate, and the one command to run next."""
+"""Find the objection to an estimate that may explain the others, and the one command to run next."""
 
 from __future__ import annotations
 
@@ -55,16 +55,16 @@ _NEXT = {
     "neglected-parameter": _EXPLORE,
     "other-minimum": "idesign solve SPEC --set signal.seed=2 --set spectrum=null"
     "  # a smooth spectrum, of more frequencies; then assess both records",
-    # Of a frequency response without a model.
+    # Findings on a frequency response without a model.
     "spiked-periods": _AGAIN + "--without ROWS",
     "drifting-periods": _AGAIN + "--detrend linear",
     "nonlinear-response": "idesign solve SPEC --set signal.phases=random  # and apply half of it",
     "response-within-chance": _AGAIN + "MORE.csv  # a further record of this signal",
 }
-"""The command after each finding that leaves a verdict open; an earlier one silences the later ones."""
+"""The command after each finding that leaves a verdict open; earlier entries precede later ones."""
 _DETREND = _AGAIN + "--detrend linear"
 _ORDER = list(_NEXT)
-_LEAK = 1e-3  # a sample, to begin with
+_LEAK = 1e-3  # per sample, the nominal value of a leak
 # Notes that may follow from a wrong model as well.
 _ALSO = ("start-estimated",)
 # A shift of level that takes more than this share of a record is a drift.
@@ -84,7 +84,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
     A drift that explains them is a finding of its own, even if no test has found it.
 
     Args:
-        estimate: of a model from the `data`; None for a response without one.
+        estimate: the estimate of a model from the `data`; None for a response without a model.
     """
     against = [one for one in findings if undecided([one])]
     if not against:
@@ -116,7 +116,7 @@ def leading(findings: Sequence[Finding], estimate: Estimate | None, data: Record
 def _slow_cause(first: Finding, against: Sequence[Finding], estimate: Estimate, data: Record) -> str:
     """Return the command for a drift along a line, or for a leak of an integrator, that explains the rest.
 
-    Past inputs, or a shift of most of a record, explain what a leak takes away. A line in the output of a
+    Past inputs, or a shift of most of a record, may stand for the effect of a leak. A line in the output of a
     plant that integrates may be its response to the input.
     """
     model, rows = _model(estimate), first.figures.get("rows")

@@ -1,8 +1,8 @@
 """Compute how far G would move if the model had an additional parameter, relative to the admissible error.
 
 r_u is the error of a right model. The error of a wrong model shows only as far as the record excites it.
-So a verdict comes with how far an additional parameter would move G, to first order, and how far it may
-with these data.
+So a verdict comes with the change of G by an additional parameter, to first order, and with the largest
+change that these data do not exclude.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Neglected:
     """A parameter that the model does without.
 
     Attributes:
-        moves: what it does to G, at the frequencies of the requirement.
-        may_move: how far it may move G at most, with 95 %, over what is admitted.
-        frequency: where, in the unit of the experiment.
+        moves: the change of G, at the frequencies of the requirement.
+        may_move: the largest change of G that is not excluded (95 %), over the admissible error.
+        frequency: the frequency of this change, in the unit of the experiment.
     """
 
     directed: Directed
@@ -54,7 +54,7 @@ def neglected(
     """Return the tried parameters that do not refute `model`; an empty list if no error of G is specified.
 
     Args:
-        information: (k, k), by which r_u is judged.
+        information: (k, k), the information matrix of r_u.
     """
     refuted = {test.name for test in estimate.tests.failed}
     tried = [directed for directed in estimate.tests.directed if directed.test.name not in refuted]
@@ -71,7 +71,7 @@ def _largest(model: Model, directed: Directed, error: OnModelError, information:
         for states in (directed.moves(model, w), directed.slope(model, w))
     )
     deviation = directed.deviation * slope
-    # A record that misses what is asked is judged as one that would just meet it.
+    # If r_u exceeds the admissible error, the parameter is judged as if r_u just met it.
     known = np.minimum(error.error_bound(information, w) / error.admissible.at(w), 1.0) / error.alpha
     may_move = moves + _ALLOWED * deviation
     at = int(np.argmax(may_move))
@@ -92,7 +92,7 @@ def objections(kind: FindingKind, units: Units, found: Sequence[Neglected], *, m
     Args:
         met: whether the verdict would be `met`, which a parameter that matters contradicts.
     """
-    severity = REFUTED if met else DOUBT  # more parameters miss it all the more
+    severity = REFUTED if met else DOUBT  # a verdict `missed` stays with more parameters
     against = []
     for one in mattering(found):
         test, moves, tried = one.directed.test, one.moves.largest, one.directed.alternatives[0]

@@ -34,9 +34,9 @@ PRIOR_REPEATED = refuted(
     "Remove the prior, or give only records that it does not include.",
 )
 
-# This many rows in a row, half of them different, come again in another record by copying only.
+# This number of successive rows, half of them different, recurs in another record only if copied.
 _IN_A_ROW = 8
-# A record of which this share stands in another is a copy; a smaller part is a finding.
+# A record is a copy if _COPY of it stands in another, as a share; from _PART on there is a finding.
 _COPY, _PART = 0.95, 0.1
 _PRIOR = "experiment.prior"
 
@@ -55,7 +55,7 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     """Return a finding where the prior and the data are not of one system, or are of one record.
 
     Args:
-        looks: how often it is asked as data come in; they share the level (Bonferroni).
+        looks: number of tests as data come in; they share the level (Bonferroni).
     """
     if estimate.prior is None:
         return []
@@ -73,7 +73,7 @@ def differences(kind: FindingKind, estimate: Estimate, files: Sequence[str], loo
     """The records come from different systems. Their own parameters differ by more than chance.
 
     Args:
-        looks: how often it is asked; all records and looks share the level (Bonferroni).
+        looks: number of tests as data come in; all records and looks share the level (Bonferroni).
     """
     if not estimate.tests.alike:
         return []
@@ -106,10 +106,10 @@ def samples_repeated(kind: FindingKind, paths: Sequence[Path], records: Sequence
     """Two files have rows in common. The estimate would look more accurate than it is.
 
     Args:
-        records: (n, c) of each file, as it stands there.
+        records: (n, c), the values in each file.
 
     Raises:
-        DataError: `data-repeated`, one holds what another does.
+        DataError: `data-repeated`, two files hold the same samples.
     """
     found = []
     for (other, others), (path, rows) in combinations(zip(paths, records, strict=True), 2):

@@ -36,22 +36,22 @@ SENSOR_ROUNDED = note(
     "Log with more digits, or excite with larger moves.",
 )
 
-# Farther off than this many robust standard deviations.
+# Distances in robust standard deviations beyond which values are outlying, or spikes.
 _OUTLYING, _SPIKE = 8.0, 12.0
-# A single spike stands out this much more than its neighbours; above this share they are no accidents.
+# A single spike stands out by this factor from its neighbours; spikes beyond this share are no accidents.
 _ALONE, _SELDOM = 4.0, 0.01
-_SHORTEST = 10
+_SHORTEST = 10  # the fewest samples in which spikes are looked for
 # More values than this share are no outliers, but the other level of the signal.
 _OFTEN = 0.05
 # Squares of signals are powers, and a spec has none beyond the square of this, or below that of its inverse.
 _EXTREME = 1e18
-# Beside a value this many times farther off than any other, all others are lost in rounding when squared.
+# A value this many times farther off than usual leaves all others to rounding when squared.
 _ABSURD = 1e10
-# How far back an input is taken to act, and the samples from which that is estimated: this is a quick look.
+# The most lags of an impulse response, the most samples that give it, its ridge, and the samples per lag.
 _LAGS, _MOST, _RIDGE, _PER_LAG = 150, 5000, 1e-9, 6
-_PASSES, _USUAL = 3, 4.0
-# Levels, and the share of samples at the end of a range; the share of a step by which rounded values are off
-# their grid, and the step in standard deviations.
+_PASSES, _USUAL = 3, 4.0  # fits without outliers; their largest residual, in median absolute residuals
+# A saturated signal has more than _FEW_LEVELS levels, and _CLIPPED of its samples at an extreme, in runs of
+# _RUN. Rounded values are off their grid by less than _OFF_GRID steps of at least _COARSE deviations.
 _FEW_LEVELS, _CLIPPED, _RUN = 10, 0.02, 3
 _OFF_GRID, _COARSE = 1e-3, 0.1
 
@@ -59,12 +59,12 @@ _OFF_GRID, _COARSE = 1e-3, 0.1
 def without_spikes(
     names: Sequence[str], u: Array, y: Array, counts: NDArray[np.bool_], rows: NDArray[np.int64]
 ) -> tuple[Array, list[Finding]]:
-    """Return outputs (n, p) with single spikes replaced, and what is seen in all signals.
+    """Return outputs (n, p) with single spikes replaced, and findings on all signals.
 
     Args:
-        names: of the inputs u (n, r), then of the outputs y (n, p); NaN where a number is missing.
+        names: names of the inputs u (n, r), then of the outputs y (n, p); NaN where a number is missing.
         counts: (n,), whether a sample is not left out.
-        rows: (n,), of the file.
+        rows: (n,), rows of the file.
     """
     r, found, plain = u.shape[1], [], y.copy()
     for name, x in zip(names[:r], u.T, strict=True):
@@ -92,14 +92,14 @@ def single_spikes(y: Array, u: Array) -> NDArray[np.int64]:
         return np.zeros(0, dtype=np.int64)
     at = _spikes(y)
     if at.size:
-        at = np.intersect1d(at, _spikes(y - _caused(u, y)))
+        at = np.intersect1d(at, _spikes(y - _response(u, y)))
     return at if at.size <= max(1, _SELDOM * y.size) else at[:0]
 
 
 def _spikes(y: Array) -> NDArray[np.int64]:
     off = np.abs(y - scipy.ndimage.median_filter(y, 5, mode="nearest"))
     steps, between = np.abs(np.diff(y)), np.abs(y[1:-1] - 0.5 * (y[:-2] + y[2:]))
-    # Rounded values lie between their neighbours most of the time: their least step counts.
+    # Most rounded values equal the mean of their neighbours, so that the least step counts as well.
     least = float(np.min(steps[steps > 0.0], initial=np.inf))
     spread = max(1.4826 * float(np.median(between)), float(np.quantile(between, 0.95)) / 2.0, least)
     far = np.flatnonzero(off[1:-1] > _SPIKE * spread) + 1
@@ -109,11 +109,11 @@ def _spikes(y: Array) -> NDArray[np.int64]:
 def outlying(name: str, x: Array, u: Array | None, lines: NDArray[np.int64]) -> list[Finding]:
     """Say which values of a signal x (n,), with their rows in the file, are far from the median.
 
-    Of an output, what the inputs u (n, r), NaN where missing, explain is not: a plant answers pulses.
+    Values of an output that the inputs u (n, r), NaN where missing, explain do not count.
     """
     far = _far(x)
     if u is not None and np.any(far):
-        far &= _far(x - _caused(u, x))
+        far &= _far(x - _response(u, x))
     count, rows = int(far.sum()), lines[far]
     fact = f"{count} of {name} ({listed(rows)})"
     seldom = 0 < count <= _OFTEN * x.size
@@ -143,7 +143,7 @@ def visible_step(x: Array) -> float:
     levels = np.unique(x)
     gaps = np.diff(levels)
     step = float(gaps.min(initial=np.inf))
-    # Values that are not rounded hardly come again.
+    # Values that are not rounded rarely recur.
     visible = _COARSE * float(np.std(x)) < step < np.inf and 2 * levels.size < x.size
     return step if visible and np.all(np.abs(gaps / step - np.round(gaps / step)) < _OFF_GRID) else 0.0
 
@@ -151,12 +151,12 @@ def visible_step(x: Array) -> float:
 def _far(x: Array) -> NDArray[np.bool_]:
     off = np.abs(x - np.median(x))
     low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
-    # A few values do not move this deviation. Two levels have no spread about the more frequent one.
+    # A few outliers do not change this spread. The median deviation of a signal with two levels may be zero.
     spread = max(1.4826 * float(np.median(off)), float(high - low) / 4.0)
     return off > (_OUTLYING * spread if spread > 0.0 else np.inf)
 
 
-def _caused(u: Array, y: Array) -> Array:
+def _response(u: Array, y: Array) -> Array:
     """Return the part (n,) of an output that past inputs explain, by a finite impulse response."""
     u = u[:, ~np.all(np.isnan(u), axis=0)]
     lags = min(_LAGS, len(y) // (_PER_LAG * max(u.shape[1], 1))) if u.size else 0
@@ -169,7 +169,7 @@ def _caused(u: Array, y: Array) -> Array:
     columns = np.column_stack([columns, np.ones(len(columns))])[lags:]
     level = float(np.median(y))
     wanted, kept = y[lags:_MOST] - level, np.ones(len(columns), dtype=bool)
-    for _ in range(_PASSES):  # faults do not decide what is explained
+    for _ in range(_PASSES):  # outliers do not affect the fit
         own = columns[kept]
         gram = own.T @ own + _RIDGE * len(columns) * np.eye(own.shape[1])
         solution = np.asarray(np.linalg.solve(gram, own.T @ wanted[kept]), dtype=float)
@@ -193,7 +193,7 @@ def beyond_precision(name: str, x: Array) -> tuple[int, str, str] | None:
     off = np.abs(scaled - middle)
     usual = max(float(np.median(off[off > 0.0])), abs(middle)) if np.any(off > 0.0) else np.inf
     far = there[off > _ABSURD * usual]
-    if 0 < far.size <= _OFTEN * there.size:  # as often as the other level of a signal, it is no fault
+    if 0 < far.size <= _OFTEN * there.size:  # more frequent values are another level of the signal
         message = f"{x[far[0]]:.6g} in column {name} is so large that all other values are lost in rounding"
         return int(far[0]), message, "write the value that was meant"
     if size and not 1.0 / _EXTREME < size < _EXTREME:

@@ -14,10 +14,10 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.outcome.units import Units
 
-SHOWN = 5
+SHOWN = 5  # places that a message lists
 SHORTEST = 10
 """Samples of the shortest segment."""
-# Rows that an option lists.
+# The most runs of rows that an option lists.
 _LISTED = 40
 
 
@@ -31,9 +31,9 @@ class Recorded:
     """Holds the signals as the files have them.
 
     Attributes:
-        values: (samples, r + p), of inputs and outputs.
-        rows: (samples,), where each sample stands; the nearest one, where times were evened out.
-        held: (samples, p), whether an output was recorded as it was a sample before.
+        values: (samples, r + p), inputs and outputs.
+        rows: (samples,), the row of each sample; the nearest one if times were evened out.
+        held: (samples, p), whether an output equals the sample before.
         resolution: (p,), the step in which each output is recorded.
     """
 
@@ -58,15 +58,15 @@ class Record:
         lengths: the samples of each segment.
         files: the name of each file and its samples.
         recorded: the signals as the files have them; None: not known.
-        names: of the columns, by channel.
+        names: names of the columns, by channel.
         step, time_unit: the sample time.
-        findings: what was done to the record and what was seen in it.
+        findings: the findings on the record and its preparation.
         header: the names of the columns of the first file, in small letters.
-        means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
-        repeated: files that have samples in common.
-        lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
+        means: (r,), means of the inputs as recorded, before trends or levels were removed; None: unknown.
+        repeated: findings on files that have samples in common.
+        lined: whether a line was subtracted from an output. Its slope is then estimated with the model, since
             the inputs cause a part of it.
-        paths: of the files, as they were given.
+        paths: paths of the files, as they were given.
     """
 
     u: Array

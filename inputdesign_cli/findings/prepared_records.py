@@ -1,4 +1,4 @@
-"""What was done to a record when it was read, and what of its file was not used."""
+"""Findings on the preparation of a record when it was read, and on unused parts of its file."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def columns_by_unit(kind: FindingKind, taken: Mapping[str, str]) -> list[Finding
     """A column was taken for a channel by its unit. Its name is not that of the channel in the spec.
 
     Args:
-        taken: by channel, the column.
+        taken: the column of each channel.
     """
     fact = ", ".join(f"{column} as {channel}" for channel, column in taken.items())
     return [kind.found(fact, where=", ".join(taken), columns=[*taken.values()])] if taken else []
@@ -119,7 +119,7 @@ def columns_against_spec(
     Args:
         header: the names of all columns.
         channels: name and unit of u1, .. and y1, .. in the spec.
-        columns: by channel, the column that it has.
+        columns: the column of each channel.
     """
     counts = {"u": inputs, "y": outputs}
     numbered = [name.strip().lower() for name in header if _NUMBERED.fullmatch(name.strip().lower())]

@@ -51,10 +51,10 @@ def foreseen_entries(units: Units, estimate: Estimate, found: Sequence[Apart]) -
 def beyond(
     model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array | None = None
 ) -> list[Apart]:
-    """Return the rivals whose G is further from that of the estimate than is admitted.
+    """Return the rivals whose G differs from that of the estimate by more than the admissible error.
 
     Args:
-        information: (k, k); with it, further than the error bound r_u.
+        information: (k, k); if given, by more than its error bound r_u instead.
     """
     found, measure = [], "the admissible error" if information is None else "r_u"
     for rival in estimate.search.rivals:
@@ -92,8 +92,8 @@ def other_minima(
     """Other parameters explain the data nearly as well. Another minimum of the likelihood has another G.
 
     Args:
-        errors: what is asked of the model error.
-        unstated: what has r_u of G where nothing is asked.
+        errors: the requirements on the model error.
+        unstated: errors of G with r_u, which count if nothing is required.
         information: (k, k) in their coordinates.
     """
     doubtful = beyond(model, estimate, errors or unstated, information)

@@ -73,8 +73,8 @@ def uncounted_excitation(message: str, *, bounded: bool) -> Finding:
     """Return the finding that spectra come ever nearer to excitation that nothing counts.
 
     Args:
-        message: what is not counted, and what to do.
-        bounded: whether what they reach has a bound.
+        message: the excitation that is not counted, and what to do.
+        bounded: whether the objective of these spectra has a bound.
     """
     return (ONLY_APPROACHED if bounded else NO_BOUND_EXISTS).found(message, remedy="Nothing")
 

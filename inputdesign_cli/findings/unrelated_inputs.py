@@ -15,11 +15,11 @@ from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
 
-# G of the spec is ruled out where chance alone makes such an estimate more seldom.
-_OTHERWISE = 1e-6
-# Of the squares of prediction errors: what the future of an input explains if it moves the output.
-_MOSTLY = 0.5
-# An output that moves in so many times fewer rows than every input may be an input itself.
+# G of the spec is ruled out if the probability of this estimate is below the threshold.
+_RULED_OUT = 1e-6
+# An input whose future explains more than this share of the squared prediction errors was logged late.
+_LOGGED_LATE = 0.5
+# An output that moves in fewer rows than every input, by this factor, may be an input itself.
 _HELD = 20.0
 
 UNEXPLAINED = doubt(
@@ -41,7 +41,7 @@ def answering(kind: FindingKind, units: Units, estimate: Estimate) -> list[Findi
     """An input responds to the outputs. In open loop no input responds to the noise."""
     found = []
     for test in estimate.tests.answering:
-        if test.statistic > _MOSTLY * estimate.errors.size:
+        if test.statistic > _LOGGED_LATE * estimate.errors.size:
             found.append(_late(units.inputs, units.outputs, test))
             continue
         name, p = signal_name("u", test.source, units.inputs), test.probability
@@ -94,13 +94,13 @@ def idle(
     """An input explains nothing. Its G cannot be distinguished from zero.
 
     Args:
-        nominal, estimated: of one structure.
+        nominal, estimated: models of one structure.
     """
     found = []
     for j, zero, expected in perhaps_other_inputs(nominal, estimated, estimate, units.step):
         name = signal_name("u", j, units.inputs)
         fact = f"{name} (probability {chance(zero)}, and {chance(expected)} for G of the spec)"
-        found += kind.when(expected < _OTHERWISE, fact, where=name, probability=zero)
+        found += kind.when(expected < _RULED_OUT, fact, where=name, probability=zero)
     return found
 
 

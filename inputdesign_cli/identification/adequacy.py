@@ -2,12 +2,12 @@
 
 A supplier proposes regressors: past inputs, past residuals, slow trends; `directed.py` proposes single
 parameters. The part that parameters and unknown starts can explain is taken off first, so that the statistic
-is chi-squared whatever was estimated. Past residuals lack the estimated part as well. If unknown starts are
-many, as in a record with gaps, that alone correlates residuals. Scores are compared with this correlation.
-In a narrow band the noise is known no better than its model there, and a statistic follows F instead
+is chi-squared whatever was estimated. The residuals lack this part as well. Many unknown starts, as in a
+record with gaps, correlate them by that alone. The mean of a score due to this correlation is subtracted.
+In a narrow band the estimated noise power is uncertain, and the statistic follows F instead
 ([satterthwaite-1946]).
 
-All of this holds for the right noise. If the stated noise model is refuted, residuals and regressors are
+All of this holds for a right noise model. If the stated one is refuted, residuals and regressors are
 whitened by filters that are estimated as well.
 """
 
@@ -25,12 +25,12 @@ from inputdesign_cli.identification.records import Point, Records, shifted
 from inputdesign_cli.identification.white import DEPENDENT, White, Whitening
 from inputdesign_cli.levels import level
 
-_LAGS = 25
-_FEW = 4
-_GROWTH = 1.35
-_FARTHEST = 400
-_AHEAD = 20
-_TRENDS, _WAVES = 3, 4
+_LAGS = 25  # past residuals of the test with many lags
+_FEW = 4  # past residuals of the test with few lags; single lags before runs of lags grow
+_GROWTH = 1.35  # ratio of successive runs of lags
+_FARTHEST = 400  # the largest lag of past inputs
+_AHEAD = 20  # the largest lead of future inputs
+_TRENDS, _WAVES = 3, 4  # powers of time and cosines in a drift
 # At most one direction per this number of residuals is tried.
 _SAMPLES_A_DIRECTION = 8
 
@@ -41,14 +41,14 @@ Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feed
 class ScoreTest:
     """The result of one chi-squared score test."""
 
-    name: str  # of the test
-    fault: Fault  # what is wrong if it fails
+    name: str  # for example recent_inputs
+    fault: Fault  # the kind of fault if it fails
     statistic: float
     freedom: int
-    probability: float  # of a statistic as large if the model is right, see `White.probability`
-    lag: int | None  # of past inputs or residuals, where they explain most; of trends None
-    output: int = 0  # of which residuals are explained most
-    source: int = 0  # by which input or other residual
+    probability: float  # probability of a statistic as large if the model is right, see `White.probability`
+    lag: int | None  # the lag of inputs or residuals that explains most; None for trends
+    output: int = 0  # the output (from zero) whose residuals are explained most
+    source: int = 0  # the input or residual (from zero) that explains them
 
 
 class Regressors(NamedTuple):
@@ -85,8 +85,8 @@ class Score(NamedTuple):
     """The part of residuals that regressors explain beyond estimated parameters and starts."""
 
     statistic: float  # chi-squared where the model is right
-    directions: Array  # ((N + M) p, freedom), orthonormal, of the regressors
-    sizes: Array  # (m,), of each regressor alone, in standard deviations up to a common factor
+    directions: Array  # ((N + M) p, freedom), orthonormal basis of the unexplained regressors
+    sizes: Array  # (m,), scores of the single regressors, in standard deviations up to a common factor
 
 
 def score(white: White, columns: Array, means: Array) -> Score:
@@ -96,8 +96,8 @@ def score(white: White, columns: Array, means: Array) -> Score:
     scores, mean = regressors.T @ white.residuals, white.mean_left(columns / norms, means / norms)
     left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
     kept, expected, along = sizes > DEPENDENT, right @ mean, right @ scores
-    # The part of a mean that comes of the parameters is right to first order only. Where it exceeds the
-    # deviation of the score, it is left out; if starts have a part in the mean too, so is the whole score.
+    # Estimated parameters contribute to the mean to first order only. A contribution beyond the deviation of
+    # the score is left out; if the regressors have means of their own, the score is left out as well.
     coarse = np.abs(right @ (mean - means / norms)) > np.sqrt(white.variance) * sizes
     expected[coarse] = along[coarse] if np.any(means) else 0.0
     along = (along - expected)[kept] / sizes[kept]
@@ -113,7 +113,7 @@ def score_tests(
 ) -> tuple[ScoreTest, ...]:
     """Return the score tests of past inputs, past residuals and trends at the estimate theta (k,).
 
-    `robust` is the estimate with whitened residuals, for all regressors but past residuals.
+    `robust` is the estimate with whitened residuals, used for all regressors but past residuals.
     """
     of_inputs = past_inputs(records, theta, feedback=feedback)
     every = [*of_inputs, *past_residuals(records, white), *_drifts(records, theta)]
@@ -129,9 +129,9 @@ def tested(white: White, tried: Regressors) -> ScoreTest | None:
         return None
     output, largest = divmod(int(np.argmax(np.abs(found.sizes))), tried.columns.shape[2])
     lag = tried.lags[largest] if tried.lags else None
-    # Lag by lag all inputs, or all residuals.
+    # At each lag stand all inputs, or all residuals.
     source = largest % tried.lags.count(tried.lags[0]) if tried.lags else 0
-    # What past residuals explain has no band of its own.
+    # Past residuals are white and occupy no narrow band, so that their statistic is chi-squared.
     probability = (
         float(scipy.special.chdtrc(freedom, found.statistic))
         if tried.of_residuals
@@ -180,7 +180,7 @@ def robust_white(
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
     trend = _trend(records, point.theta).white(white)
-    # Few regressors first: many explain a part of right residuals, which correlates the rest.
+    # Few regressors first: many would explain a part of white residuals, and so correlate the rest.
     if any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend]))):
         return None
     return White.of(records, point, Whitening.of(white.without(columns).errors, records.lengths))
@@ -191,7 +191,7 @@ def with_linear_faults(
 ) -> White:
     """Return the estimate once past inputs or a trend are free to explain residuals, where tests name them.
 
-    A lag or a drift that a model lacks looks like a plant that is not linear, or that changes.
+    A lag or a drift that a model lacks looks like a nonlinear or a time-varying plant.
     """
     named = {test.name for test in failed(tests)}
     tried = [*past_inputs(records, theta, feedback=feedback), *_drifts(records, theta)]

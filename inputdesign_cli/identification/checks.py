@@ -9,10 +9,10 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 
-# Residuals of this power relative to the output are rounding, of files with eight digits.
+# Residuals up to this power, relative to the output, are the rounding of files with eight digits.
 _EXACT = 1e-16
-# Correlation matrices of residuals with a smaller eigenvalue are singular but for rounding.
-_COMBINED = 1e-13
+# Correlation matrices of residuals with an eigenvalue up to this are singular to rounding.
+_SINGULAR = 1e-13
 # Fewer samples than this for each parameter say nothing about a covariance.
 _SAMPLES_A_PARAMETER = 3
 
@@ -42,7 +42,7 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
     """Check that no channel of u (samples, r) and y (samples, p) keeps one value throughout.
 
     Raises:
-        SpecError: `constant-input`, `constant-output`; it has the `names` of the parameters.
+        SpecError: `constant-input`, whose message has the `names` of the parameters, or `constant-output`.
     """
     static = f"only a static gain could be seen, not {', '.join(names)} each"
     if u.shape[1] > 1:
@@ -79,7 +79,7 @@ def check_noisy(covariance: Array, y: Array) -> None:
             )
     rms = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(rms, rms))
-    if values[0] <= _COMBINED:
+    if values[0] <= _SINGULAR:
         share = np.abs(vectors[:, 0])
         names = " and ".join(f"y{i + 1}" for i in np.flatnonzero(share > 0.05 * share.max()))
         raise bad_spec(

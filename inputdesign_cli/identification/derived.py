@@ -1,12 +1,12 @@
 """Estimate a model that is derived from a plant: with further noise, or in other parameters.
 
-Prediction errors of the plant, and all that depends on them, go through D (1 - q^-1) / C: see
-`plant.coloured`. Starting points of the plant are made from differences if the noise drifts. C and D begin
-with the residuals of the plant.
+Prediction errors of the plant, their gradients and starts are filtered by D (1 - q^-1) / C: see
+`plant.coloured`. Starting points of the plant are made from differences if the noise drifts. Starting points
+of C and D are estimated from the residuals of the plant.
 
 The chain rule turns gradients by the coefficients into gradients by the parameters, of which some may be
-known. Starting points are estimates of all coefficients, brought back to the parameters by least squares
-weighed by the information matrix. In the limit of many samples that is an efficient estimate already.
+known. Starting points are estimates of all coefficients, mapped to the parameters by least squares,
+weighted by the information matrix. For many samples these estimates are efficient already.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import Coloured, Model, Parametrisation
 from inputdesign_cli.plant.filtering import filtered
 
-# So often a point is moved halfway towards the nominal one before that takes its place.
+# A point is moved halfway towards the nominal one at most this often before the nominal one replaces it.
 _HALVINGS = 40
-_RIDGE = 1e-9
+_RIDGE = 1e-9  # the least eigenvalue of a scaled Hessian, relative to its largest
 _MOST_EVALUATIONS = 60
-_OUT_OF_BOUNDS = 1e12
+_OUT_OF_BOUNDS = 1e12  # stands for a distance that is not finite
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Derived(Kind):
 
     model: Model
     plant: Kind
-    coloured: Coloured | None = None  # the model, where it has C and D besides
-    by: Parametrisation | None = None  # None: the parameters are the coefficients
+    coloured: Coloured | None = None  # the model, if it has C and D besides the plant
+    by: Parametrisation | None = None  # from parameters to coefficients; None: they are the same
 
     @property
     def _first(self) -> int:
@@ -95,11 +95,11 @@ class Derived(Kind):
         return (errors, psi) if noise is None else _coloured(noise, errors, psi)
 
     def leaks(self, theta: Array, u: Array, y: Array) -> Array:
-        """Return the derivatives by the constant terms of denominators that are known to be zero."""
+        """Return minus the derivatives by constant terms of denominators that are known to be zero."""
         if self.by is None:
             return super().leaks(theta, u, y)
         held = ~np.any(self.by.moves[: self._first], axis=1) & (self._of_plant(theta) == 0.0)
-        last = [name.partition("[")[0] == "a0" for name in self.plant.model.names]  # of plants in s
+        last = [name.partition("[")[0] == "a0" for name in self.plant.model.names]  # plants in s
         leaks = np.flatnonzero(held & last)
         return self._by_coefficients(theta, u, y)[1][leaks] if leaks.size else super().leaks(theta, u, y)
 
@@ -145,8 +145,8 @@ class Derived(Kind):
     def stabilised(self, theta: Array, samples: int) -> Array:
         """Return theta if its predictor is stable, otherwise the nominal parameters moved towards it.
 
-        They move one after the other: one that has reached its end, as a dead time of zero, holds no other.
-        Coefficients that are the parameters are changed themselves.
+        They move one after the other, so that one at its bound, as a dead time of zero, blocks no other.
+        If the parameters are the coefficients, unstable polynomials are mirrored instead.
         """
         if self.by is None:
             return self._stable(theta, samples)
@@ -189,7 +189,7 @@ class Derived(Kind):
         else:
             noise = cast(Coloured, self.coloured)
             fixed = reduce(np.convolve, {tuple(p): p for p in noise.fixed}.values())
-            clear = [(_clear(fixed, u), _clear(fixed, y)) for u, y in parts]
+            clear = [(_filtered(fixed, u), _filtered(fixed, y)) for u, y in parts]
             start = None if given is None else given[: self._first]
             found = self.plant.starting_points(clear, start, None if known is None else known[: self._first])
             left = [self.plant.errors_and_gradient(theta, *parts[0])[0] for theta in found.points]
@@ -226,7 +226,7 @@ def brought_back(at: Parametrisation, point: Point) -> Array:
         jacobian = root @ at.at(share * unit).jacobian * unit
         return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
-    # A step may go far beyond what doubles hold where the coefficients hardly move; it is taken back.
+    # Where the coefficients hardly depend on the parameters, a step may overflow; it is then rejected.
     with np.errstate(over="ignore", invalid="ignore"):
         found = scipy.optimize.least_squares(
             distance, at.theta / unit, jac=slope, x_scale="jac", max_nfev=_MOST_EVALUATIONS
@@ -260,11 +260,11 @@ def _of_residuals(noise: Coloured, errors: Array) -> Array:
             max((p.power for p in own if p.letter == letter and (i, i) in p.places), default=0)
             for letter in "cd"
         )
-        for letter, row in zip("cd", noise_polynomials(_clear(fixed, errors[:, i]), c, d), strict=True):
+        for letter, row in zip("cd", noise_polynomials(_filtered(fixed, errors[:, i]), c, d), strict=True):
             values |= {(letter, lag, i): float(value) for lag, value in enumerate(row, start=1)}
     return np.array([np.mean([values[one.letter, one.power, i] for i, _ in one.places]) for one in own])
 
 
-def _clear(known: Array, signals: Array) -> Array:
-    """Return signals (N, ..) filtered by a polynomial, without its first samples, whose past is unknown."""
+def _filtered(known: Array, signals: Array) -> Array:
+    """Return signals (N, ..) filtered by a polynomial, without first samples, whose past is unknown."""
     return filtered(known, [1.0], signals, axis=0)[known.size - 1 :]

@@ -37,18 +37,19 @@ from inputdesign_cli.levels import level
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.model import DELAY
 
-# A parameter of whose effect the estimate explains all but this share is not tried.
+# A parameter is not tried if the estimate explains all but this share of its effect.
 _EXPLAINED = 1e-6
-# A score of a larger probability is final. A mean below this number of deviations counts as zero.
-_OPEN, _LITTLE = 0.3, 0.1
-# Directions with a larger cosine are one.
+# Below this probability of the score, a likelihood ratio is computed too. It counts only if the mean of the
+# score is at most this number of its standard deviations.
+_SUGGESTIVE, _NEGLIGIBLE = 0.3, 0.1
+# The data cannot distinguish directions with a larger cosine.
 _SAME = 0.99
-_LAGS = ("a", "f", DELAY)
-# The odds from which nothing is promised any more. Odds beforehand that something is missing, shared among
-# parameters that stand for it: what plants mostly have beyond their model is a lag or a longer dead time.
-_ODDS, _OF_LAGS, _OF_OTHERS = 0.7, 1.0, 0.2
+_LAGS = ("a", "f", DELAY)  # letters of poles and dead times
+# Posterior odds of a missing parameter above which it speaks against a verdict. Prior odds of lags and of
+# others, shared among the tried ones: most plants have a lag or a longer dead time beyond their model.
+_ODDS, _PRIOR_OF_LAGS, _PRIOR_OF_OTHERS = 0.7, 1.0, 0.2
 _LEAST = 1e-300
-# A signal that lies on a straight line but for this share is the input itself.
+# A trial signal that differs from a straight line in the input by less than this share is the input itself.
 _STRAIGHT = 1e-6
 _PARTS = {"a quarter": 0.25, "half": 0.5, "three quarters": 0.75}
 
@@ -60,27 +61,27 @@ RISING = "rising"
 class Alternative:
     """The model with one additional parameter, which is zero in the model."""
 
-    name: str  # of the parameter
-    phrase: str  # what it is, for a sentence
-    fault: Fault  # what is wrong if it is missing
+    name: str
+    phrase: str  # description for a sentence
+    fault: Fault  # the kind of fault if it is missing
     column: Array  # (N, p), minus the derivative of the prediction errors with respect to it
-    slopes: Callable[[Model, ArrayLike], ComplexArray]  # dG by it at (n,), of each state, (states, n, p, r)
+    slopes: Callable[[Model, ArrayLike], ComplexArray]  # derivative of G by it, by state: (states, n, p, r)
     lag: bool = False  # whether it is a pole or a dead time of the plant
-    echo: Array | None = None  # (lags, p, p), how `column` responds to past errors, if it does
-    estimated: Callable[[], tuple[Model, float]] | None = None  # larger model, its likelihood ratio
+    echo: Array | None = None  # (lags, p, p), the response of `column` to past errors, if it has one
+    estimated: Callable[[], tuple[Model, float]] | None = None  # estimates larger model, likelihood ratio
 
 
 @dataclass(frozen=True)
 class Directed:
     """The test of one parameter that the model does not have, and its estimate."""
 
-    test: ScoreTest  # whether these data ask for it
-    # That act alike on these data where they are small, the likeliest first.
+    test: ScoreTest  # the test whether these data support it
+    # Alternatives that these data cannot distinguish while small; the likeliest comes first.
     alternatives: tuple[Alternative, ...]
-    size: float  # of the first of them, to first order
+    size: float  # estimate of the first of them, to first order
     deviation: float  # its standard deviation
-    following: Array  # (k,), how the parameters of the model change with it, to first order
-    larger: Model | None = None  # the estimate of the larger model, where it was looked for
+    following: Array  # (k,), change of the other parameters per unit of it, to first order
+    larger: Model | None = None  # the estimate of the larger model, if it was searched for
 
     @property
     def of_structure(self) -> bool:
@@ -114,7 +115,7 @@ def directed_tests(
     """Return the test of every alternative; alternatives that these data cannot distinguish share one test.
 
     Args:
-        parameters: k of the model.
+        parameters: their number k in the model.
     """
     groups: list[list[_Tried]] = []
     for alternative in alternatives:
@@ -133,14 +134,14 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
     found, mean = _score(white, group[0])
     statistic, directions = found.statistic, found.directions
     larger: Model | None = None
-    if white.whitening is None and white.probability(statistic, directions) < _OPEN:
+    if white.whitening is None and white.probability(statistic, directions) < _SUGGESTIVE:
         ends = [(one[0].estimated(), one) for one in group if one[0].estimated is not None]
         if ends:
             ends.sort(key=lambda end: -end[0][1])
             larger, ratio = ends[0][0]
             group = [*(one for _, one in ends), *(one for one in group if one[0].estimated is None)]
-            # A likelihood ratio has no mean to be compared with.
-            statistic = max(statistic, ratio) if abs(mean) <= _LITTLE else statistic
+            # The mean of a score cannot be subtracted from a likelihood ratio.
+            statistic = max(statistic, ratio) if abs(mean) <= _NEGLIGIBLE else statistic
             found, _ = _score(white, group[0])
     first, column, along = group[0]
     size = float(along @ column)
@@ -171,7 +172,7 @@ def alternative(extension: Extension, kind: Kind, records: Records) -> Alternati
     """Return the parameter of a larger model of this kind as a regressor of the errors of records."""
     model, index = extension.model, extension.model.names.index(extension.name)
     larger, in_plant = replace(records, kind=kind, earlier=None), bool(model.in_plant[index])
-    # Of other parameters than coefficients the larger structure has further freedom.
+    # If the parameters are no coefficients, the larger structure has more than one additional freedom.
     nested = set(model.names) - set(records.kind.model.names) == {extension.name}
     again = partial(_estimated, larger, model, index)
     return Alternative(
@@ -189,8 +190,8 @@ def alternative(extension: Extension, kind: Kind, records: Records) -> Alternati
 def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float]:
     """Return the larger model that a search from here finds, and -2 log of the likelihood ratio.
 
-    Both costs are with the unknown starts of the larger structure; that without the parameter is by one
-    step of Gauss and Newton from here. Where the parameter adds unknown starts, costs cannot be compared:
+    Both costs have the unknown starts of the larger structure. The cost without the parameter follows by
+    one Gauss-Newton step from here. If the parameter adds unknown starts, the costs are not comparable, and
     the ratio is zero.
     """
     theta: Array = model.theta
@@ -207,9 +208,9 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
 class Moves:
     """The change of G at n frequencies by an added parameter, in units of the admissible error."""
 
-    estimated: Array  # (n,), how far G moves if the parameter is estimated along
-    deviation: Array  # (n,), the standard deviation of that
-    known: Array  # (n,), the largest standard deviation of G of the model itself
+    estimated: Array  # (n,), the change if the parameter is estimated too
+    deviation: Array  # (n,), its standard deviation
+    known: Array  # (n,), the standard deviation of G without the parameter
 
     @property
     def largest(self) -> float:
@@ -219,13 +220,13 @@ class Moves:
     def odds(self, probability: float) -> float:
         """Return the odds that the parameter exists and G exceeds the admissible error, from even prior odds.
 
-        The evidence is the Bayes factor of a normal estimate ([kass-raftery-1995]) that is as far from zero
-        by chance with this `probability`. A priori it is normal and moves G by about the admissible error.
+        The evidence is the Bayes factor of a normal estimate ([kass-raftery-1995]) whose distance from zero
+        has this `probability` by chance. The prior is normal and moves G by about the admissible error.
         """
         reach = float(np.max(self.deviation))
         if reach == 0.0:
             return 0.0
-        left = 1.0 / (1.0 + reach**2)  # of the estimate, once the prior draws it to zero
+        left = 1.0 / (1.0 + reach**2)  # the factor by which the prior shrinks the estimate
         statistic = float(scipy.special.chdtri(1.0, max(probability, _LEAST)))
         evidence = np.exp(0.5 * (np.log1p(-left) + left * statistic))
         spread = np.sqrt(self.known**2 + left * self.deviation**2)
@@ -239,18 +240,18 @@ class Moves:
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
     """Return the indices of the parameters that speak against a verdict of |error of G| <= r_adm.
 
-    It is neither enough nor necessary that the parameter is significant. It must exist, and G must be beyond
-    r_adm after the estimated move and with its uncertainty.
+    Significance of the parameter is neither sufficient nor necessary. The odds are that it exists and that G
+    then differs by more than r_adm, uncertainty included.
     """
-    # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
-    # G by more than is admitted, at a level that is shared among all that would. What is not a number is no
-    # promise: it is compared so that it speaks against one.
+    # A varying gain often has a large effect that the record hardly shows. It matters if it would move G by
+    # more than r_adm and is significant, at a level shared among all such gains. NaN must speak against a
+    # verdict, hence the negated comparisons.
     varying = [i for i, one in enumerate(tried) if not (one.of_structure or moves[i].largest <= 1.0)]
     found = [i for i in varying if not tried[i].test.probability * len(varying) >= level("varying gain")]
     structure = [i for i, one in enumerate(tried) if one.of_structure]
     among = Counter(tried[i].lag for i in structure)
     for i in structure:
-        beforehand = (_OF_LAGS if tried[i].lag else _OF_OTHERS) / among[tried[i].lag]
+        beforehand = (_PRIOR_OF_LAGS if tried[i].lag else _PRIOR_OF_OTHERS) / among[tried[i].lag]
         if not beforehand * moves[i].odds(tried[i].test.probability) <= _ODDS:
             found.append(i)
     return sorted(found)
@@ -264,8 +265,8 @@ class _Trial(NamedTuple):
     fault: Fault
     f: Array
     gains: tuple[float, ...]  # df/du, one for each state of the plant
-    moves: tuple[float, ...] = (0.0,)  # what a change of the output from sample to sample adds in each state
-    early: int = 0  # by how many samples that acts early
+    moves: tuple[float, ...] = (0.0,)  # df / d(y(t) - y(t - 1)), one for each state
+    early: int = 0  # samples by which the output term acts early
 
     def slopes(self, channel: int, size: float, model: Model, w: ArrayLike) -> NDArray[np.complex128]:
         """Return the derivative (states, n, p, r) of G by x, for an input of this size."""
@@ -295,7 +296,7 @@ def variations(records: Records, theta: Array, simulated: Array | None) -> tuple
         if simulated is not None and u.shape[1] == simulated.shape[1] == 1:
             tried += _one_way(x, simulated[:, 0], records.kind.lateness(theta) + 1, lengths)
         for one in tried:
-            # What the signal beside the input adds to the outputs, as minus prediction errors.
+            # The response of the outputs to f is minus the prediction errors with f as the only input.
             only = np.outer(size * one.f, np.arange(u.shape[1]) == channel)
             parts = tuple(split(only, np.zeros_like(records.y), lengths))
             column = -replace(records, parts=parts).from_rest(theta)[0]
@@ -318,13 +319,13 @@ def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Trial]:
     """Yield the signals of gains that depend on samples x (N,), of mean zero and size one."""
     moves = []
     for own in np.split(x, np.cumsum(lengths)[:-1]):
-        # The direction in which x last moved; before it first does, the other one.
+        # The direction of the last move of x; before the first move, the opposite one.
         signs = np.sign(np.diff(own, prepend=own[:1]))
         first = np.flatnonzero(signs)[:1]
         signs[0] = -signs[first[0]] if first.size else 0.0
         moves.append(signs[np.maximum.accumulate(np.where(signs != 0.0, np.arange(own.size), 0))])
     for of, phrase, f, gains in (
-        # One deviation below and above the middle.
+        # Gains at one standard deviation below and above the mean.
         (f"{name}^2", f"a gain of {name} that depends on its level", x**2, (-2.0, 2.0)),
         (f"{name}^3", f"a gain of {name} that depends on its amplitude", x**3, (0.0,)),
         (f"sign of {name}", f"a dead zone or friction at {name}", np.sign(x), (0.0,)),

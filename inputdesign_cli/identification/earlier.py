@@ -1,7 +1,7 @@
 """An estimate from earlier data, in place of these: Gaussian knowledge of the parameters.
 
-It is worth -2 log of its density, q = (theta - theta_0)^T M_0 (theta - theta_0), so that the estimate with it
-minimises -2 log likelihood + q (maximum a posteriori; [ljung-1999], Section 7.4).
+Its density adds q = (theta - theta_0)^T M_0 (theta - theta_0) to -2 log likelihood. The estimate minimises
+the sum (maximum a posteriori; [ljung-1999], Section 7.4).
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 
-# Directions of which less than this share of the knowledge is of one side only are the other's alone.
-_OF_ONE_SIDE = 1e-9
-# Two estimates from the same data agree to this share of a deviation, and of their information.
-_THE_SAME = 1e-3
-# An estimate of data among these knows no more than they do; one that knows far less may be stated modestly.
+# Directions are not compared if one estimate has less than this share of the information on them.
+_LEAST_INFORMATION = 1e-9
+# Two estimates from the same data agree to this share of a deviation, and of the information.
+_AGREEMENT = 1e-3
+# An estimate from the same data has half of the joint information at most. A far smaller share may come from
+# a covariance that was stated cautiously.
 _LEAST_SHARE, _MOST_SHARE = 0.2, 0.6
 
 
@@ -46,19 +47,19 @@ class Earlier:
     def is_of_these_data(self, theta: Array, factor: Array) -> bool:
         """Return whether the estimate is of these data: it has half of the information, and theta stays.
 
-        Other data of the same length have another input or another noise, and move theta by a deviation.
+        Other data of the same length have another input or noise, and move theta by about a deviation.
         """
         inner = np.linalg.solve(factor, self.rows.T)
         shares = np.linalg.eigvalsh(inner @ inner.T)
         away = float(np.linalg.norm(factor.T @ (theta - self.theta)))
-        return bool(np.all(np.abs(shares - 0.5) < _THE_SAME) and away < _THE_SAME * np.sqrt(len(theta)))
+        return bool(np.all(np.abs(shares - 0.5) < _AGREEMENT) and away < _AGREEMENT * np.sqrt(len(theta)))
 
     def agreement(self, theta: Array, factor: Array) -> float:
         """Return the probability that two estimates of one system differ as much as this one and the data's.
 
         The estimate theta (k,) from both has the information L L^T, L the lower triangular `factor` (k, k).
         """
-        statistic, directions = self._apart(theta, factor, _OF_ONE_SIDE, 1.0 - _OF_ONE_SIDE)
+        statistic, directions = self._apart(theta, factor, _LEAST_INFORMATION, 1.0 - _LEAST_INFORMATION)
         return float(scipy.special.chdtrc(directions, statistic)) if directions else 1.0
 
     def likeness(self, theta: Array, factor: Array) -> float:
@@ -73,7 +74,7 @@ class Earlier:
         """Return the squared distance of the two, in deviations of their difference, and its dimension.
 
         Args:
-            least, most: of the knowledge in a direction that counts, the share that is of this one.
+            least, most: a direction counts if this estimate has a share of its information between these.
         """
         inner = np.linalg.solve(factor, self.rows.T)
         shares, turn = np.linalg.eigh(inner @ inner.T)

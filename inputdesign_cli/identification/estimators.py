@@ -53,13 +53,13 @@ from inputdesign_cli.plant import (
     StateSpaceModel,
 )
 
-# Of records that follow each other; None for one.
+# Samples of each record, where several follow each other; None for a single record.
 Lengths = Sequence[int] | None
 
-# Numbers that unknown starts may take up: inputs of long dead times are taken for known beyond.
-_MOST = 2e7
-# A direction is not excited where gradients change by more than this share of themselves when they are
-# rounded otherwise. Parameters this share apart are the same to rounding.
+# The size of the array of unknown starts beyond which the inputs before a record count as known.
+_LARGEST = 2e7
+# A direction is not excited if its gradients change by more than _UNCERTAIN, relatively, when the parameters
+# change by rounding, which is _LAST_DIGITS, relatively.
 _UNCERTAIN = 0.03
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
@@ -96,7 +96,7 @@ class Estimate:
     names: tuple[str, ...]  # (k,)
     theta: Array  # (k,)
     factor: Array  # L (k, k), lower triangular, L L^T the information
-    noise: Array  # (p, p) covariance of e; of white noise on the samples where the model knows no other
+    noise: Array  # (p, p) covariance of e, which without a noise model is white noise on the samples
     errors: Array  # (samples, p) prediction errors at theta
     lengths: tuple[int, ...]  # the samples of each of the records, which follow each other
     search: Search
@@ -136,7 +136,7 @@ class BatchEstimate:
 def estimator(model: Model, step: float) -> Kind:
     """Return the structure of the estimator for models of this kind, from samples `step` apart.
 
-    Models in discrete time have their own step. A TypeError says that none is registered.
+    Models in discrete time have their own step. Raises TypeError if none is registered.
     """
     raise TypeError(f"no estimator is registered for {type(model).__name__}")
 
@@ -178,18 +178,18 @@ def identify(
 
     Args:
         model: gives the orders, zero entries, common polynomials and known parameters; its other numbers
-            are not used.
+            serve as a starting point at most.
         u, y: (N, r), (N, p).
         step: time between samples of a plant in continuous time.
         start: (k,), tried besides starts that are made from the data.
         feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
-        lengths: of the records that follow each other in u and y; None for one.
+        lengths: samples of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; otherwise its start and its level are unknown and
-            estimated along. None: as the data say.
-        earlier: an estimate from other data, which counts along.
+            estimated too. None: the data decide.
+        earlier: an estimate from other data, which is combined with these.
         experiments: the samples of each experiment, of one or several records; None: all are of one.
-        near: whether `start` is an estimate of such data already, so that no others are made.
-        ramp: whether outputs may drift along a line in every record, whose slope is estimated along; no
+        near: whether `start` is an estimate of such data already, so that no other starts are made.
+        ramp: whether outputs may drift along a line in every record, whose slope is estimated too; no
             record then begins at rest.
 
     Raises:
@@ -227,9 +227,9 @@ def _as_data_allow(
     start: Array | None,
     records: int,
 ) -> Estimate:
-    """Return the estimate of records that begin at rest or not; tests that refute rest try it without.
+    """Return the estimate of records that begin at rest or not; if tests refute rest, free starts are tried.
 
-    Of many records, few that do not begin at rest are lost among the unknown starts of all.
+    A few of many records that do not begin at rest hardly show in a test of all unknown starts.
     """
     found = begun(rest, start)
     if rest is not None or records == 1 or found.start.free or not found.tests.failed:
@@ -243,8 +243,8 @@ def with_larger_noise(
 ) -> T | None:
     """Return the result with the smallest further noise that the tests accept, or None.
 
-    Of noises with as many coefficients the likeliest is taken. If tests refute all of them, the first with
-    white residuals is taken. None is needed where residuals are white already.
+    Of noise models with equally many coefficients the likeliest is taken. If tests refute all of them, the
+    first with white residuals is taken. None is needed if residuals are white already.
 
     Args:
         estimated: returns the estimate with a further noise, and the result; None if there is no estimate.
@@ -318,7 +318,7 @@ def information_of_data(
     records = Records(kind, tuple(centred(parts) if free else parts), weights=weights)
     if free:
         late = kind.lateness(model.theta)
-        records = records.begun_freely(late if late * u.shape[1] * y.shape[1] * y.size <= _MOST else 0)
+        records = records.begun_freely(late if late * u.shape[1] * y.shape[1] * y.size <= _LARGEST else 0)
     found = information_of(records, evaluate(records, model.theta), model.covariance)
     return found if earlier is None else found + earlier.information
 
@@ -378,14 +378,14 @@ def _simulation(records: Records, point: Point, y: Array) -> Simulation:
 def factor_at(records: Records, point: Point, noise: Array) -> Array:
     """Return the triangular factor L (k, k) of the information matrix of records, M = L L^T.
 
-    Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
-    common and mean no lack of excitation. So M is never formed, and directions count as undetermined only
-    if the gradients themselves are rounding.
+    Slow poles make the coefficients of a polynomial nearly collinear. Even after scaling, eigenvalues of M
+    often differ by 1e14 without a lack of excitation. So M is never formed, and directions count as
+    undetermined only if the gradients themselves are rounding.
 
     Raises:
         SpecError: `not-exciting`, with the parameters that the data cannot distinguish.
     """
-    # What is known besides the data counts as further rows.
+    # The earlier estimate counts as further rows.
     known = np.zeros((0, point.theta.size)) if records.earlier is None else records.earlier.rows
     root = np.linalg.cholesky(weights_of(records, noise)).T
     last = _LAST_DIGITS * np.resize([1.0, -1.0], point.theta.size)
@@ -415,7 +415,7 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
 
 
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
-    """Return the factor of the information of a mixture if minima beyond instants are about as likely.
+    """Return the information's factor for a mixture if minima beyond sampling instants are about as likely.
 
     The weight of each is its likelihood times the square root of the determinant of its covariance (Laplace's
     method, [tierney-kadane-1986]). The covariance is that of the mixture about the estimate.
@@ -424,9 +424,9 @@ def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
     for point, excess in found.beside:
         try:
             own = factor_at(found.records, point, noise)
-        except SpecError:  # what determines nothing there has no covariance to count
+        except SpecError:  # the data do not determine this minimum, so that it has no covariance
             continue
-        # In units of the best minimum's own deviations.
+        # In standard deviations of the best minimum.
         half = scipy.linalg.solve_triangular(own, factor, lower=True)
         away = factor.T @ (point.theta - found.point.theta)
         spreads.append(half.T @ half + np.outer(away, away))

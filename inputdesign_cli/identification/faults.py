@@ -2,8 +2,8 @@
 
 An innovation of standard deviation s falls into a cell of width d with a probability of at most d f / s.
 Here f is the largest density of usual noise. If that is small, a row of equal samples is beyond chance. If
-rounding hides the noise, the model decides: it moves by more than a cell and its own errors while the sensor
-does not.
+rounding hides the noise, the model decides: the simulation moves by more than a cell and its own errors while
+the sensor does not.
 
 An input that is logged a sample late biases estimates in closed loop. No residual shows it: the model takes
 the shift for a delay. The controller shows it if the reference was logged too.
@@ -26,23 +26,23 @@ from inputdesign_cli.plant import TransferMatrix
 
 # The median of the absolute value of a normal variable, in standard deviations.
 _NORMAL = 0.6745
-# A spike is farther from zero than _FAR robust standard deviations, twice that of _UNSURE samples.
+# Spikes are farther from zero than _FAR robust standard deviations, or twice that in _UNSURE samples.
 _FAR, _UNSURE = 8.0, 20
-# Not more of the samples than this, which hold this share of the sum of squares.
+# Spikes are at most _FEW of the samples, as a share, and hold at least _MOST of the sum of squares.
 _FEW, _MOST = 0.05, 0.5
-# Fewer equal samples in a row, and fewer samples in all, say nothing.
+# The shortest run of equal samples that counts, and the fewest samples that give a deviation.
 _SHORTEST, _FEWEST = 5, 20
-# The largest density of noise with two-sided exponential tails, by its robust deviation; normal: 0.4.
+# The largest density of noise with two-sided exponential tails, times its robust deviation; normal: 0.4.
 _DENSITY = 0.52
-# A filter of two differences passes so much of the mean square of rounding, d^2 / 12.
+# The variance of rounding, d^2 / 12, is six times as large after two differences.
 _ROUNDING = 6.0 / 12.0
-# A measured input that rests may flicker by a step of its rounding, which moves no output: this share of its
-# standard deviation says nothing.
+# A measured input at rest may flicker by its rounding, which moves no output. It counts as moving beyond this
+# share of its standard deviation.
 _MOVES = 0.1
 # The errors of a simulation rarely span this number of their robust standard deviations.
 _SPAN = 8.0
-# Lags of signals that are tried, one of which is right if its error of the law of control is below these
-# shares of the error as logged, and of the input itself.
+# The shifts that are tried, in samples. A shift is right if its rms error of the control law is below these
+# shares of the error as logged, and of the input.
 _LAGS, _BETTER, _GOOD = (-2, -1, 1, 2), 0.1, 0.3
 
 
@@ -109,15 +109,16 @@ def frozen(
     """Return by output the first and last samples of stretches in which it stands still and an input moves.
 
     Args:
-        held: (samples, p), whether the sample is that before, as recorded in steps of `resolution` (p,).
-        u, errors, simulated: (samples, r), and (samples, p) of prediction and of simulation.
+        held: (samples, p), whether a sample equals the one before, recorded in steps of `resolution` (p,).
+        u: (samples, r), the inputs.
+        errors, simulated: (samples, p), prediction errors and simulated outputs.
         apart: (samples, p), the record less the simulation.
-        lengths: of the stretches without gaps.
+        lengths: samples of the stretches without gaps.
     """
     ends, moves = np.cumsum([0, *lengths]), _MOVES * np.std(u, axis=0)
     found: dict[int, list[tuple[int, int]]] = {}
     for output, d in enumerate(resolution.tolist()):
-        stays = _likely(errors[:, [output]], d)
+        stays = _repeat_probability(errors[:, [output]], d)
         size = _spread(apart[:, output])
         for start, end in pairwise(ends.tolist()):
             edges = np.flatnonzero(np.diff(held[start + 1 : end, output], prepend=False, append=False))
@@ -133,17 +134,17 @@ def frozen(
 
 
 def resolution_of(y: Array) -> Array:
-    """Return the resolution (p,) of outputs y (n, p), NaN where missing; it is small for plain noise."""
+    """Return the resolution (p,) of outputs y (n, p), NaN where missing; it is small for unrounded noise."""
     found = np.zeros(y.shape[1])
     for output, x in enumerate(y.T):
         steps = np.abs(np.diff(x[~np.isnan(x)]))
         moves = steps[steps > 0.0]
-        if moves.size:  # a single value between the cells, filled in by hand, is no step
+        if moves.size:  # the quantile ignores a single value filled in by hand between the cells
             found[output] = np.quantile(moves, 0.05, method="lower")
     return found
 
 
-def _likely(errors: Array, d: float) -> float:
+def _repeat_probability(errors: Array, d: float) -> float:
     """Return the largest probability that a sample falls into the same cell as the last one."""
     if len(errors) < _FEWEST or not np.any(errors):
         return 1.0
@@ -160,22 +161,22 @@ def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: S
     """Return by input the shift of u (n, m), y (n, p) or r (n, m) that makes u = r - C y hold much better.
 
     Args:
-        lengths: of the stretches without gaps; levels are taken away from each.
+        lengths: samples of the stretches without gaps; the level of each is subtracted.
     """
     ends = np.cumsum(lengths)[:-1]
     parts = list(zip(*(np.split(x, ends) for x in (u, y, r)), strict=True))
     found = []
     for i in range(u.shape[1]):
-        left = _left(controller, i, parts, "", 0)
+        left = _law_error(controller, i, parts, "", 0)
         tried = [(letter, lag) for letter in "uyr" for lag in _LAGS]
-        each = [Shift(one[0], i, one[1], left, _left(controller, i, parts, *one)) for one in tried]
+        each = [Shift(one[0], i, one[1], left, _law_error(controller, i, parts, *one)) for one in tried]
         best = min(each, key=lambda one: one.then)
         if best.then < min(_BETTER * left, _GOOD):
             found.append(best)
     return found
 
 
-def _left(
+def _law_error(
     controller: TransferMatrix, i: int, parts: Sequence[tuple[Array, ...]], letter: str, lag: int
 ) -> float:
     """Return the rms of q u - q r + P y relative to q u, with the signals of one letter shifted."""

@@ -30,15 +30,15 @@ from inputdesign_cli.plant import Model
 
 CONFIDENCE = 0.95
 _MOST_FREQUENCIES = 200
-_FREEDOM = 8
-_PARABOLA = 3
-_BEGINNING, _TRIED = 16, 20
-_DEPENDENT = 1e-7
-# Of its largest value: where a response to a pulse begins.
+_FREEDOM = 8  # the fewest degrees of freedom of the residuals of a local fit
+_PARABOLA = 3  # coefficients
+_BEGINNING, _TRIED = 16, 20  # first samples that must recur; recurrences tried as the period
+_DEPENDENT = 1e-7  # relative singular value up to which inputs are not separable
+# A pulse response begins where it reaches this share of its largest value.
 _BEGUN = 0.1
 
 REPEATS = 1e-9
-"""Of the size of a signal that repeats, what one period may be off the next."""
+"""The largest difference between successive periods, as a share of the size of the signal."""
 
 Method = Literal["lines", "local_polynomial"]
 _Records = Sequence[tuple[Array, Array, Array]]  # x, u, y of each, (N, channels)
@@ -53,7 +53,7 @@ class FrequencyResponse:
 
     frequency: Array  # (n,), rad/sample
     G: ComplexArray  # (n, p, r)
-    radius: Array  # (n, p, r): of the disc about G that holds the true one with 95 %
+    radius: Array  # (n, p, r): the radius of the disc about G that holds the true G with 95 %
     # (n, p): the spectrum of the unexplained part of y, for white noise its variance.
     noise: Array
     coherence: Array  # (n, p): the share of the spectrum of y that the inputs explain
@@ -73,7 +73,7 @@ def frequency_response(
     Args:
         u, y: (N, r), (N, p).
         x: (N, r), the external excitation; None: u itself, which then must not depend on y.
-        delays: presumed delays of the inputs (p, r), in samples; of no use with external signals.
+        delays: presumed delays of the inputs (p, r), in samples; ignored with external signals.
     """
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
@@ -97,7 +97,7 @@ def found_period(x: Array) -> int:
     tolerance = REPEATS * float(np.abs(x).max())
     if x.size < 2:
         return 0
-    begin = x[: min(_BEGINNING, x.size // 2)]  # so that it stands a second time in what follows
+    begin = x[: min(_BEGINNING, x.size // 2)]  # short enough to recur
     windows = np.lib.stride_tricks.sliding_window_view(x[1 : x.size // 2 + begin.size], begin.size)
     same = np.flatnonzero(np.all(np.abs(windows - begin) <= tolerance, axis=1)) + 1
     repeated = (p for p in same[same <= x.size // 2][:_TRIED] if np.all(np.abs(x[p:] - x[:-p]) <= tolerance))
@@ -128,7 +128,7 @@ def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
     if not period:
         return {}
     periods = _settled(period, len(y))
-    # A drift is the same ramp in every period, and would speak at all lines.
+    # A drift is the same ramp in every period, and would add power at all lines.
     level = y - line_of_periods(y, periods)
     silent = np.setdiff1d(np.arange(1, (period + 1) // 2), excited_harmonics(u, periods))
     kinds = {"odd": silent[silent % 2 == 1], "even": silent[silent % 2 == 0]}
@@ -160,7 +160,7 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
         )
         for record in records
     ]
-    # At most as many as can be looked at, evenly on a logarithmic axis.
+    # Many lines are thinned out evenly on a logarithmic axis.
     last = (longest - 1) // 2
     lines = np.arange(1, last + 1)
     if last > _MOST_FREQUENCIES:
@@ -169,7 +169,7 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
     found: list[_Found] = []
     for w in frequency:
         G, radius, noise, coherence = _at(w, transformed, window, inputs, _PARABOLA)
-        # What a parabola may be off where G bends: as much as a line is off it, beyond the noise.
+        # The bias of a parabola where G bends: at most its distance from a straight line, beyond the noise.
         straight = _at(w, transformed, window, inputs, _PARABOLA - 1)[0]
         apart = np.nan_to_num(np.abs(G - straight) ** 2)
         found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), noise, coherence))
@@ -254,12 +254,12 @@ def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> 
 def _radius_of_ratio(from_x: ComplexArray, residuals: ComplexArray, spread: float, freedom: int) -> Array:
     """Return the radius (p, 1) of discs about G = y/u that hold every G which y - G u does not refute.
 
-    Behind a reference u has an error as well. The region is a disc about another centre ([fieller-1954]);
-    without a bound, NaN.
+    If x is a reference, u has an error as well. The region is a disc about another centre ([fieller-1954]);
+    NaN if it is unbounded.
 
     Args:
         from_x: (p + 1,), responses of the outputs and of the input to x.
-        residuals: (n, p + 1), of the regression on x.
+        residuals: (n, p + 1), residuals of the regression on x.
         spread: variance of these responses, relative to the variance of the residuals.
     """
     within = spread * float(scipy.special.fdtri(2, 2 * freedom, CONFIDENCE))

@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 
 # Settled: the next step, squared and in standard deviations of the estimate, is this small. It is still
-# taken; the steps shrink at least tenfold where the model fits, so that what is left is far smaller.
+# taken; the steps shrink at least tenfold where the model fits, so that the remaining error is far smaller.
 SETTLED = 1e-10
 MOST_STEPS = 150
 _FIRST_DAMPING = 1e-3
 _LEAST_DAMPING = 1e-8
 _MOST_DAMPING = 1e8
-_TRUSTED = 0.25
+_TRUSTED = 0.25  # the damping falls if a step gains this share of the promised decrease
 # Rounding of a sum of squares: a cost that rises by less has not risen.
 _ROUNDING = 1e-12
 _RIDGE = 1e-14
-# Checked after every _WATCHED steps: a run that took less than this off -2 log likelihood, and less than this
-# share of what its next step promises, is stuck. Where that is next to nothing, only rounding stops it.
+# Checked every _WATCHED steps: a run is stuck if it lowered -2 log likelihood by less than _STUCK, and less
+# than _SHARE of the decrease that its next step promises. A promise below _NEGLIGIBLE is rounding.
 _WATCHED = 10
 _STUCK, _SHARE = 0.05, 0.01
-_NOTHING = 1e-6
+_NEGLIGIBLE = 1e-6
 
 
 class Problem(Protocol):
@@ -74,7 +74,7 @@ def minimise(
     Args:
         settled_at: the square of the last step, in standard deviations of the estimate.
         idle: the decrease of -2 log likelihood in ten steps below which a run has settled. It has settled as
-            well where no step, however short, decreases the cost. At zero this run is given up.
+            well if no step, however short, decreases the cost. If `idle` is zero, this run is given up.
     """
     theta = problem.stabilised(start)
     runs = theta.shape[0]
@@ -93,8 +93,8 @@ def minimise(
             took = problem.errors * np.log(np.maximum(earlier[active], 1e-300) / least)
             stuck |= took <= idle if idle else (took < _STUCK) & (took < _SHARE * promised)
             earlier = cost.copy()
-        # Where there is next to nothing to take, rounding hides it.
-        settled = (promised < settled_at) | (cost[active] <= 0.0) | (stuck & (promised < _NOTHING))
+        # Rounding hides a decrease that is nearly zero.
+        settled = (promised < settled_at) | (cost[active] <= 0.0) | (stuck & (promised < _NEGLIGIBLE))
         converged[active[settled]] = True
         theta[active[settled]] = problem.stabilised(theta[active[settled]] + newton[settled])
         lost = ~settled & stuck

@@ -1,4 +1,4 @@
-"""What a kind of model supplies to be estimated: prediction errors, their Jacobian, starts."""
+"""The interface of a kind of model to its estimator: prediction errors, their gradient, starts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 STEP = 1e-6
 """The step of central differences, in shares of the size of a parameter."""
 FADED = 2000
-"""Samples after which noise that fades has faded."""
+"""Samples after which the response of a stable noise model counts as zero."""
 
 
 class Starts(NamedTuple):
@@ -43,9 +43,9 @@ class Starts(NamedTuple):
 class Extension(NamedTuple):
     """A larger model, whose additional parameter is zero."""
 
-    model: Listed  # by its coefficients
-    name: str  # of the new parameter
-    what: str  # it is
+    model: Listed  # in its coefficients
+    name: str  # the additional parameter
+    what: str  # its description, for example "pole in F"
 
     @classmethod
     def of(cls, model: Model, larger: Listed, what: str) -> Self:
@@ -78,7 +78,7 @@ class Kind(ABC):
 
     @property
     def explaining(self) -> Mask:
-        """Return the mask (k,) of the parameters that take directions of past inputs away from residuals."""
+        """Return the mask (k,) of the parameters that make residuals look independent of past inputs."""
         return self.model.in_plant
 
     @property
@@ -91,7 +91,7 @@ class Kind(ABC):
         """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
 
     def batch(self, u: Array, y: Array) -> Batch | None:
-        """Return the problem of records (runs, N, r), (runs, N, p), noise at rest as well, if it is fast."""
+        """Return a fast problem of records (runs, N, r), (runs, N, p) from rest, noise too, if it exists."""
         return None
 
     @abstractmethod
@@ -99,7 +99,7 @@ class Kind(ABC):
         """Return for each output the effect of the past of a record on its prediction errors.
 
         Args:
-            free: whether level and states are unknown; else the plant is at rest at zero, and noise is not.
+            free: whether level and states are unknown; else the plant is at rest at zero, but not the noise.
         """
 
     @abstractmethod
@@ -164,8 +164,8 @@ class Kind(ABC):
     def echoes(self, theta: Array, samples: int) -> Array:
         """Return the responses of gradients to past errors, (k, lags, p, p): parameter, lag, output, error.
 
-        They are zero for parameters of the plant alone. They count as zero if the response does not fade: it
-        is not the noise model that holds this plant.
+        They are zero for parameters of the plant alone. They count as zero if the response does not fade:
+        then a controller stabilises the plant, not the noise model.
         """
         samples = min(samples, FADED)
         found = np.zeros((theta.size, samples, self.model.outputs, self.model.outputs))

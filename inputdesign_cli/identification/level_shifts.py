@@ -21,17 +21,17 @@ from inputdesign_cli.identification.records import Point, Records
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
 
-# Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
+# Time constants of the lags: the shortest in samples, their ratio, the longest as a share of the record.
 _SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125
 # The largest number of shifts that are reported.
 _MOST = 6
-# What is nearer to an end of a record is its start, or a few samples that are wrong.
+# A shift within this number of samples of an end of a record is its start, or a few wrong samples.
 _FEWEST = 5
 # A shift of which the estimate explains all but this share cannot be seen.
 _EXPLAINED = 1e-3
-# Of squares, so that what is left stays positive.
+# The largest share of the squares that a shift explains, so that the rest stays positive.
 _MOST_EXPLAINED = 1.0 - 1e-9
-# Of time constants, until a lag has settled, and how far its beginning may be off.
+# Time constants until a lag has settled, and by which its beginning is uncertain.
 _SETTLED, _UNSURE = 3.0, 0.5
 
 
@@ -40,13 +40,13 @@ class LevelShift:
     """The likeliest shift of an output."""
 
     output: int  # from zero
-    sample: int  # likely the first of it, counted through all records
-    lag: float  # the time constant by which it is smooth, in samples; zero of a step
-    begins: int  # likely not before this sample
-    ends: int  # likely settled from this sample on
+    sample: int  # its likeliest first sample, counted through all records
+    lag: float  # the time constant of its lag, in samples; zero for a step
+    begins: int  # it likely begins no earlier than this sample
+    ends: int  # it has likely settled from this sample on
     rises: bool  # whether the output is larger after it
-    test: ScoreTest  # of the likelihood ratio, which counts every sample, lag and output that was tried
-    score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
+    test: ScoreTest  # likelihood-ratio test, corrected for every sample, lag and output that was tried
+    score: float  # the score statistic, which is smaller; it is the largest of `looks` statistics
     looks: int
     alone: bool  # whether it explains more than a line through its record, or single samples next to it
 
@@ -89,7 +89,7 @@ def _by_chance(statistics: Sequence[float], looks: int) -> float:
 def level_shift(records: Records, point: Point, white: White) -> LevelShift | None:
     """Return the likeliest shift; None in records that are too short for any."""
     found: list[tuple[float, int, int, float, bool, bool]] = []
-    # Zero, then ever longer ones.
+    # A step, then ever longer lags.
     lags = [0.0, *(x for k in range(12) if (x := _SHORTEST * _GROWTH**k) <= _SHARE * records.longest)]
     stretches, outputs = _stretches(records), records.y.shape[1]
     through = _responses(records, point.theta, lags, white)
@@ -160,14 +160,14 @@ def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Arr
     power = np.cumsum(response**2)[::-1] * float(white.root[:, output] @ white.root[:, output])
     explained = common(white.basis[rows])
     left = power - np.sum(explained**2, axis=1)
-    # Where a search ends at a kink, residuals are not at right angles to all gradients.
+    # If a search ends at a kink, residuals are not orthogonal to all gradients.
     along = common(white.residuals[rows, None])[:, 0] - explained @ (white.basis.T @ white.residuals)
     seen = left > _EXPLAINED * power
     return np.where(seen, along**2 / np.where(seen, left, 1.0), 0.0) / white.variance, along
 
 
 def _column(records: Records, theta: Array, white: White, begin: int, signal: Array, output: int) -> Array:
-    """Return the errors ((N + M) p, 1) by a signal (n,) in one output, in units of the noise."""
+    """Return the errors ((N + M) p, 1) due to a signal (n,) in one output, in units of the noise."""
     every, own = np.zeros((records.samples, 1)), np.zeros((1, *records.y.shape))
     every[begin : begin + len(signal), 0] = signal
     own[0, :, output] = records.whitened(theta, every)[output, :, 0]

@@ -10,7 +10,7 @@ The change is estimated as for a cubic of a Gaussian signal. With y = x + c x^3 
 the ratio of the rest to the power of x. A third of the rest is beyond the highest line (three times the
 band), so that the share that is seen counts 9/6 times 3/2.
 
-Signals of low peaks leave less power for the same change of the gain. If the nonlinearity is static, at an
+A low crest factor leaves less power at silent lines for the same change. If the nonlinearity is static, at an
 input or at the output, the signal itself gives its cubic part up to a factor. The part of the outputs at
 silent lines in phase with it gives the factor, and so the change at every excited line.
 """
@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods
 
-# Neighbouring lines over which the spectrum of the noise is taken to be even, where it is not known.
+# Neighbouring lines over which the spectrum of the noise is taken to be flat, if it is not known.
 _NEIGHBOURS = 15
-_OF_THE_SHARE = 9.0 / 6.0 * 3.0 / 2.0
+_CHANGE_OF_GAIN = 9.0 / 6.0 * 3.0 / 2.0  # squared relative change of G over the share of power, see above
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,16 @@ class SilentLines:
 
     lines: int
     over_noise: Array  # (p,) mean of the power there over that of the noise; about one for noise alone
-    probability: Array  # (p,) that noise alone has as much, by an F test over all lines
-    rms: Array  # (p,) of the part beyond the noise
-    beyond: Array  # (lines, p) mean squares beyond the noise, over neighbours
+    probability: Array  # (p,) probability that noise alone has as much, by an F test over all lines
+    rms: Array  # (p,) rms of the outputs there beyond the noise
+    beyond: Array  # (lines, p) mean squares beyond the noise, averaged over neighbouring lines
 
 
 def silent_lines(Y: ComplexArray, shape: Array | None = None) -> SilentLines | None:
     """Return the power at silent lines from transforms (blocks, periods, lines, p); None without scatter.
 
     Args:
-        shape: (lines, p) of the spectrum of the noise, up to a factor; None: that of the scatter, smoothed.
+        shape: (lines, p), the spectrum of the noise up to a factor; None: that of the scatter, smoothed.
     """
     blocks, periods, lines, _ = Y.shape
     if lines == 0 or periods < 2:
@@ -57,10 +57,10 @@ def silent_lines(Y: ComplexArray, shape: Array | None = None) -> SilentLines | N
         return None
     level: Array = periods * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
     even = _smoothed(noise) if shape is None else shape
-    # Over the shape of the noise all lines count alike.
+    # Divided by the shape of the noise spectrum, all lines have the same weight.
     ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
     freedom = 2 * blocks * lines
-    # Where strong noise at some lines hides the sum, what is beyond it is taken to have its shape.
+    # If strong noise at some lines hides the sum, the power beyond it is taken to have its shape.
     like_noise = (ratio - 1.0) * np.mean(noise / even, axis=0) * np.sum(even, axis=0)
     plain = np.sum(level - noise, axis=0)
     beyond = np.where(plain > 0.0, plain, np.maximum(like_noise, 0.0))
@@ -95,14 +95,14 @@ def response_error(
 
     added = between(harmonics, odd.beyond, found.harmonics)
     of_inverse = kept * period * found.deviation**2 / found.noise[:, :, None]  # sum over blocks of |U^-1|^2
-    # The power of the inputs behind each output, and of the added part, referred to the inputs.
+    # The share of the added power at the outputs, or divided by |G|^2 at the inputs; the larger one counts.
     gain = np.sum(np.abs(found.G) ** 2, axis=2)
     seen = between(found.harmonics, gain, harmonics)
     shares = np.maximum(
         (odd.beyond.sum(axis=0) + added.sum(axis=0)) / found.explained.sum(axis=0),
         ((odd.beyond / seen).sum(axis=0) + (added / gain).sum(axis=0)) / (found.explained / gain).sum(axis=0),
     )
-    changed = _OF_THE_SHARE * shares[None, :, None] * np.abs(found.G) ** 2
+    changed = _CHANGE_OF_GAIN * shares[None, :, None] * np.abs(found.G) ** 2
     return np.asarray(np.sqrt(added[:, :, None] * of_inverse + changed))
 
 
@@ -111,7 +111,7 @@ class Cubes:
     """The cube that explains most of the power of each of p outputs at silent lines."""
 
     error: Array  # (L, p, r): its change of G at the excited lines
-    probability: Array  # (p,): that noise alone looks as much like one of the cubes
+    probability: Array  # (p,): probability that noise alone looks as much like one of the cubes
     source: NDArray[np.int_]  # (p,): the input (from zero) that is cubed, or -1: the output
 
 
@@ -130,11 +130,11 @@ def cubes(
 
     Args:
         model: a rough G at the lines of `found` and at the silent ones, to interpolate the measured one.
-        shape: (n, p) of the spectrum of the noise at the silent lines, up to a factor.
+        shape: (n, p), the spectrum of the noise at the silent lines, up to a factor.
         repeats: see `Periods.parts`.
     """
     lines, transforms = found.harmonics, periods.transforms(y, repeats)
-    # Mean transforms (harmonics, channels, blocks), with the level zero.
+    # Mean transforms (harmonics, channels, blocks).
     U, Y = (
         np.moveaxis(signal.mean(axis=1), 0, -1) for signal in (periods.transforms(u, repeats), transforms)
     )
@@ -144,7 +144,7 @@ def cubes(
     signals = (np.fft.irfft(X, periods.period, axis=0) for X in varying)  # about zero
     of_input, of_output = (np.fft.rfft(x**3, axis=0) / periods.period for x in signals)
     at_silent, at_lines = (
-        # What the cube of each input does at the outputs (candidates, lines, p, blocks), then of the output.
+        # Responses to the cube of each input, then cubes of the outputs: (candidates, lines, p, blocks).
         np.stack([*np.einsum("npr,nrb->rnpb", G, of_input[at]), of_output[at]])
         for G, at in ((_carried(lines, found.G, *model, silent), silent), (found.G, lines))
     )

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 
-_EXCITED = 1e-6
-# Where less of the inputs differs from period to period, what differs is noise, and lines that are no more
-# than it are not excited; where more differs, they do not repeat as such.
+_EXCITED = 1e-6  # the least size of an excited line, relative to the largest
+# Up to this share of the input power, a difference between periods is noise, which excited lines must exceed
+# with the probability _SURE. Beyond it the inputs do not repeat.
 _REPEAT = 0.1
 _SURE = 0.99
-# Of a drift: the highest power of time, and the probability that noise is taken for one.
+# The highest power of time in a drift, and the probability that noise is taken for a drift.
 _MOST_DEGREE, _CERTAIN = 3, 1e-4
 
 
@@ -71,7 +71,7 @@ class PeriodicResponse:
 
     harmonics: NDArray[np.int_]
     G: ComplexArray
-    deviation: Array  # (L, p, r): of the entries, |error|^2 being their variance
+    deviation: Array  # (L, p, r): standard deviation of the entries, the rms of |error|
     noise: Array  # (L, p): the spectrum of the noise; for white noise it is the variance
     explained: Array  # (L, p): mean squares of the part that the inputs explain, per line
     freedom: int  # degrees of freedom of each variance, counted as complex numbers
@@ -180,7 +180,7 @@ def line_of_periods(y: Array, periods: Periods) -> Array:
 
 
 def _along(y: Array, time: Array, periods: Periods, most: int) -> tuple[Array, Array]:
-    """Return polynomials (N, m) of time, orthonormal as means up to a level, and their coefficients in y."""
+    """Return polynomials (N, m) of time, with orthonormal period means up to levels, and y's coefficients."""
     scaled = (time - time.mean()) / max(float(np.ptp(time)), np.finfo(float).tiny)
     count = periods.blocks * periods.kept(len(y))
     powers = scaled[:, None] ** np.arange(min(most + 1, count))

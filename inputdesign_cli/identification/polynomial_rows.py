@@ -19,7 +19,7 @@ from inputdesign_cli.identification.stability import is_stable, reflected, witho
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import stack
 
-# Samples of as many runs stay in the cache.
+# Runs are processed together up to this number of samples, which stay in the cache.
 _NUMBERS_AT_ONCE = 16_000
 
 
@@ -122,7 +122,7 @@ def errors_and_gradients(rows: Sequence[Row], theta: Array, u: Array, y: Array) 
         errors[:, i] = _multiplied(D, shaped)
         of_a = _multiplied(-D, _divided(C, y[:, i])) if row.a.lags else shaped
         of_c = _divided(C, errors[:, i]) if row.c.lags else shaped
-        # Signals of which the gradients are delays.
+        # The gradients are delayed copies of these signals.
         for one, source in zip(row.all, (of_a, *of_b, of_c, -shaped, *of_f), strict=True):
             for lag in one.lags:
                 psi[:, number, lag:] = source[:, : max(samples - lag, 0)]  # a short segment has no such past
@@ -141,7 +141,7 @@ def _multiplied(polynomials: Array, x: Array) -> Array:
 def _divided(monic: Array, x: Array) -> Array:
     """Return x / D for monic polynomials D (runs, order + 1) and signals x (runs, N).
 
-    All runs, one after the other, are a triangular system with few diagonals.
+    All runs, one after the other, form one banded triangular system.
     """
     order = min(monic.shape[1], x.shape[1]) - 1
     if not order:
@@ -157,10 +157,10 @@ def _divided(monic: Array, x: Array) -> Array:
 class FromRest:
     """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`."""
 
-    rows: tuple[Row, ...]  # one an output
+    rows: tuple[Row, ...]  # one for each output
     u: Array  # (runs, r, N)
     y: Array  # (runs, p, N)
-    skipped: int = 0  # how many errors at the begin of each do not count
+    skipped: int = 0  # errors at the beginning of each run that do not count
 
     @classmethod
     def of(cls, model: PolynomialModel, u: Array, y: Array, skipped: int = 0) -> FromRest:
@@ -219,8 +219,8 @@ class FromRest:
 class Sums:
     """Sums of products of residuals and gradients over the samples, for each run."""
 
-    owner: NDArray[np.int64]  # (m,), the output that each gradient is of
-    spread: Array  # (m, k), its parameter
+    owner: NDArray[np.int64]  # (m,), the output of each gradient
+    spread: Array  # (m, k), one at the parameter of each gradient
     errors: Array  # e e^T (runs, p, p)
     slopes: Array  # psi e^T (runs, m, p)
     products: Array  # psi psi^T (runs, m, m)

@@ -2,8 +2,8 @@
 
 A long ARX model gives an estimate of the noise and of the noise-free output. With the first, A, B and C
 follow by linear regression ([hannan-rissanen-1982]); with the second, B and F by the iteration of
-[steiglitz-mcbride-1965], and C and D from what is left. With several inputs the iteration takes one at a
-time, on the output less what the others cause.
+[steiglitz-mcbride-1965], and C and D from the residual. With several inputs the iteration takes one at a
+time, on the output less the responses to the others.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Parts = list[tuple[Coefficients, Array]]
 """Coefficients and their values."""
 
 _ITERATIONS = 15
-_LONGEST = 40
+_LONGEST = 40  # the highest order of the long ARX model
 
 
 def starting_points(row: Row, size: int, u: Array, y: Array) -> Array:
@@ -31,7 +31,7 @@ def starting_points(row: Row, size: int, u: Array, y: Array) -> Array:
     lags = [range(b.lags.start, order + 1) for b in row.b]
     (a, *bs), noise = regress(y, [(-y, range(1, order + 1)), *zip(inputs, lags, strict=True)])
     A = reflected(np.append(1.0, a))
-    # What each input causes alone in this long ARX model.
+    # The response of this long ARX model to each input alone.
     responses = [_caused(b, A, of.start, x) for b, x, of in zip(bs, inputs, lags, strict=True)]
     left = y - sum(responses, np.zeros_like(y))
     found = [

@@ -66,10 +66,10 @@ class PolynomialKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past on the prediction errors, output by output.
 
-        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j, which is off by impulses if earlier y
-        and u are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown level of its
-        input a step, which the others make up for unless F_j integrates or nearly does. From rest only y is
-        missing, which noise has moved. That matters only if the predictor remembers y beyond its order.
+        The inverse noise model D/C filters A y - sum_j (B_j/F_j) u_j, which is wrong by impulses if earlier y
+        and u are missing. An unknown state of an entry adds impulses through 1/F_j. An unknown level of its
+        input adds a step, which the others make up for unless F_j integrates or nearly does. From rest only
+        y is missing, moved by noise. That matters only if the predictor remembers y beyond its order.
         """
         return tuple(_start(row, theta, samples, free=free) for row in self.rows)
 

@@ -1,16 +1,16 @@
-"""Records of one system, of which a single model is estimated, and what is minimised.
+"""Records of one system, from which a single model is estimated, and the cost that is minimised.
 
 The records share theta. Each begins with the plant at rest, or, where the start is `free`, in a state of its
 own about a level of its own; see `start.py` for what these and the noise before it can explain.
 
-With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), the sum of squares for one output. It falls with the
-likelihood of Gaussian noise of unknown covariance ([ljung-1999], (7.87)-(7.96) and Section 15.2). Minus half
-its gradient is sum psi(t) W e(t), half its Hessian sum psi W psi^T up to what vanishes at the minimum, with
-W = cost / (p N) S^-1. Known weights are kept.
+With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), the sum of squares for one output. Its minimum is the
+largest likelihood of Gaussian noise of unknown covariance ([ljung-1999], (7.87)-(7.96) and Section 15.2).
+Minus half its gradient is sum psi(t) W e(t), half its Hessian sum psi W psi^T up to terms that vanish at the
+minimum, with W = cost / (p N) S^-1. Known weights W stay fixed.
 
-Of the n = N p - m errors that m free unknowns leave, n log cost is -2 log likelihood. Integrating over the
-starts adds a determinant to that, and an earlier estimate at a distance q, -2 log of its density, adds q:
-they multiply the cost by exp(q / n); with known weights they are added.
+With m free unknowns and n = N p - m, -2 log likelihood is n log cost. Integrating over the starts adds a
+determinant, and an earlier estimate adds its squared distance q, -2 log of its density. Both multiply the
+cost by exp(q / n); with known weights they are added.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.kind import Kind, Part
 from inputdesign_cli.identification.start import FreeStarts, Start
 
-_MOST_STARTED = 3
+_MOST_STARTED = 3  # records that starting points are estimated from
 # Errors of this power relative to the output are rounding. It is added to S, so that an output without
 # noise does not hide the others.
 _EXACT = 1e-20
@@ -41,16 +41,16 @@ class Point:
     """
 
     theta: Array
-    all_errors: Array  # (N + M, p), what unknown starts explain taken off
-    all_psi: Array  # (k, N + M, p) = -d errors / d theta, the starts following
+    all_errors: Array  # (N + M, p), without the part that unknown starts explain
+    all_psi: Array  # (k, N + M, p) = -d errors / d theta, the starts eliminated
     samples: int  # N
     directions: Array  # ((N + M) p, m) orthonormal, errors in white units that unknown starts can explain
-    towards: Array  # (k,), minus half the gradient of what the cost has beside the errors
-    known: Array  # (k, k), half the Hessian of that, about
+    towards: Array  # (k,), minus half the gradient of the terms of the cost beside the errors
+    known: Array  # (k, k), half the Hessian of these terms, approximately
     weights: Array  # W (p, p)
-    unknowns: int = 0  # how many are levels and states, of which nothing is known
-    determinant: float = 0.0  # what integrating over the starts adds to -2 log likelihood
-    of_noise: float = 0.0  # the part of that which belongs to noise before the records
+    unknowns: int = 0  # the number of unknown levels and states
+    determinant: float = 0.0  # the term of -2 log likelihood due to integrating over the starts
+    of_noise: float = 0.0  # its part due to noise before the records
     cost: float = np.inf
 
     @classmethod
@@ -103,7 +103,7 @@ class Records:
     free: bool = False  # whether each begins in an unknown state about an unknown level, not at rest at zero
     late: int = 0  # samples in which unknown inputs before each act, if it is free
     weights: Array | None = None  # W (p, p) of the errors; None to weigh by their own covariance
-    earlier: Earlier | None = None  # what is known besides
+    earlier: Earlier | None = None  # an estimate from other data
     ramp: bool = False  # whether outputs of free records may drift along a line besides, of an unknown slope
 
     def begun_freely(self, late: int) -> Records:
@@ -137,7 +137,7 @@ class Records:
 
     @cached_property
     def longest(self) -> int:
-        """Return the length of the longest record: the past acts on all alike, on shorter ones for less."""
+        """Return the length of the longest record, for which the effect of the past is computed."""
         return max(self.lengths)
 
     @cached_property
@@ -331,7 +331,7 @@ def information_of(records: Records, point: Point, noise: Array) -> Array:
 
 
 def weights_of(records: Records, noise: Array) -> Array:
-    """Return the weights W (p, p): the inverse of the noise, which may be no more than rounding."""
+    """Return the weights W (p, p): the inverse covariance of the noise, with rounding added."""
     return inverses((noise + records.rounding)[None])[0][0]
 
 
@@ -350,8 +350,8 @@ def weighing(S: Array, samples: int) -> tuple[Array, Array]:
 def inverses(covariances: Array) -> tuple[Array, Array]:
     """Return the inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
 
-    They follow from correlations: outputs may differ by orders of magnitude. A singular correlation is raised
-    to rounding, and one that has overflowed has an infinite determinant.
+    They follow from correlations, since outputs may differ by orders of magnitude. Eigenvalues of zero are
+    raised to rounding. A covariance that has overflowed has an infinite determinant.
     """
     usable = np.atleast_1d(np.isfinite(covariances).all(axis=(1, 2)))
     known = np.where(usable[:, None, None], covariances, np.eye(covariances.shape[1]))

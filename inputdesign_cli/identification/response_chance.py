@@ -1,4 +1,4 @@
-"""Tests of Wald on G of an estimate: how probable its distance from zero or another G is by chance."""
+"""Wald tests of G of an estimate: how probable its distance from zero or another G is by chance."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def _chance(
 ) -> float | None:
     """Return the probability that a part of G differs by (n, p) from the estimate through chance alone.
 
-    The Wald statistic is the smallest step of the parameters that moves G there, `exactly` or as
-    far as any step can. None if no step does, or something is infinite.
+    The Wald statistic is the squared length of the smallest step of the parameters that moves G there,
+    `exactly` or as far as a step can. None if no step moves it exactly, or a value is infinite.
 
     Args:
-        gradient: (n, k, p) of that part of G.
+        gradient: (n, k, p), gradient of that part of G.
     """
     if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(difference))):
         return None

@@ -19,28 +19,30 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.gauss_newton import MOST_STEPS, Minimum, best_run, minimise
 from inputdesign_cli.identification.records import Point, RecordProblem, Records, centred, evaluate
 
-# What another minimum may have more in -2 log likelihood: a thousandth of the likelihood of the best.
+# The largest excess in -2 log likelihood of another minimum: a thousandth of the likelihood of the best.
 _NEARLY = 2.0 * float(np.log(1000.0))
-# Another minimum: so far apart in squared standard deviations, and by what the slope of one does not explain.
+# Another minimum is farther than _APART, in squared standard deviations, and _UNEXPLAINED times its excess.
+# Within one quadratic minimum the squared distance equals the excess.
 _APART, _UNEXPLAINED = 25.0, 4.0
-# Squared standard deviations between minima that are not one. Instants that are farther than _REACH standard
-# deviations part the estimate from nothing that is likely.
+# Minima farther apart than _SAME, in squared standard deviations, are distinct. Beyond an instant that is
+# farther than _REACH standard deviations no minimum is likely.
 _SAME, _REACH, _RIDGE = 0.1, 3.0, 1e-9
-# Begun within a deviation, a search settles in a few steps, or is stopped by the kink that it has passed.
+# A search begun within a deviation settles in a few steps, or stops at the kink that it has passed.
 _STEPS, _ROUNDS = 15, 4
-# Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
+# A search at kinks has settled at _SETTLED, the squared step in standard deviations. The cost must be higher
+# at _ASIDE standard deviations beside a kink.
 _SETTLED, _ASIDE, _MOST_HELD_STEPS = 1e-8, 0.01, 60
-# What ten steps of a quick search must take off -2 log likelihood.
+# The least decrease of -2 log likelihood in ten steps of a quick search.
 _IDLE = 0.1
-# A record that begins at rest is taken for one that does not with the probability _MISTAKEN; above _UNLIKELY
-# nothing is searched for. A step that promises to take off nearly all promises too much.
+# Rest is refuted wrongly with the probability _MISTAKEN. Above the probability _UNLIKELY no search with free
+# starts is made. The decrease that a step promises counts up to _MOST_PROMISED of the cost.
 _MISTAKEN, _UNLIKELY, _MOST_PROMISED = 0.01, 0.2, 0.999
-# Samples by which a dead time may grow while a search begun freely goes on, how often they are counted anew,
-# and the samples for each unknown start if these are many.
+# Samples of unknown inputs to spare, for a dead time that grows during a search; the most recounts of them.
+# Unknown starts are many if fewer than _MANY errors come on each.
 _SPARE, _MOST_COUNTS, _MANY = 2, 4, 10
-# Errors to spare beside unknown starts: with fewer nothing is said against rest.
+# Rest is not refuted if no more errors than this remain beside parameters and unknown starts.
 _FEWEST = 8
-# Of exp, so that it stays finite.
+# The largest exponent, so that exp stays finite.
 _LARGEST = 50.0
 
 
@@ -62,7 +64,7 @@ class Search:
     steps: int
     starts: int
     rivals: tuple[Rival, ...]  # other minima that explain the records nearly as well, far from the best
-    beside: tuple[tuple[Point, float], ...]  # those beyond instants near it, with their excess
+    beside: tuple[tuple[Point, float], ...]  # minima near the best, beyond instants, with their excess
     rest_refuted: bool = False  # whether the records say that they do not begin at rest about zero
 
 
@@ -141,8 +143,8 @@ def _beyond_instants(records: Records, found: Minimum) -> Minimum:
 def _beyond(records: Records, point: Point) -> Array:
     """Return starts (n, k) beyond the sampling instants next to dead times.
 
-    Other parameters follow a dead time across an instant that is within reach. Across one that is not they
-    stay, as dead times of a loop may have minima in neighbouring samples, many deviations apart.
+    If the instant is within reach, the other parameters follow the dead time across it. Otherwise they stay,
+    as dead times of a loop may have minima in neighbouring samples, many deviations apart.
     """
     crossings = records.kind.crossings(point.theta, records.longest)
     if not len(crossings):
@@ -166,8 +168,8 @@ def _beyond(records: Records, point: Point) -> Array:
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
     """Return the point where the search settles if kinks of the cost stopped it, otherwise None.
 
-    A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains as much as its slopes promise. The same happens if the edge of stability mirrors a root.
+    A dead time that passes a sampling instant makes a kink, and minima may lie on kinks. No Gauss-Newton step
+    there gains as much as its slopes promise. The same happens if a root is mirrored into the stable region.
     Parameters that block the way are held, one after the other; only dead times, if there are some. The rest
     settles. Then each held one is moved to both sides, where the cost must be higher.
     """
@@ -213,8 +215,8 @@ def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
 def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.0) -> float:
     """Return the probability that useless unknown starts at a point lower -2 log likelihood as far.
 
-    Many unknowns shrink the estimated noise, which chi-squared does not account for: F does. One is the
-    answer if there are no unknowns beyond the ones from rest, or too few errors to compare.
+    Many unknowns shrink the estimated noise, which chi-squared does not account for: F does. The probability
+    is one if there are no more unknowns than from rest, or too few errors to compare.
     """
     rest, errors, unknowns = at_rest.point, records.y.size, point.unknowns
     more, left = unknowns - rest.unknowns, errors - len(records.kind.model.names) - unknowns
@@ -232,11 +234,11 @@ def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.
 def _promised(point: Point) -> float:
     """Return the promised decrease of -2 log likelihood by one step: about as much as by a search.
 
-    Near the edge of stability the determinant allows short steps only.
+    The determinant is left out, since it allows short steps only near the edge of stability.
     """
     errors = point.of_errors
     step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
-    # Where nothing is left of the errors there is nothing to gain.
+    # A cost of zero cannot decrease.
     share = min(float(errors.slope @ step) / point.cost, _MOST_PROMISED) if point.cost else 0.0
     return float(-point.freedom * np.log1p(-share))
 
@@ -266,7 +268,7 @@ def from_rest_or_free(
 
     def begun_free(known: Array | None, late: int) -> Search:
         tried = {late: (found := searched(deviations.begun_freely(late), known))}
-        # The dead time may come out another than was thought when the unknown inputs were counted.
+        # The estimated dead time may differ from the one by which the unknown inputs were counted.
         while abs((now := later(found.point.theta)) - late) > _SPARE:
             # Unknown inputs may explain half of a record, whatever the model.
             swamped = 2 * now * records.u.shape[1] > records.longest
@@ -285,10 +287,10 @@ def from_rest_or_free(
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
     if records.dead_times.size and near.unknowns * _MANY > records.y.size:
-        # A wrong level or a spike may feign a dead time, and the inputs before it explain whatever they like.
+        # A wrong level or a spike may feign a dead time, whose many unknown inputs explain anything.
         begun = begun_free(None, later(about))
     elif _chance_of(at_rest, free, near, _promised(near)) > _UNLIKELY:
-        return at_rest  # a search with unknown starts is not worth the while
+        return at_rest  # a search with unknown starts would hardly refute it
     else:
         begun = begun_free(at_rest.point.theta, late)
     refuted = _chance_of(at_rest, begun.records, begun.point) < _MISTAKEN

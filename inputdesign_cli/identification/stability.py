@@ -9,9 +9,9 @@ from inputdesign_cli.arrays import Array
 
 # A root is never moved closer to the circle than this.
 _MARGIN = 1e-3
-# A root that is nearer counts as on it. Specs refuse what is within rounding of the circle.
+# A root that is nearer counts as on it. Specs refuse roots within rounding of the circle.
 _ON_THE_CIRCLE = 1e-9
-# A sum of coefficients that is zero to rounding of decimals.
+# A sum of coefficients up to this share of their sizes is zero to rounding of decimals.
 _EXACT = 1e-12
 
 
@@ -22,7 +22,7 @@ def is_stable(monic: Array) -> NDArray[np.bool_]:
     """
     stable = np.ones(monic.shape[0], dtype=bool)
     p = monic
-    with np.errstate(over="ignore", invalid="ignore"):  # beyond a coefficient that is too large already
+    with np.errstate(over="ignore", invalid="ignore"):  # an unstable polynomial may overflow
         while p.shape[1] > 1:
             last = p[:, -1:]
             stable &= np.abs(last[:, 0]) < 1.0 - _ON_THE_CIRCLE

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.filtering import filtered
 
-# Roots on the circle, which may be known, are taken for some so far inside: noise would have no stationary
-# start, and its zeros no density.
+# Roots are moved inside by this share, since some may be known to lie on the circle. There noise has no
+# stationary start, and its zeros have no density.
 _INSIDE = 1e-5
 # Directions of the unknown starts below this size, columns scaled, are linearly dependent.
 _DEPENDENT = 1e-7
@@ -36,9 +36,9 @@ _MOST_ROUNDS = 30
 class Start(NamedTuple):
     """The effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
 
-    free: Array  # (m, N), by the level and states, of which nothing is known
+    free: Array  # (m, N), due to the level and states, of which nothing is known
     disturbance: Array  # (m, N), `free` before the inverse of the noise model
-    noise: Array  # (n, N), by independent unknowns of the variance of e
+    noise: Array  # (n, N), due to independent unknowns with the variance of e
     zeros: Array  # -2 log of a density of the zeros of the noise model, see `density`; a scalar
 
     @classmethod
@@ -47,7 +47,7 @@ class Start(NamedTuple):
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
     def through(self, C: Array, D: Array) -> Start:
-        """Return the start of errors that D/C filters further; `disturbance` is known without noise."""
+        """Return the start of errors that D/C filters further; `disturbance` stays as before the filter."""
         free, noise = (filtered(D, C, block) for block in (self.free, self.noise))
         past = np.concatenate([noise, noise_before(C, D, free.shape[1])])
         return Start(free, self.disturbance, past, self.zeros + (density(C) if C.size > 1 else 0.0))
@@ -58,7 +58,7 @@ def noise_before(C: Array, D: Array, samples: int) -> Array:
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
     first n samples. Both e = D q and v = C q follow from the autoregression q = e / D. The predictors of
-    every order make its last n values of independent ones.
+    all orders express its last n values by independent variables.
     """
     n = max(C.size, D.size) - 1
     if n == 0:
@@ -89,8 +89,8 @@ def density(C: Array) -> float:
 
     It vanishes on the unit circle and is all but flat elsewhere, 1 - c_1^2 for one zero. The likelihood has
     no slope across the circle. In short records it is often largest there: noise seems to vanish at a
-    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that come out
-    zero alike. A zero z moves by about 2 z / N.
+    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that are
+    estimated as zero in the same way. A zero z moves by about 2 z / N.
     """
     return 2.0 * float(np.log(_step_down(C)[1][0]))
 
@@ -113,11 +113,11 @@ class _Basis(NamedTuple):
     """Orthonormal directions (N + n, K) of all errors that one start of N samples can explain."""
 
     directions: Array
-    coefficients: Array  # (m + n, K), of its unknowns for each direction
-    free: int  # how many of these are not of past noise
+    coefficients: Array  # (m + n, K), the unknowns that give each direction
+    free: int  # the number of directions due to level and states
     determinant: float  # log det Z^T Z, Z being the responses to orthonormal disturbances and past noise
-    gradient: Start  # half of its gradient in the blocks of a start
-    of_noise: float  # the determinant of past noise
+    gradient: Start  # half the gradient of the determinant, in the blocks of a start
+    of_noise: float  # the determinant of past noise alone
 
     @classmethod
     def of(cls, start: Start, samples: int) -> _Basis:
@@ -222,7 +222,7 @@ class FreeStarts:
         def spread(step: Array) -> Array:
             return np.asarray(plain @ (step[:, None] * np.eye(errors.shape[1])[of]))
 
-        # Output by output first: levels alone would make all errors look alike.
+        # Output by output first: unknown levels alone would correlate the errors of all outputs.
         shares, previous, directions = (plain.T @ errors)[every, of], np.inf, plain
         left = errors - spread(shares)
         root = _root(left, weights)

@@ -17,7 +17,7 @@ from inputdesign_cli.plant.model import DELAY
 
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
 _MARGIN = 1e-9
-# A pole this near to one integrates, or nearly does: a level of the input is not made up for by states.
+# A pole this near to one nearly integrates, so that states do not make up for an unknown input level.
 _INTEGRATES = 1e-2
 
 
@@ -88,7 +88,7 @@ class StateSpaceKind(Kind):
             return found
 
         through = responses(m.K)
-        # What an unstable plant does without its predictor grows beyond all numbers.
+        # The response of an unstable plant without its predictor would overflow.
         stable = bool(np.all(np.abs(model.poles) < 1.0 + _MARGIN))
         before = responses(np.zeros_like(m.K)) if coloured and stable else through
         return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))

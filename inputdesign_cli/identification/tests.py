@@ -27,8 +27,8 @@ from inputdesign_cli.levels import level
 
 # Samples that residual tests need.
 _FEWEST_TESTED = 20
-# Directions of which one experiment has less than this share of the information are the others' alone.
-_OF_ONE_SIDE = 1e-6
+# Directions are not compared if one side has less than this share of the information on them.
+_LEAST_INFORMATION = 1e-6
 # Two-sided 99 % of the normal distribution: the band of a single correlation.
 _BAND = 2.5758293035489004
 
@@ -37,12 +37,12 @@ class ResidualTest(NamedTuple):
     """A chi-squared test of residuals over several lags and all channels at once ([ljung-1999], 16.6)."""
 
     lags: Array  # (n,)
-    # (n, p, columns), normalised, of residuals with residuals or inputs that much earlier.
+    # (n, p, columns), normalised, of residuals with earlier residuals or inputs.
     correlation: Array
     limit: float  # a single correlation of white noise stays within +- limit with probability 0.99
     statistic: float  # chi-squared if the model is right
-    freedom: int  # of that
-    probability: float  # of a statistic at least as large if the model is right; small values refute it
+    freedom: int  # its degrees of freedom
+    probability: float  # a right model has a statistic at least as large with this probability
 
     @classmethod
     def of(cls, at: NDArray, correlation: NDArray, samples: int, statistic: float, freedom: int) -> Self:
@@ -106,17 +106,17 @@ def _most_lags(samples: int, pairs: int, lags: int, fitted: int) -> int:
 class Tests:
     """All tests of an estimate against its own records."""
 
-    whiteness: ResidualTest  # of the residuals, all channels at once, correlations (lags, p, p)
-    independence: ResidualTest  # of residuals and past inputs, correlations (lags, p, r)
-    scores: tuple[ScoreTest, ...]  # of the structure, and `directed` of one additional parameter
-    directed: tuple[Directed, ...]
-    shift: LevelShift | None  # where an output most likely shifts; None in too short records
+    whiteness: ResidualTest  # residuals with past residuals, correlations (lags, p, p)
+    independence: ResidualTest  # residuals with past inputs, correlations (lags, p, r)
+    scores: tuple[ScoreTest, ...]  # tests of the structure with many regressors
+    directed: tuple[Directed, ...]  # tests of one additional parameter
+    shift: LevelShift | None  # the likeliest shift of an output; None in too short records
     shifts: tuple[LevelShift, ...]  # all that refute the structure
-    beside_shifts: tuple[ScoreTest, ...]  # `scores` once these are taken off
-    # Whether the noise is refuted: tests, but of past residuals, are then of whitened residuals.
+    beside_shifts: tuple[ScoreTest, ...]  # `scores` with these removed
+    # Whether the noise model is refuted. All tests except with past residuals then use whitened residuals.
     coloured: bool
     future: tuple[ScoreTest, ...]  # in open loop, whether the future of each input explains errors
-    # Of several experiments, the probability that each differs as much from the others.
+    # (experiments,), the probability that each differs as much from the others; empty for a single one.
     alike: tuple[float, ...]
 
     @property
@@ -145,10 +145,10 @@ class Tests:
         others = failed(self.scores, directed)
         if not self.shifts or not others:
             return self.shifts
-        # Likelihood ratios are compared with one, scores with the other.
+        # Likelihood ratios are compared with ratios, scores with scores.
         by_ratio, by_score = chance_of_shifts(self.shifts)
         compared = [(by_ratio if one.of_structure else by_score, one.test) for one in self.directed]
-        # Where the noise is refuted, that says nothing of shifts: they are tested with white residuals.
+        # A refuted noise model does not speak against shifts, which are tested with whitened residuals.
         beside = [test for test in self.beside_shifts if not (self.coloured and test.fault == "noise")]
         alone = all(own < test.probability for own, test in compared if test in others)
         return self.shifts if alone and all(by_ratio < test.probability for test in beside) else ()
@@ -180,7 +180,7 @@ def tests_of(
         experiments: the samples of each experiment.
     """
     kind = records.kind
-    # Samples that unknown inputs before each record explain whatever they are, if enough are left.
+    # Unknown inputs before a record may explain its first samples, which are left out if enough remain.
     left, kept = np.concatenate([np.arange(n) >= records.late for n in records.lengths]), records.lengths
     if np.count_nonzero(left) < _FEWEST_TESTED:
         left[:] = True
@@ -222,24 +222,24 @@ def tests_of(
 def of_one_system(point: Point, noise: Array, experiments: Sequence[int]) -> tuple[float, ...]:
     """Return the probability that each experiment differs from the others as much, if all are of one system.
 
-    It is the score test of parameters of its own ([engle-1984]): regressors are the gradients, in this
-    experiment alone. It has as many degrees of freedom as both it and the others determine parameters. The
-    estimate is the joint one; of a single experiment nothing is said.
+    It is the score test of separate parameters for one experiment ([engle-1984]), whose regressors are its
+    gradients. The degrees of freedom are the number of parameters that both it and the others determine.
+    The estimate is the joint one. For a single experiment the result is empty.
     """
     if len(experiments) < 2:
         return ()
     root, own = np.linalg.cholesky(np.linalg.inv(noise)).T, np.repeat(range(len(experiments)), experiments)
     errors, psi = point.errors @ root.T, point.psi @ root.T
-    # Of each by its own noise, which need not be that of the others.
+    # Each experiment is scaled by its own noise, which may differ from that of the others.
     power = [max(float(np.mean(errors[own == i] ** 2)), 1e-300) for i in range(len(experiments))]
     scale = np.sqrt(power)[own][:, None]
     every, sizes, _ = np.linalg.svd((psi / scale).reshape(len(psi), -1).T, full_matrices=False)
-    every, left = every[:, sizes > _OF_ONE_SIDE * sizes[0]], (errors / scale).ravel()
+    every, left = every[:, sizes > _LEAST_INFORMATION * sizes[0]], (errors / scale).ravel()
     found = []
     for i in range(len(experiments)):
         alone = np.where(np.repeat(own == i, len(root))[:, None], every, 0.0)
         directions, shares, _ = np.linalg.svd(alone - every @ (every.T @ alone), full_matrices=False)
-        kept = shares**2 > _OF_ONE_SIDE
+        kept = shares**2 > _LEAST_INFORMATION
         statistic = float(np.sum((directions[:, kept].T @ left) ** 2))
         found.append(float(scipy.special.chdtrc(np.sum(kept), statistic)) if np.any(kept) else 1.0)
     return tuple(found)

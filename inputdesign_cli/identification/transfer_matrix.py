@@ -27,19 +27,19 @@ from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
 from inputdesign_cli.plant.model import DELAY
 
-# Of the starts made from the data, as many are followed to the end: the likeliest after so many steps, fewer
-# if ten of these gain less -2 log likelihood, that are not within so many squared standard deviations.
+# The likeliest _FOLLOWED starts after _QUICK steps are searched from. A quick search ends if ten steps lower
+# -2 log likelihood by less than _IDLE. Starts within _APART squared standard deviations count as one.
 _FOLLOWED, _QUICK, _IDLE, _APART = 4, 12, 0.1, 25.0
-# A mode that loses less than this over the whole record is not distinguishable from one on the limit.
+# A mode that loses less than this over the whole record is not distinguishable from an undamped one.
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
-# Of a sample: a dead time of zero would be none, and no parameter.
+# The least dead time, in samples: zero would make it no parameter.
 _LEAST_DELAY = 1e-12
-_CUTOFFS = 5
+_CUTOFFS = 5  # state-variable filters that are tried
 # Dead times are tried sample by sample up to _FINE samples, then in steps that grow by _GROWTH.
 _FINE, _GROWTH = 20, 1.1
-_SWEEPS, _MINIMA = 2, 8
+_SWEEPS, _MINIMA = 2, 8  # sweeps over several dead times; minima that are tried for a single one
 
 Place = tuple[int, int]
 
@@ -68,8 +68,8 @@ class TransferKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past of each output: a level, and the free response of its entries.
 
-        Level and states make up for an unknown level of the input where poles are stable, but not for the
-        ramp of an integrator, or nearly one. Inputs late by a dead time move the states as from anywhere.
+        Level and states make up for an unknown level of the input if poles are stable, but not for the ramp
+        of an integrator, or nearly one. Earlier inputs that a dead time delays count as arbitrary impulses.
         """
         if not free:
             return (Start.white(np.zeros((0, samples))),) * self.model.outputs
@@ -104,8 +104,8 @@ class TransferKind(Kind):
     def stabilised(self, theta: Array, samples: int) -> Array:
         """Return theta with poles mirrored into the left half plane, off its edge and off infinity.
 
-        Poles that are exactly zero belong to integrators, and stay. Dead times are kept
-        positive and below the length of the record.
+        Poles that are exactly zero belong to integrators, and stay. Dead times are kept positive and below
+        the length of the record.
         """
         step = self.between.sample_time
         slowest, fastest = _LEAST_DECAY / (samples * step), _FASTEST / step
@@ -187,8 +187,8 @@ def _starting_points(
     """Yield dead times and denominators (k,), numerators zero, for each cutoff, from u (N, r) and y (N, p).
 
     Cutoffs lie between the record's length and its step. Dead times that are not `held` are searched on a
-    grid, one after the other, by the residuals of the regression of the row. A single one also takes its
-    next best minima.
+    grid, one after the other, by the residuals of the regression of the row. A single one is also tried at
+    its next best minima.
     """
     samples, step = len(y), between.sample_time
     for cutoff in np.geomspace(8.0 * np.pi / (samples * step), 0.5 * np.pi / step, _CUTOFFS):

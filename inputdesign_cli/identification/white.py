@@ -22,8 +22,8 @@ from inputdesign_cli.identification.stability import reflected
 from inputdesign_cli.plant.filtering import filtered
 
 DEPENDENT = 1e-6
-"""Signals of norm one of which less is left depend on the others."""
-# A relative variance of the noise so small changes probabilities of 0.001 by a few per cent of themselves.
+"""A signal of norm one depends on others if its unexplained part is no larger."""
+# Up to this relative variance of the noise power, probabilities of 0.001 change by a few per cent only.
 _WELL_KNOWN = 1e-3
 # A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
@@ -42,7 +42,7 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
     BIC decides between equal numbers.
 
     Args:
-        lengths: of the records that follow each other; the longest determines the polynomials.
+        lengths: samples of the records that follow each other; the longest determines the polynomials.
     """
     at, ranked = int(np.argmax(lengths)), []
     begin = sum(lengths[:at])
@@ -71,7 +71,7 @@ class Whitening:
         found, orders = [], np.arange(most + 1)
         for v in errors.T:
             past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
-            # Squares of orders that nest, from one triangle.
+            # The sums of squares of all orders, which are nested, follow from one triangular factor.
             triangle = np.linalg.qr(np.column_stack([past, v]))[1]
             left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
             left = np.maximum(left[: most + 1], 1e-300)
@@ -115,22 +115,22 @@ class White:
     """An estimate in units of the covariance of its residuals, outputs interleaved."""
 
     root: Array  # R (p, p), which makes residuals white
-    lengths: tuple[int, ...]  # of the records, N samples; M errors of noise before them follow
+    lengths: tuple[int, ...]  # samples of the records, N in all; M errors of noise before them follow
     residuals: Array  # ((N + M) p,)
-    variance: float  # of the noise, in these units: residuals lack what unknown starts explain
-    starts: Array  # ((N + M) p, m), orthonormal, what m unknown starts explain
-    explained: Array  # ((N + M) p, m + k), what they and the k parameters explain
-    basis: Array  # of that, orthonormal
+    variance: float  # noise variance in these units: residuals lack the part that unknown starts explain
+    starts: Array  # ((N + M) p, m), orthonormal directions that m unknown starts explain
+    explained: Array  # ((N + M) p, m + k), these directions and the gradients by the k parameters
+    basis: Array  # orthonormal basis of `explained`
     echoes: Array  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
-    whitening: Whitening | None = None  # filters of residuals that are not white, estimated along
+    whitening: Whitening | None = None  # filters of residuals that are not white, estimated too
 
     @classmethod
     def of(cls, records: Records, point: Point, whitening: Whitening | None = None) -> White:
         """Return the estimate at a point of the search; a parameter at its limit explains nothing.
 
         Args:
-            whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
-                estimated along; of the parameters of that noise model nothing is known then.
+            whitening: filters that make residuals white if the noise model is wrong. Their coefficients are
+                estimated too; echoes of the parameters of that noise model then count as zero.
         """
         starts = point.directions
         errors, psi = point.all_errors, np.where(_held(records, point)[:, None, None], 0.0, point.all_psi)
@@ -188,7 +188,7 @@ class White:
     def probability(self, statistic: float, directions: Array) -> float:
         """Return the probability of a sum of squares as large by chance, along orthonormal D ((N + M) p, f).
 
-        It is chi-squared in units of the noise along these directions, whose power is known by the estimate.
+        It is chi-squared in units of the noise along these directions, whose power is estimated.
         With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of this power changes by
         2 tr(D^T T_k D) / f for each delta theta_k. If v is the variance of this change, the statistic over f
         is F with f and 2 / v degrees of freedom. White directions have v = 0. A narrow band where the noise
@@ -207,7 +207,7 @@ class White:
         """Return the matrix (k, (N + M) p) that maps residuals to parameters if starts are unknown."""
         scale = np.linalg.norm(self.explained, axis=0)
         inverse = np.linalg.pinv(self.explained / np.where(scale > 0.0, scale, 1.0), rcond=1e-12)
-        # A parameter at its limit follows nothing, by rounding neither.
+        # A parameter at its limit does not move, not even by rounding.
         inverse = np.divide(inverse, scale[:, None], out=np.zeros_like(inverse), where=scale[:, None] > 0.0)
         return inverse[len(inverse) - len(self.echoes) :]
 
@@ -223,7 +223,7 @@ class White:
         return found
 
     def mean_left(self, columns: Array, means: Array) -> Array:
-        """Return the means (m,) of scores of columns (N p, m) less the part that parameters explain."""
+        """Return the means (m,) of scores of columns ((N + M) p, m) less the part that parameters explain."""
         if not np.any(means) and not np.any(self.means):
             return np.zeros(columns.shape[1])
         return np.asarray(means - self.means @ (self.spread @ columns))
@@ -248,7 +248,7 @@ class White:
         )
 
     def unexplained(self, columns: Array) -> Array:
-        """Return the part of columns (N p, m) that the estimate does not explain."""
+        """Return the part of columns ((N + M) p, m) that the estimate does not explain."""
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
 
@@ -259,7 +259,7 @@ def _traces(echoes: Array, correlations: Array) -> Array:
 
 
 def _held(records: Records, point: Point) -> NDArray[np.bool_]:
-    """Return the mask (k,) of dead times that the samples push against a bound.
+    """Return the mask (k,) of dead times that the data push against a bound.
 
     There the score is not zero. If the part that this parameter explains were taken off, evidence against a
     wrong model would go with it.

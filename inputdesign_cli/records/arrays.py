@@ -39,7 +39,7 @@ def arrays_of_mat(source: Source, raw: bytes) -> dict[str, Any]:
     import scipy.io
 
     try:
-        if raw[:4].count(0) == 0 and raw[124:126] != b"\x00\x02":  # version 4 begins with zeros, 7.3 is HDF5
+        if raw[:4].count(0) == 0 and raw[124:126] != b"\x00\x02":  # version 4 has zeros there, 7.3 is HDF5
             _check_elements(raw[128:], "<" if raw[126:128] == b"IM" else ">", MOST_UNPACKED)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -84,7 +84,7 @@ def columns_of_arrays(
     Fields of structs have their own names.
 
     Raises:
-        DataError: `data-unreadable`; of an object that only MATLAB reads, with the lines that convert it.
+        DataError: `data-unreadable`; for an object that only MATLAB reads, with the lines that convert it.
     """
     if named and named not in values:
         raise source.unreadable("has no such variable", f"it holds {', '.join(values)}")

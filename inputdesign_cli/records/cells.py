@@ -1,4 +1,4 @@
-"""What the cells of a table say: numbers, dates and times of day, or that there is no value."""
+"""The contents of the cells of a table: numbers, dates, times of day, or no value."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.records.sheet import Column
 
-# What says that there is no value, with what sheets write in place of a number that they do not have.
+# Cells without a value, among them the errors that spreadsheets write in place of a number.
 ERROR = re.compile(
     r"\s*#(N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)\s*", re.IGNORECASE
 )
@@ -24,7 +24,7 @@ _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
 _THOUSAND = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _SAY = "say which with --decimal , or --decimal .; or write decimal points and nothing between thousands"
 
-# The year first, or points behind a day; with slashes and hyphens the dates must show what is the month.
+# The year first, or points behind a day. With slashes and hyphens the dates must show which is the month.
 _DAYS = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y"),
     *("%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y", "%d-%b-%Y", "%d %b %Y"),

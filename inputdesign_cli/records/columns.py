@@ -33,11 +33,11 @@ _UNITS = {one: unit for unit in TIME_UNITS for one in (unit, *_SPELLINGS.get(uni
 _TIME = re.compile(
     r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
 )
-# Other things may be called like this as well: numbers of such a column rise, or it holds dates.
+# Other quantities may have these names: the numbers of the column must rise, or it must hold dates.
 _CLOCK = re.compile(
     r"(uhrzeit|zeitpunkt|messzeit|datum|date|clock|hora|fecha|marca[ _]de[ _]tiempo)(?![^\W_]).*"
 )
-# The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
+# The letter alone may be a temperature: only a unit of time may follow, and the numbers must rise.
 _SHORT = re.compile(rf"t([ _]*[(\[]?\s*({'|'.join(_UNITS)})\s*[)\]]?)?")
 # Words in the names of inputs and outputs. Such columns are proposed, and never taken unasked.
 _WORDS = {
@@ -68,7 +68,7 @@ def column_named(sheet: Sheet, name: str) -> Column:
 def time_columns(sheet: Sheet) -> list[str]:
     """Return the names in small letters of the columns of times, or the number of a nameless one.
 
-    If no name is one of times, columns that are called as clocks are and rise, or hold dates or times of day.
+    If no column is called a time: columns that are called a clock and rise, or hold dates or times of day.
     """
     header, surely, likely = sheet.header, dict[str, Column](), dict[str, Column]()
     for i, column in enumerate(sheet.columns):
@@ -163,7 +163,7 @@ def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None)
     typed = {role: _whole_name(sheet, role, name) for role, name in named.items()}
     found: dict[str, str] = {}
     for letter, count in counts.items():
-        for role in _of(letter, count):
+        for role in _roles(letter, count):
             taken = [*typed.values(), *found.values()]
             found[role] = typed.get(role) or _likely(sheet, role, taken, units, single=count == 1)
     references = units is None or units.closed_loop
@@ -171,7 +171,7 @@ def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None)
     return found | _time(sheet, typed, [*found.values()])
 
 
-def _of(letter: str, count: int) -> list[str]:
+def _roles(letter: str, count: int) -> list[str]:
     return [f"{letter}{i + 1}" for i in range(count)]
 
 
@@ -193,7 +193,7 @@ def _numbered(sheet: Sheet, letter: str) -> dict[str, list[str]]:
 
 
 def _likely(sheet: Sheet, role: str, taken: Sequence[str], units: Units | None, *, single: bool) -> str:
-    """Return the column that is called as a role, has the name of its channel, or alone its unit.
+    """Return the column that is named by a role or its channel, or is the only one with its unit.
 
     Where the channel has a name, a column of its unit must have a word of that name. If no column fits, it
     is the role itself.
@@ -242,9 +242,9 @@ def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
 def _references(sheet: Sheet, typed: Mapping[str, str], inputs: int) -> dict[str, str]:
     """Return `r1` -> the column of the reference that is added to an input, if every input has one.
 
-    A column that the user does not name counts if its numbers are whole.
+    A column that the user does not name counts if it has a number in every row.
     """
-    channels = _of("r", inputs)
+    channels = _roles("r", inputs)
     named = {role: typed[role] for role in channels if role in typed}
     found = {role: role for role in channels if role in sheet.header} | named
     found = found or ({"r1": "r"} if inputs == 1 and "r" in sheet.header else {})
@@ -261,14 +261,14 @@ def _references(sheet: Sheet, typed: Mapping[str, str], inputs: int) -> dict[str
 def _count(letter: str, sheet: Sheet, named: Mapping[str, str]) -> int:
     """Return how many inputs or outputs the user or the header names; their numbers must run from one."""
     roles = {role for role in named if role[0] == letter} or _numbered(sheet, letter).keys()
-    if roles and roles == {*_of(letter, len(roles))}:
+    if roles and roles == {*_roles(letter, len(roles))}:
         return len(roles)
     what = "input" if letter == "u" else "output"
     message = f"which column of {sheet.path.name} is the {what}? ({_contents(sheet)})"
     if roles:
         listed = ", ".join(sorted(roles))
         message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
-    wanted = [role for x in "uy" for role in _of(x, max(sum(role[0] == x for role in named), 1))]
+    wanted = [role for x in "uy" for role in _roles(x, max(sum(role[0] == x for role in named), 1))]
     hint = f"name them, or give their numbers, for example {columns_option(sheet, named, wanted)}"
     raise sheet.error("data-missing-column", message, hint)
 

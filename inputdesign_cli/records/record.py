@@ -28,7 +28,8 @@ from inputdesign_cli.records.sheet import Preparation, Sheet
 from inputdesign_cli.records.signals import Signals, is_even, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
-# The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
+# The sample time of a file may differ by this share from the spec's or a stated one. If resampled, it may be
+# longer than a stated one by the second share.
 _ALIKE, _LONGER = 0.1, 0.5
 # Sample times of several files, or of a file in two places, differ by less than this share by rounding alone.
 _ROUND = 1e-3
@@ -237,7 +238,7 @@ def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signal
     stated = stated and stated * (scale if preparation.time_unit else 1.0)
     step = _step_of(signals, stated, resample=preparation.resample) or units.sample_time
     apart, most = abs(step - units.sample_time), (EVEN if stated else _ALIKE) * units.sample_time
-    # Even steps do not jitter: near ones are another sample time once the record is a sample too long.
+    # Even steps do not jitter: a small difference is another sample time once it adds up to a sample.
     falls_behind = apart > EVEN * units.sample_time and apart * len(signals.time) > units.sample_time
     other = bool(signals.name) and is_even(signals.time) and falls_behind and not preparation.resample
     if apart <= most and not other:

@@ -25,10 +25,10 @@ from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.records.sheet import Detrend, Preparation
 from inputdesign_cli.records.signals import Signals
 
-# Times may be off by this share of the sample time unsaid, and by the second with a finding.
+# Steps may differ by EVEN from the sample time, relatively, and by MOST_JITTER with a finding.
 EVEN = 1e-3
 MOST_JITTER = 0.25
-# A longer step is a gap; with `resample` it may be longer before it is one.
+# A step of more sample times is a gap; the second holds with `resample`.
 _GAP, _LONG_GAP = 1.5, 3.0
 # Gaps after a larger share of the rows come from times that are rounded, or from another sample time.
 _OFTEN = 0.1
@@ -48,7 +48,8 @@ def segments_of(
     """Return segments with even steps `step`, their trends taken away, and what was done and seen.
 
     Raises:
-        DataError: `data-not-uniform`, the times jitter too much; `data-not-a-number`, no row is whole.
+        DataError: `data-not-uniform`, the times jitter too much; `data-not-a-number`, no row is complete;
+            `data-unreadable`, no row remains.
     """
     sheet, time = signals.sheet, signals.time if signals.name else signals.time * step
     whole = ~np.isnan(np.column_stack([time, signals.u, signals.y])).any(axis=1)
@@ -121,7 +122,7 @@ def _cut(
 def _resampled(part: Segment, step: float) -> tuple[Segment, int]:
     """Resample a segment at even times: outputs by linear interpolation, inputs at the nearest sample.
 
-    The number is that of even times after which inputs differ at samples that are left out.
+    The number counts the even times after which inputs change at samples that are left out.
     """
     count = int(np.floor((part.time[-1] - part.time[0]) / step + 0.5)) + 1
     even = part.time[0] + step * np.arange(count)
@@ -135,7 +136,7 @@ def _resampled(part: Segment, step: float) -> tuple[Segment, int]:
 def _detrended(
     part: Segment, names: tuple[str, ...], preparation: Preparation
 ) -> tuple[Segment, list[Finding]]:
-    """Return a segment without its trends or its operating point, and what was taken away."""
+    """Return a segment without its trends or its operating point, and findings on the trends."""
     found, left = list[Finding](), []
     for name, x in zip(names, (*part.u.T, *part.y.T), strict=True):
         if preparation.detrend == "none":
@@ -151,7 +152,7 @@ def _detrended(
 
 
 def trend(x: Array, kind: Detrend) -> tuple[Array, bool]:
-    """Return what is taken away from a signal x (n,), and whether it is a line.
+    """Return the trend (n,) of a signal x (n,), and whether it is a line.
 
     `auto` takes a line if it explains half the power about the mean, else the mean.
     """

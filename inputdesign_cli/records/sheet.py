@@ -15,7 +15,7 @@ from inputdesign_cli.errors import DataError, Diagnostic, Location
 
 Detrend = Literal["none", "constant", "linear", "auto"]
 Run = tuple[str, int, int]
-"""Rows of a file, the first and the last; no name: of the only file."""
+"""Name of a file, first and last row; the name is empty if there is only one file."""
 _PLAIN = (
     "write plain numbers like -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave "
     "a cell empty where there is no value, and write 1 and 0 for ON and OFF"
@@ -28,13 +28,13 @@ class Preparation:
 
     Attributes:
         columns: channel (`u1`, `y1`, `time`) -> name or number of its column.
-        sample_time, time_unit: what the file does not say, or says wrongly.
+        sample_time, time_unit: as the user states them; None: the file decides.
         resample: whether times that jitter more than usual are made even, and columns of other times joined.
-        detrend: what is taken away from the signals of every segment; `auto` a line where it explains much.
+        detrend: the trend to subtract from the signals of every segment; `auto`: a line if it explains much.
         skip: rows to leave out at the beginning.
-        span: of times, in the unit of the file, to keep.
+        span: the range of times to keep, in the unit of the file.
         without: rows to leave out, as findings number them; the record is cut there.
-        operating_point: by channel, what is taken away where no trend is.
+        operating_point: the levels to subtract if no trend is, by channel.
         separator, decimal, time_format: how the file is written.
     """
 
@@ -89,7 +89,7 @@ class Column:
     Attributes:
         fault: the first row that holds something else, and its text; `wrong` and `hint` are for the message.
         dated: whether the cells hold dates or times; the numbers are seconds since the first.
-        done: what was done to make times of the cells.
+        done: descriptions of how times were made of the cells.
     """
 
     numbers: Array
@@ -110,12 +110,12 @@ class Sheet:
     """Holds the content of a data file.
 
     Attributes:
-        names: of the columns; empty where the file has none.
-        lines: (n,) of the text file, or of rows counted from one.
-        head: line and text of the header; `texts` what the rows say, for diagnostics.
-        shown: whether messages may show what the file holds: most of it is numbers.
+        names: the names of the columns; empty if the file has none.
+        lines: (n,), line numbers of the rows in a text file, otherwise row numbers from one.
+        head: line and text of the header; `texts` are the texts of the rows, for diagnostics.
+        shown: whether messages may quote the file, since most of it is numbers.
         passed: blank lines and rows that are commented out, between rows of numbers.
-        sample_time, time_unit: what the file itself states.
+        sample_time, time_unit: stated by the file itself.
     """
 
     source: Source

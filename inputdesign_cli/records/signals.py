@@ -23,10 +23,11 @@ _ROUND, _EVEN_STEPS = 1e-4, 0.01
 # The first date in digits, and seconds since 1970 of the years 2000 to 2100.
 _A_DATE = 1.97e7
 _FIRST, _LAST = (datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (2000, 2100))
-# Rows stay as they are where this share of the whole ones stands in long stretches; in short records, where
-# this share is whole.
+# Rows are not joined if _KEPT of the complete rows, as a share, stand in long stretches. In records shorter
+# than _SHORT they are not joined if _FEW of all rows are complete.
 _KEPT, _FEW, _SHORT = 0.25, 0.5, 2 * SHORTEST
-# Steps of an output that are longer, in its own, are gaps. Those of all rows may be shorter by the second.
+# Steps of an output beyond _OWN_GAP of its median step are gaps. An output whose median step is at most
+# _NEARLY times that of all rows misses some rows only.
 _OWN_GAP, _NEARLY = 3.0, 1.1
 
 
@@ -36,10 +37,10 @@ class Signals:
 
     Attributes:
         time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
-        unit: of the times, if the file or the user says it; `dated`: they are dates, counted in seconds.
-        names: what findings call the columns of u, the last of which may be references, and of y.
-        without: (n,), rows that are to be left out.
-        findings: what was done to read them.
+        unit: the unit of the times, if the file or the user states it; `dated`: dates, counted in seconds.
+        names: the names in findings of the columns of u, the last of which may be references, and of y.
+        without: (n,), mask of the rows to leave out.
+        findings: findings on how they were read.
     """
 
     sheet: Sheet
@@ -114,7 +115,7 @@ def signals_of(sheet: Sheet, roles: Mapping[str, str], preparation: Preparation)
 def _check_counting(sheet: Sheet, time: Array, name: str) -> None:
     """Raise `DataError` (`data-not-a-number`) for times (n,) that may be dates in digits, as 20240312.
 
-    They may count parts of seconds since 1970 as well. Seconds since 1970 are times as others.
+    They may also count milliseconds since 1970, for example. Seconds since 1970 are accepted.
     """
     there = np.flatnonzero(~np.isnan(time))
     first, last = float(time[there].min()), float(time[there].max())
@@ -218,7 +219,7 @@ def check_range(sheet: Sheet, name: str, x: Array) -> None:
 
 
 def joined_rows(signals: Signals, *, resample: bool) -> Signals:
-    """Return the signals at the times of the output that was written most often, if hardly a row is whole.
+    """Return the signals at the times of the output written most often, if hardly a row is complete.
 
     Inputs are held until they are written again, and move at the nearest of these times. Outputs are
     interpolated linearly. Raises `DataError` (`data-not-a-number`) unless `resample` asks for it.

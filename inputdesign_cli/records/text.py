@@ -26,13 +26,13 @@ from inputdesign_cli.records.sheet import Column, Sheet, Source
 
 Rows = list[tuple[int, list[str]]]
 _COMMENTS = ("#", "%", "//")
-# Asked of charset-normalizer where a text is neither UTF-8 nor, by its bytes, Windows-1252.
+# Encodings that charset-normalizer tries if a text is neither UTF-8 nor, by its bytes, Windows-1252.
 _OTHERS = ["utf_16", "utf_32", "utf_16_le", "utf_16_be", "cp932", "gb18030", "big5", "euc_kr", "cp1251"]
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1b\ufffd]")
 _LOOKED_AT = 200
-# As many as a sheet of a workbook can have: a longer line is no row of a table.
+# The most columns of a sheet in a workbook: a longer line is no row of a table.
 _MOST_FIELDS = 16_384
-# What may separate fields; None stands for blanks. Of equally good ones the first.
+# Separators of fields; None stands for blanks. The first of equally good ones is taken.
 _SEPARATORS = ("\t", ";", "|", None, ",")
 _SAID = {"tab": "\t", "\\t": "\t", "blank": None, " ": None}
 _EXTRA = (
@@ -102,7 +102,7 @@ def sheet_of(
     every = [cell for column in cells for cell in column if cell.strip()]
     decimal = given.decimal or decimal_of(every, between_commas=separator == ",")
     columns = [column_of(column, decimal, stated=bool(given.decimal)) for column in cells]
-    # Messages may show what is a table of numbers, and no secret.
+    # Messages may quote a table of numbers, but nothing that may be secret.
     some = every[:: max(len(every) // 10**4, 1)]
     shown = not every or 2 * sum(map(is_value, some)) >= len(some)
     lines = np.array([line for line, _ in body])
