@@ -107,7 +107,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     if not found:
         return None
     largest, output, sample, lag, rising, alone = max(found)
-    # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
+    # The likelihood ratio of one linear regressor. A large shift has made the noise look larger in the score.
     power = float(white.residuals @ white.residuals) / outputs
     share = min(largest * white.variance / power, _MOST_EXPLAINED)
     statistic = -float(np.log1p(-share)) * point.freedom / outputs
