@@ -76,7 +76,8 @@ class Followed:
         """Return the followed spec with an error; `lines` are the lines of `file` when it was read."""
         listed = tuple(_placed(diagnostic, lines, file) for diagnostic in error.diagnostics)
         number = f"{len(listed)} errors" if len(listed) > 1 else "One error"
-        return replace(self, state="failed", said=f"{number}: the last good design stays.", errors=listed)
+        said = f"{number}: the last good design stays." if self.designs else f"{number}."
+        return replace(self, state="failed", said=said, errors=listed)
 
     @property
     def page(self) -> str:

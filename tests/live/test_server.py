@@ -255,6 +255,7 @@ def test_what_the_user_writes_is_text_on_the_page():
     assert "<script>alert" not in text
     assert text.count("&lt;script&gt;alert") == 3
     assert "&lt;b&gt;.yaml" in text
+    assert "last good design" not in text  # where there has been none
 
 
 @needs_browser

@@ -138,10 +138,11 @@ def shown(address, browser):
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])
+@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light"), (672, "paper")])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_page_is_accessible_and_nothing_is_clipped(address, browser, name, scheme, width):
-    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.emulate_media(**{"media": "print"} if scheme == "paper" else {"color_scheme": scheme})
     page.goto(address(name))
     assert violations(page) == []
     assert clipped(page) == []
