@@ -20,8 +20,9 @@ from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.curves import NyquistCurves
 from inputdesign_cli.outcome.results import Array
 
-# Factors on the height of a page with a panel below one other, or below several.
-_TALL, _TALLER = 1.25, 1.4
+# Factors on the height of a page with a panel below one other, or below several; share for a further row.
+_TALL, _TALLER, _HIGHER = 1.25, 1.4, 0.3
+_ROWS, _MOST = 3, 9  # rows of a plant, and entries in all, for which a page has room
 # Other ratios beyond this many times the limit, or the first one, are cut off by the linear panel.
 _HIGHEST = 4.0
 # Ratios that all stay below this share of the limit are flat on a linear axis: they are drawn over decades.
@@ -51,14 +52,22 @@ def draw_panels(
 ) -> None:
     """Draw each panel with `plot`, outputs as rows, and all of them together in a further panel with `below`.
 
+    Entries that do not fit side by side follow each other; the first ones are drawn if they are many.
+
     Args:
         magnitude: the label of the vertical axes at the left.
         title: the common title of all panels.
     """
     single = len(panels) == 1
     places = [(0, 0)] if single else [panel.entry or (0, 0) for panel in panels]
+    across = int(style.width_for(page) // style.PANEL)
+    if any(row >= _ROWS or column >= across for row, column in places):
+        title += f", {_MOST} of {len(panels)} entries" if len(panels) > _MOST else ""
+        panels = panels[:_MOST]
+        places = [divmod(number, across) for number in range(len(panels))]
     rows, columns = (1 + max(place[side] for place in places) for side in (0, 1))
     heights = [3] * rows
+    page.set_figheight((1.0 + _HIGHER * max(rows - 2, 0)) * page.get_figheight())
     if below is not None:
         page.set_figheight((_TALL if single else _TALLER) * page.get_figheight())
         heights.append(2)
@@ -72,7 +81,7 @@ def draw_panels(
         if single:
             title = ": ".join(filter(None, (title, panel.names)))
         else:
-            axes.set_label(f"G{lowered(i + 1, j + 1)} {panel.names}".strip())
+            axes.set_label(f"G{lowered(*(1 + side for side in panel.entry or (0, 0)))} {panel.names}".strip())
             axes.set_title(str(axes.get_label()), loc="left", color=GREY)
         if below is not None or any(row > i and column == j for row, column in places):
             axes.tick_params(which="both", labelbottom=False)
@@ -81,7 +90,7 @@ def draw_panels(
         style.title_above(page, title)
         style.legend_above(axes)
     else:
-        style.legend_over_all(page, title=title)
+        style.legend_over_all(page, title=title.removeprefix(", "))
     if below is not None:
         lowest = page.add_subplot(cells[rows, :])
         below(lowest, panels)
@@ -98,7 +107,11 @@ def draw_bound(page: Figure, curves: of.BoundCurves, time_unit: str) -> None:
     title = "Model error r_u against the admitted error r_adm" if stated else "Model error r_u beside |G|"
     title += ", at the plant of the spec" if curves.of_several else ""
     below = _plot_ratios if stated else None
-    draw_panels(page, curves.panels, _plot_error, time_unit, magnitude="error of G", title=title, below=below)
+    panels = list(curves.panels)
+    if len(panels) > _MOST:  # the entries nearest to r_adm, or to |G|, are drawn
+        worst = [np.nanmax(one.r_u / (one.G_abs if one.r_adm is None else one.r_adm)) for one in panels]
+        panels = [panels[number] for number in np.argsort(worst)[::-1]]
+    draw_panels(page, panels, _plot_error, time_unit, magnitude="error of G", title=title, below=below)
 
 
 def _errors(curves: of.BoundPanel) -> list[tuple[str, Array, dict[str, Any]]]:

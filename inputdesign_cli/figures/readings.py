@@ -67,7 +67,7 @@ def _labels(axes: Axes) -> tuple[str, str]:
     below = axes.get_xlabel() or page.get_supxlabel() or lowest.get_xlabel()
     beside = axes.get_ylabel() or next(filter(None, row), "") or page.get_supylabel()
     several = str(axes.get_label()) or ("" if axes.get_ylabel() else axes.get_title(loc="left"))
-    return below.split(";")[0], ", ".join(filter(None, (several, beside)))
+    return below.split(";")[0], ", ".join(filter(None, (several, beside.replace("\n", " "))))
 
 
 def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, object]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
 from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures import style
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE
@@ -20,6 +20,8 @@ _ROWS = 4  # channels that fit, of the record and of the outputs together
 _MARGIN = 0.08  # above and below, as a share of the range shown
 _HIGHER = 0.25  # share of the page height for each row beyond the second
 _BAND = 2.0  # standard deviations
+# A fixed number of steps: the layout is made for the tick labels at the first height.
+_STEPS: dict[str, Any] = {"nbins": 4, "steps": [1, 2, 5, 10]}
 _LIMIT: dict[str, Any] = {"color": ORANGE, "linewidth": 1.2, "linestyle": DASHED, "label": "limits"}
 # Samples beyond which a part of a record is also shown enlarged, and samples of that part.
 _WHOLE, _PART = 600, 400
@@ -74,7 +76,8 @@ def _name(axes: Axes, name: str, label: str, what: str) -> None:
     """Label the axis with the user's name and unit of a channel, or with its symbol and unit."""
     symbol = f"{name[0]}{style.lowered(name[1:])}(t)"
     nameless = not label or label.startswith("(")  # a unit alone
-    axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
+    said = f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}"
+    axes.set_ylabel(textwrap.fill(said, max(3 * axes.yaxis.get_tick_space(), 1)))  # letters for each tick
 
 
 def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: bool) -> None:
@@ -106,6 +109,7 @@ def _frame(axes: Axes, *shown: Array | float) -> None:
     if high == low:  # a constant is seen beside zero
         low, high = (min(low, 0.0), max(high, 0.0)) if high else (-1.0, 1.0)
     axes.set_ylim(low - _MARGIN * (high - low), high + _MARGIN * (high - low))
+    axes.locator_params(axis="y", **_STEPS)
 
 
 def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> None:
@@ -117,6 +121,7 @@ def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> No
     axes.hist(values, bins=bins, range=ends, weights=weights, **drawn)
     axes.tick_params(labelleft=False)
     axes.set_ylim(shown)
+    axes.locator_params(axis="y", **_STEPS)
 
 
 def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
@@ -142,8 +147,7 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         residual = curves.panels[0].y - curves.panels[0].predicted
         axes[1].plot(*_drawn(curves, residual, whole), color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
-        # A fixed number of steps: the layout is made for the tick labels at the first height.
-        axes[1].yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+        axes[1].locator_params(axis="y", **_STEPS)
     ends = np.concatenate([curves.time[[0, -1]], curves.left_out])
     over, last = (axes[:2], axes[1]) if single else (axes, axes[-1])
     for place in axes:

@@ -68,13 +68,15 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     if curves.record is not None:
         drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
         drawn[0].set_label("record, smoothed")
-    of = f"power of each line of {curves.symbol}"
-    above.set_ylabel(of if curves.lines else f"density of {curves.symbol}")
+    of = f"power of each line of {curves.symbol}" if curves.lines else f"density of {curves.symbol}"
+    above.set_ylabel(of if len(there) <= MOST else f"{of},\n{MOST} of {len(there)} entries")
     shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
     _scale(above, shown, float(np.median(shown)) if shown.size else 0.0)  # no line without power
     style.legend_above(above)
     values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
-    for number in range(min(r, MOST)):
+    # Eigenvalues below the last decade that is shown would have a label without a curve.
+    seen = np.max(values, axis=0, initial=0.0) > 10.0**-DECADES * values.max(initial=0.0)
+    for number in np.flatnonzero(seen)[:MOST].tolist():
         label = f"λ{style.lowered(number + 1)}"
         _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
     _plot_white(below, curves.white)
@@ -137,9 +139,9 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
 def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> None:
     """Draw a power over frequency, the `number`th of its panel, as a curve or as stems of `lines`."""
     colour = PALETTE[number % MOST]
-    if lines:
+    if lines:  # coinciding points have different sizes
         axes.vlines(w, 0.0, values, color=colour, linewidth=1.0, alpha=0.6)
-        axes.plot(w, values, linestyle="none", marker="o", markersize=4, color=colour, label=label)
+        axes.plot(w, values, "o", markersize=max(7.0 - 2.5 * number, 2.0), color=colour, label=label)
     else:
         dashes = DASHES[number % len(DASHES)]
         axes.plot(w, values, color=colour, linestyle=dashes, linewidth=1.8, label=label)

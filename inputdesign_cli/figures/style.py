@@ -17,9 +17,11 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.markers import TICKDOWN, TICKLEFT
 from matplotlib.text import Text
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import (
     FuncFormatter,
     LogFormatterSciNotation,
@@ -27,6 +29,7 @@ from matplotlib.ticker import (
     MaxNLocator,
     NullFormatter,
     NullLocator,
+    ScalarFormatter,
 )
 from matplotlib.typing import LineStyleType
 
@@ -60,11 +63,11 @@ GREY = "#777777"
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # for curves near a limit
 
-# Widths in a legend, in letters: an inch, a handle with its gaps, and the excess of a capital.
-_LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
+# Inches of a handle in a legend beside its label, and of the numbers and the label beside a panel.
+_BESIDE_LABEL, _BESIDE_AXES = 0.55, 0.85
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
-_PANEL, _ROW = 2.3, 0.4  # least inches of width of a panel, and share of the page height for a further row
+PANEL, _ROW = 2.3, 0.4  # least inches of width of a panel, and share of the page height for a further row
 
 # A logarithmic axis has even steps, at most as many as the second number, if its ends have a ratio below the
 # first. Beyond the last ratio, only powers of ten have a number.
@@ -94,10 +97,6 @@ _RC: dict[Any, Any] = {
 }
 
 
-# Digits before a power of ten that are written where an axis shows less than a decade.
-_LABELLED = ("1", "3")
-
-
 def lowered(*indices: str | int) -> str:
     """Return indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
     texts = [str(index) for index in indices]
@@ -108,11 +107,31 @@ def lowered(*indices: str | int) -> str:
 class _LogTicks(LogFormatterSciNotation):
     """Writes 10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
 
+    # Digits before a power of ten that are written: the first of the sets that gives an axis two numbers.
+    sets, digits = ("1", "13", "1236", "123456789"), "1"
+
+    def set_locs(self, locs: object = None) -> None:
+        """Choose the digits by the range that the axis shows."""
+        assert self.axis is not None
+        low, high = sorted(self.axis.get_view_interval())
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.log10(high) + 1.0)
+        for self.digits in _LogTicks.sets:
+            numbers = np.outer([int(digit) for digit in self.digits], decades)
+            if np.sum((low <= numbers) & (numbers <= high)) > 1:
+                break
+
     def __call__(self, x: float, pos: int | None = None) -> str:
         formula = re.fullmatch(r"\$\\mathdefault\{(.*?)(?:\^\{(.*)\})?\}\$", super().__call__(x, pos))
-        if formula is None or formula[1][:1] not in _LABELLED:
+        if formula is None or formula[1][:1] not in self.digits:
             return ""
         return formula[1].replace(r"\times", "×") + (formula[2] or "").translate(_RAISED)
+
+
+class _Numbers(ScalarFormatter):
+    """Writes 2e-18 at a tick, where others write 2, and the power above the axis: a legend stands there."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if self.get_offset() else super().__call__(x, pos)
 
 
 _SYMBOL = re.compile(r"\br_(u|adm)\b")
@@ -193,6 +212,10 @@ def painted(paint: Callable[[Figure], object], width: Width = "page") -> Figure:
         page = Page(figsize=_SIZES[width][:2], dpi=DPI, layout="constrained")
         paint(page)
         _typeset(page)
+        for axis in (axes.yaxis for axes in page.axes):
+            if axis.get_scale() == "linear" and axis.isDefault_majfmt:
+                axis.set_major_formatter(_Numbers())
+                axis.offsetText.set_visible(False)
     return page
 
 
@@ -221,7 +244,7 @@ def _strokes(axes: Axes) -> None:
 
 def panels(page: Figure, number: int, columns: int, *, shared: bool = False) -> list[Axes]:
     """Return axes for panels, row by row, in at most this many columns; further rows make a page higher."""
-    columns = min(columns, number, max(int(width_for(page) // _PANEL), 1))
+    columns = min(columns, number, max(int(width_for(page) // PANEL), 1))
     rows = -(-number // columns)
     page.set_figheight((1.0 + _ROW * (rows - 1)) * page.get_figheight())
     grid = list(page.subplots(rows, columns, squeeze=False, sharex=shared, sharey=shared).flat)
@@ -353,7 +376,7 @@ def legend_above(axes: Axes) -> None:
     page = axes.get_figure(root=True)
     assert page is not None
     corner = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.3}
-    axes.legend(**_legend(labelled(axes), page, corner))
+    axes.legend(**_legend(labelled(axes), width_for(page) - _BESIDE_AXES, corner))
 
 
 def width_for(page: Figure) -> float:
@@ -361,29 +384,24 @@ def width_for(page: Figure) -> float:
     return page.get_figwidth() * TYPE_SIZE / float(mpl.rcParams["font.size"])
 
 
-def _legend(handles: Sequence[Artist], page: Figure, place: Mapping[str, object]) -> dict[str, Any]:
-    """Return the settings of a legend at a place, with as many columns as the page has room for."""
-    room = int(_LETTERS_PER_INCH * width_for(page))
+def _legend(handles: Sequence[Artist], room: float, place: Mapping[str, object]) -> dict[str, Any]:
+    """Return the settings of a legend at a place, with as many columns as there is `room` for, in inches."""
     # A label wider than the page would leave no room for the axes.
-    widest = max(room - 2 * _BESIDE_LABEL, 1)
+    widest = max(int(_TITLE_PER_INCH * (room - _BESIDE_LABEL)), 1)
     labels = [textwrap.fill(str(handle.get_label()), widest) for handle in handles]
     listed = {"handles": handles, "labels": labels, "ncols": _columns(labels, room)}
     return {**listed, "handlelength": 2.0, "columnspacing": 1.2, **place}
 
 
 def _columns(labels: Sequence[str], room: float) -> int:
-    """Return the most columns of a legend, filled one after the other, that fit into `room` letters."""
+    """Return the most columns of a legend, filled one after the other, that fit into `room`, in inches."""
+    size, kind = text_to_path.get_text_width_height_descent, FontProperties(size=TYPE_SIZE)
+    lines = (_SYMBOL.sub(r"r\1", label).split("\n") for label in labels)
+    widths = [_BESIDE_LABEL + max(size(line, kind, False)[0] for line in each) / 72.0 for each in lines]
     for columns in range(len(labels), 1, -1):
-        shared = np.array_split([_width(label) for label in labels], columns)
-        widest = [float(max(widths)) for widths in shared]
-        if sum(widest) + _BESIDE_LABEL * len(widest) <= room:
+        if sum(max(shared) for shared in np.array_split(widths, columns)) <= room:
             return columns
     return 1
-
-
-def _width(label: str) -> float:
-    """Return the width of a label in letters of usual width: capitals are wider."""
-    return len(label) + _WIDER * sum(letter.isupper() for letter in label)
 
 
 def title_above(page: Figure, title: str) -> None:
@@ -400,4 +418,4 @@ def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title
     """Draw one legend for all panels of a page, above them: of all that has a label, or of `handles`."""
     handles = labelled(*page.axes) if handles is None else handles
     place = {"loc": "outside upper left", "title": _wrapped(page, title), "alignment": "left"}
-    page.legend(**_legend(handles, page, place))
+    page.legend(**_legend(handles, width_for(page), place))

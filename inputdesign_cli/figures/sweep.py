@@ -149,6 +149,8 @@ def _draw_curves(
         table.numbers(f"baseline.white.{objective(table.kind).white}") if of_value and not across else None
     )
     side = f"{'ceiling' if table.maximised else 'floor'}: {whatever}"
+    if across and bound is not None:  # each value has a colour, the name has none of them
+        axes.plot([], [], color=BLACK, linestyle=DASHED, label=side)[0].set_in_layout(False)
     for group, colour in zip(groups, PALETTE, strict=False):
         member = shown & [not across or text == group for text in table.columns[across or along]]
         name = f"{_short(across)} = {group}" if across else "design"

@@ -117,6 +117,16 @@ def test_entries_that_coincide_are_dashed_apart_and_rounding_has_no_curve(page):
     assert [axes.get_xscale() for axes in page(CURVES["matrix"]).axes] == ["log", "log"]
 
 
+def test_lines_that_coincide_are_seen_through_each_other_and_an_eigenvalue_of_zero_has_no_name(page):
+    """Two inputs in phase: all entries are the same, and one direction has all power."""
+    lines = SpectrumCurves(np.array([0.2, 1.0]), np.ones((2, 2, 2)), lines=True)
+    above, below = page(lines).axes
+    sizes = [line.get_markersize() for line in lines_by_label(above).values()]
+    assert len(sizes) == 3
+    assert sizes == sorted(set(sizes), reverse=True)
+    assert list(lines_by_label(below)) == ["λ₁"]
+
+
 def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
     figure = page(CURVES["long signal"])
     record, histogram = figure.axes[:2]

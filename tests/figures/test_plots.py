@@ -17,7 +17,7 @@ from matplotlib.transforms import Bbox
 from inputdesign_cli.figures.estimates import draw_campaign
 from inputdesign_cli.figures.plots import draw, draw_all, figure, painter
 from inputdesign_cli.figures.readings import readings
-from inputdesign_cli.figures.style import TYPE_SIZE, painted, rendered
+from inputdesign_cli.figures.style import TYPE_SIZE, log_axes, painted, rendered
 from inputdesign_cli.figures.sweep import draw_trade
 from inputdesign_cli.figures.sweep_table import Trade
 from inputdesign_cli.outcome.curves import (
@@ -27,20 +27,38 @@ from inputdesign_cli.outcome.curves import (
     FitCurves,
     NyquistCurves,
     OrderCurves,
+    PredictedPanel,
     ResponseCurves,
     RunCurves,
     SignalCurves,
 )
 from inputdesign_cli.outcome.results import Results
-from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound, lines_by_label
+from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound, lines_by_label, one_input
 from tests.support.outcomes import typed
+
+WAVE = np.sin(0.1 * T)
+# Numbers of the first height of a panel that are narrower than those of the last one.
+SKEW = np.where(WAVE < 0, 0.0419, 0.0344) * WAVE
+QUIET = (PredictedPanel("u1", 1.7 * WAVE, 0 * T, applied=True), PredictedPanel("y1", SKEW, 0 * T))
+LONG = {"u1": "w" * 30 + " (km/h)", "u2": "heating of the hall behind the door (%)"}
+UNUSUAL = {
+    "many entries": BoundCurves(
+        tuple(BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=entry) for entry in product(range(8), repeat=2))
+    ),
+    "one long row": BoundCurves(tuple(BoundPanel(W, 0.008 * G, G, entry=(0, j)) for j in range(5))),
+    "quiet output": SignalCurves(T, {"r1": 1.1 * WAVE}, predicted=QUIET),
+    "long names": SignalCurves(T, {"u1": WAVE, "u2": WAVE}, labels=LONG),
+    "full legend": bound(
+        BoundPanel(W, 0.00816 * G, G, 0.01 * G, r_u_record=0.00836 * G, r_u_equal=0.0191 * G)
+    ),
+}
 
 
 @cache
 def drawn(name, width="page"):
     """The picture of curves and its figure; drawn once for all tests."""
     found = []
-    return rendered(painter(CURVES[name]), width=width, seen=found.append), found[0]
+    return rendered(painter((CURVES | UNUSUAL)[name]), width=width, seen=found.append), found[0]
 
 
 def test_no_global_state():
@@ -109,10 +127,11 @@ def test_a_png_of_the_promised_size_has_labels_in_one_size_and_no_legend_hides_a
 
 # The test before has drawn the pages.
 LAID_OUT = [("bound beside white", "phone"), ("predicted signal", "column")]
+LAID_OUT += [(name, width) for name in UNUSUAL for width in ("page", "column")]
 LAID_OUT += [(name, width) for width in ("page", "column", "phone") for name in CURVES]
 
 
-@pytest.mark.first(14)
+@pytest.mark.first(24)
 @pytest.mark.parametrize(("name", "width"), dict.fromkeys(LAID_OUT))
 def test_no_text_leaves_the_page_or_lies_on_another(name, width):
     _, figure = drawn(name, width)
@@ -129,12 +148,29 @@ def test_no_text_leaves_the_page_or_lies_on_another(name, width):
     for axes in figure.axes:
         for axis, side in ((axes.xaxis, "x"), (axes.yaxis, "y")):
             low, high = sorted(axis.get_view_interval())
-            ticks = [tick for tick in axis.get_ticklabels("both") if tick.get_visible() and tick.get_text()]
+            ticks = [
+                tick for tick in axis.get_ticklabels(which="both") if tick.get_visible() and tick.get_text()
+            ]
             ticks = [tick for tick in ticks if low <= tick.get_position()["xy".index(side)] <= high]
             ends = sorted(
                 getattr(tick.get_window_extent(renderer), f"interval{side}").tolist() for tick in ticks
             )
             assert all(one[1] < other[0] for one, other in pairwise(ends)), (side, ticks)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.031, 0.19), (0.02, 0.9), (0.41, 0.72), (0.04, 30.0)])
+def test_a_logarithmic_axis_has_two_numbers_or_more(low, high):
+    page = painted(lambda page: log_axes(page.subplots(), "y"))
+    page.axes[0].set_ylim(low, high)
+    page.draw_without_rendering()
+    ticks = page.axes[0].yaxis.get_ticklabels(which="both")
+    assert sum(low <= tick.get_position()[1] <= high and bool(tick.get_text()) for tick in ticks) >= 2
+
+
+def test_no_power_of_ten_stands_over_the_axis_where_the_legend_is(page):
+    axes = page(one_input(1e-18 * np.ones_like(W), 2e-18)).axes[0]
+    assert not axes.yaxis.get_offset_text().get_visible()
+    assert "2e-18" in [tick.get_text() for tick in axes.get_yticklabels()]
 
 
 def headings(page):

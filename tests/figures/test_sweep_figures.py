@@ -63,6 +63,15 @@ def test_cost_against_samples_is_sorted_logarithmic_and_has_its_floor():
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
 
 
+def test_the_name_of_the_floor_has_the_colour_of_no_curve():
+    """The floors of all orders coincide: the last one would be seen, and the first one named."""
+    given = table({M: "112233", N: "121212"}, [4, 3, 2, 1, 4, 2], floor=[0.5] * 6)
+    axes = pages(given)[0].axes[0]
+    floor, *designs = axes.get_legend().legend_handles
+    assert "floor" in axes.get_legend().texts[0].get_text()
+    assert floor.get_color() not in {design.get_color() for design in designs}
+
+
 def test_the_map_has_a_cell_for_each_point():
     given = table({N: ["10", "10", "9", "9"], M: ["1", "2", "1", "2"]}, [1.0, 2.0, 3.0, ""])
     page = pages(given)[-1]
