@@ -229,13 +229,14 @@ def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
     w, rows, number = curves.frequency, curves.ratios[:_MOST_LINES], len(curves.ratios)
     width = 0.5 if len(rows) > 20 else 0.8
     if number:
-        each = axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
-        each[0].set_label(f"each of {number} plants")
+        drawn: dict[str, Any] = {"color": GREY, "linewidth": width, "alpha": 0.45}
+        axes.plot(w, rows.T, **drawn)
+        axes.plot([], [], label=f"each of {number} plants", **drawn)  # no single curve has this name
         largest, label = curves.ratios.max(axis=0), f"largest of {number} plants"
         axes.plot(w, largest, color=GREY, linestyle=DOTTED, linewidth=1.4, label=label)
     axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
     for (name, ratio), color in zip(list(curves.active.items())[:MOST_NAMED], OTHERS, strict=False):
-        axes.plot(w, ratio, color=color, linewidth=1.4, label=f"decides: {name}")
+        axes.plot(w, ratio, color=color, linewidth=1.4, label=f"decides, {name}")
     shown = rows if len(rows) else curves.nominal
     top = 1.3 * max(float(shown.max()), 1.0)
     style.plot_limit(axes, top)

@@ -75,7 +75,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     style.legend_above(above)
     values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
     # Eigenvalues below the last decade that is shown would have a label without a curve.
-    seen = np.max(values, axis=0, initial=0.0) > 10.0**-DECADES * values.max(initial=0.0)
+    seen = np.max(values, axis=0, initial=0.0) >= 10.0**-DECADES * values.max(initial=0.0)
     for number in np.flatnonzero(seen)[:MOST].tolist():
         label = f"λ{style.lowered(number + 1)}"
         _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)

@@ -197,7 +197,14 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(shown, runs):
     ("name", "told", "figure"),
     [
         ("sweep", ["number of samples N (100|50) ", "cost: order = 1 [0-9.]+; floor"], 0),
-        ("robust", ["frequency", "r_u / r_adm: largest of 5 plants [0-9.e-]+; plant of the spec"], 1),
+        (
+            "robust",
+            [
+                "frequency",
+                "r_u / r_adm: largest of 5 plants [0-9.e-]+; plant of the spec .*; decides, plant [0-9]",
+            ],
+            1,
+        ),
         ("loop", ["frequency ω .rad/s. ", "C G, nominal: real part", "distance of the disc from −1 "], 1),
         ("lines", ["frequency", "power [0-9.e-]+"], 1),
         ("assessed", ["time", "predicted one step ahead"], 0),
