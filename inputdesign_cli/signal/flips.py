@@ -324,6 +324,8 @@ class FlipSearch:
             values = point.values.copy()
             values.ravel()[order] = wanted.ravel()[order]
             point = self._at(values, best.ratio)
+            if not np.isfinite(point.ratio):  # it has no gradient
+                break
             if point.ratio < best.ratio and self.keeps(values):
                 best = point
         return best

@@ -236,6 +236,24 @@ objective: shortest_experiment
     assert least <= found["samples"] <= least + 1
 
 
+@pytest.mark.parametrize("kind", ["binary", "ternary"])
+def test_a_shortest_record_has_the_whole_amplitude(kind):
+    """Its first length, the least period of two inputs, needs less."""
+    text = f"""
+plant: {{A: [1, -0.177, -0.088], B: [[[0, -0.327], [-0.655, -0.567]]]}}
+noise: {{variance: 0.012}}
+accuracy: {{model_error: {{relative: 0.745, alpha: 2, band: [0.1, 2.8]}}}}
+spectrum: {{type: free}}
+limits: {{amplitude: 0.8}}
+signal: {{type: {kind}, seed: 1, seconds: 3}}
+objective: shortest_experiment
+"""
+    found = solve(parse_spec(text)).result["signal"]
+    assert found["of_limits"]["amplitude.input"] == pytest.approx(1.0)
+    assert found["samples"] < 14
+    assert found["worst_ratio"] <= 1.0 + 1e-9
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
 def test_what_is_known_already_needs_a_short_record_only(share):

@@ -47,7 +47,7 @@ class LevelSearch:
     Args:
         plants: returns the plants, one for each scenario, for records of a length.
         cost: returns the cost of samples (n, r).
-        amplitude: amplitude (r,) of two-level records; None: the levels of the first record.
+        amplitude: amplitude (r,) of the levels; None: the levels of the first record.
         allowed: says whether samples (n, r) keep to the limits beside the amplitude; None if there is none.
         most_moves: the largest number of changes of the inputs in a number of samples; None without a limit.
     """
@@ -110,8 +110,9 @@ class LevelSearch:
         """Return the best record (n, r) found from a first one and from other starts, and its ratio."""
         hold, returns = self.settings.hold, self.settings.returns
         letters, most = _levels(record[:-hold] if returns else record), self.most_moves(values * hold)
-        if self.amplitude is not None and len(letters) == 2:
-            letters = np.array([-self.amplitude, self.amplitude])
+        if self.amplitude is not None:  # the first record is as low as its own length allows
+            record = self.amplitude * np.sign(record)
+            letters = self.amplitude * np.linspace(-1.0, 1.0, len(letters))[:, None]
         goals = [
             PlantGoal(plant, scenario.requirements)
             for plant, scenario in zip(self.plants(values * hold), self.design.problem.scenarios, strict=True)
