@@ -20,13 +20,13 @@ os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before n
 os.environ["PYTHONDONTWRITEBYTECODE"], sys.dont_write_bytecode = "", False
 
 SPECS = Path(__file__).parent.parent / "specs"
-# New objects before the collector of cycles looks at them: by itself it does so every 700.
+# The number of new objects after which the collector of cycles runs; the default is 700.
 gc.set_threshold(50_000, 10, 10)
 
 # The tree of commands is made once, not at every call: it depends on nothing.
 typer.main.get_command = typer.testing._get_command = cache(typer.main.get_command)
 
-# `nohup` and the background of a shell hand on that these are ignored, and commands under test would obey.
+# `nohup` and background jobs of a shell ignore these signals, and commands under test would inherit that.
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, handler)
@@ -34,7 +34,7 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Beyond the sets of parameters that its mark `first` counts a test is slow."""
+    """Mark the parameter sets of a test as slow beyond the number in its mark `first`."""
     seen = Counter()
     for item in items:
         name, mark = item.nodeid.partition("[")[0], item.get_closest_marker("first")
@@ -44,7 +44,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """What was imported and collected stays, so that the collector need not look through it again."""
+    """Freeze imported and collected objects, so that the garbage collector need not scan them again."""
     gc.collect()
     gc.freeze()
 
@@ -56,7 +56,7 @@ def _time_for_hints(monkeypatch):
 
 
 def built(name):
-    """Here the package is imported, which the process that only hands out tests does not need."""
+    """Build an experiment; the import stays here, as a process that only hands out tests needs none."""
     from inputdesign_cli import load_spec
     from inputdesign_cli.questions.building.system import build_experiment
 
@@ -77,7 +77,7 @@ def first_order():
 
 @pytest.fixture(scope="session")
 def campaigns(tmp_path_factory):
-    """A folder with a campaign as it has `begun`, and as it is after `r1.csv`: `once`; and `r2.csv`."""
+    """A folder with a campaign that has `begun`, the same after `r1.csv` in `once`, and `r2.csv`."""
     from tests.support.campaigns import SPEC, applied
     from tests.support.commands import caller
 

@@ -1,4 +1,4 @@
-"""The house: imports run one way, the spec becomes objects once, and contracts are complete."""
+"""The architecture: imports run one way, the spec becomes objects once, and contracts are complete."""
 
 import ast
 from collections.abc import Callable, Iterable, Iterator
@@ -9,7 +9,7 @@ import inputdesign_cli
 
 ROOT = Path(inputdesign_cli.__file__).parent
 
-# From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
+# From the lowest level to the highest. A room, a top-level module, may import from earlier lines and its own.
 FOUNDATION = "arrays errors finding expressions version regular_file compute plugins"
 ORDER = [
     set(FOUNDATION.split()),
@@ -61,7 +61,7 @@ def room_of(path: Path) -> str:
 
 @cache
 def imports(path: Path) -> list[tuple[str, str]]:
-    """What a file imports, at its top or inside a function: modules, and the names taken from them."""
+    """The modules that a file imports, at its top or inside a function, and the names taken from them."""
     package = ["inputdesign_cli", *path.relative_to(ROOT).parts[:-1]]
     found = []
     for node in nodes(path):
@@ -164,8 +164,8 @@ def test_folders_import_one_way():
     assert {(a, b) for a, b in pairs if "" < a < b and (b, a) in pairs} == set()
 
 
-# Who may know the spec: those that read or write it, those that turn it into objects or hand it to those, and
-# the page of a report that restates it in words.
+# Code that may know the spec: it reads or writes the spec, turns it into objects, or calls code that does.
+# The page of a report restates it in words.
 SPEC_ROOMS = {"specification", "sweeps", "wizard", "cli"}
 SPEC_FILES = {"questions/__init__.py", "report/question.py"}
 
@@ -176,7 +176,7 @@ def knows_the_spec(path: Path) -> bool:
 
 
 def builds(path: Path) -> bool:
-    """Whether a file turns parts of a spec into objects: `building/`, and `build*.py` of a question."""
+    """Return whether a file makes objects of a spec: `building/`, and `build*.py` of a question."""
     inside = path.relative_to(ROOT).as_posix()
     of_question = inside.startswith("questions/") and path.name.startswith("build")
     return of_question or inside.startswith("questions/building/")
@@ -222,11 +222,11 @@ def test_uses_of_the_spec_are_found():
 
 
 def test_the_spec_becomes_objects_once():
-    """After the builders nothing takes a spec: it holds what they made of it."""
+    """After the builders no function takes a spec: it takes the objects that they made."""
     assert offenders(lambda path: not knows_the_spec(path) and uses_of_the_spec(nodes(path))) == {}
 
 
-# What says that a contract is incomplete, counted over the package. The numbers may fall, never rise.
+# Signs of incomplete contracts, counted over the package. The numbers may fall, never rise.
 MOST_QUESTIONS = 41
 MOST_IGNORED = 1
 
@@ -237,8 +237,8 @@ def own_kinds() -> set[str]:
     return {node.name for path in FILES for node in nodes(path) if isinstance(node, ast.ClassDef)}
 
 
-def test_kinds_are_hardly_asked_for():
-    """`isinstance` and `issubclass` of our own kinds."""
+def test_the_number_of_type_checks_of_own_classes_does_not_rise():
+    """Calls of `isinstance` and `issubclass` with classes of the package are counted."""
     found = [
         f"{path.relative_to(ROOT)}: {ast.unparse(call)}"
         for path in FILES
@@ -248,7 +248,7 @@ def test_kinds_are_hardly_asked_for():
     assert len(found) <= MOST_QUESTIONS, "\n".join(found)
 
 
-def test_only_builders_match_kinds():
+def test_only_builders_match_classes_of_the_package():
     """`case Kind():` belongs where a section of the spec becomes an object, and nowhere after."""
 
     def matched(path: Path) -> list[str]:
@@ -258,8 +258,8 @@ def test_only_builders_match_kinds():
     assert [name for name in offenders(matched) if not builds(ROOT / name)] == []
 
 
-def test_no_attribute_goes_by_a_computed_name():
-    """But for the command line and the models of the spec (and the package itself, which imports lazily)."""
+def test_no_attribute_is_accessed_by_a_computed_name():
+    """Exceptions are the command line, the models of the spec, and the package itself (lazy imports)."""
 
     def computed(path: Path) -> list[str]:
         by_name = calls(path, "getattr", "setattr", "hasattr")
@@ -270,7 +270,7 @@ def test_no_attribute_goes_by_a_computed_name():
     ] == []
 
 
-def test_types_are_hardly_ignored():
+def test_the_number_of_ignored_types_does_not_rise():
     found = [
         f"{path.relative_to(ROOT)}:{number}"
         for path in FILES

@@ -77,7 +77,7 @@ def test_tabs_and_control_characters_do_not_reach_the_terminal():
     assert not set("".join(lines)) & set("\x1b\x07\t")
 
 
-def test_as_data():
+def test_diagnostics_become_plain_data():
     assert json.loads(json.dumps(as_json(ONE))) == [
         {
             "code": "a-code",

@@ -1,4 +1,4 @@
-"""Pages lead somewhere, cite what has an entry, and show specs and code that run; and so do benchmarks."""
+"""Links and citations of pages are valid, and specs and code on pages and in benchmarks run."""
 
 import ast
 import importlib
@@ -18,7 +18,7 @@ CITATION = re.compile(r"(?<!ignore)\[([a-z]{3,}(?:-[a-z]+)*-(?:[0-9]{4}|[a-z]{3,
 
 
 def anchors(page):
-    """What a link to a heading of this page ends with."""
+    """The ends of links to the headings of this page."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-") for heading in headings}
 
@@ -65,7 +65,7 @@ def test_the_spec_of_the_readme_is_the_shipped_one():
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
-def test_what_a_benchmark_takes_from_the_package_is_there(script):
+def test_every_name_that_a_benchmark_imports_exists(script):
     taken = [
         (node.module, alias.name)
         for node in ast.walk(ast.parse(script.read_text(encoding="utf-8")))
@@ -79,7 +79,7 @@ def test_what_a_benchmark_takes_from_the_package_is_there(script):
 
 @pytest.mark.slow
 def test_the_code_of_the_page_about_python_runs(tmp_path, monkeypatch):
-    """Of docs/python.md, in its order."""
+    """The blocks of docs/python.md run in their order."""
     page = ROOT / "docs" / "python.md"
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)

@@ -19,8 +19,8 @@ CODE = re.compile(r"[a-z]+(-[a-z]+)*")
 
 
 def codes_in(nodes: Iterable[ast.AST]) -> set[str]:
-    """The string literals that stand for a code: in calls that make diagnostics, and first of the three
-    texts that a function returns as code, message and hint."""
+    """The string literals that stand for a code in calls that make diagnostics. A code is also the first of
+    three texts that a function returns as code, message and hint."""
     found = set()
     for node in nodes:
         if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and len(node.value.elts) == 3:
@@ -51,7 +51,7 @@ def test_every_code_is_explained():
     assert offenders(lambda path: codes_in(nodes(path)) - explanations().keys()) == {}
 
 
-def test_no_code_is_explained_in_vain():
+def test_every_code_with_an_explanation_is_used():
     source = "\n".join(p.read_text() for p in FILES)
     source += 'unknown-code"'
     assert [code for code in explanations() if f'{code}"' not in source] == []
@@ -78,6 +78,6 @@ def test_no_code_is_explained_twice():
     assert kinds().keys() & explanations().keys() == set()
 
 
-def test_explaining():
+def test_an_unknown_code_is_refused_with_the_nearest_one():
     assert explanation("not-monic", explanations()).startswith("not-monic: ")
     assert refused(explanation, "not-monik", explanations())[0].hint == 'did you mean "not-monic"?'

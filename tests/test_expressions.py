@@ -26,7 +26,7 @@ TEXTS = [
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_values_and_slopes_are_those_of_complex_steps(text):
+def test_values_and_slopes_agree_with_complex_steps(text):
     value, slope = Expression.of(text).at(NAMES, VALUES)
     functions = {name: getattr(cmath, name) for name in dir(cmath) if not name.startswith("_")}
 
@@ -67,7 +67,7 @@ def test_values_and_slopes_are_those_of_complex_steps(text):
         "\x00",
     ],
 )
-def test_what_is_not_arithmetic_is_refused(text):
+def test_texts_that_are_not_arithmetic_are_refused(text):
     with pytest.raises(ExpressionError):
         Expression.of(text)
 
@@ -75,7 +75,7 @@ def test_what_is_not_arithmetic_is_refused(text):
 @pytest.mark.parametrize(
     "text", ["1/(K - K)", "log(-K)", "sqrt(-K)", "9**9**9**9", "exp(1e6*K)", "(-K)**0.5"]
 )
-def test_what_is_not_defined_is_not_a_number(text):
+def test_undefined_values_and_slopes_are_nan(text):
     value, slope = Expression.of(text).at(NAMES, VALUES)
     assert math.isnan(value)
     assert np.all(np.isnan(slope))
@@ -92,11 +92,11 @@ def test_what_is_not_defined_is_not_a_number(text):
         ("pi*K", True),
     ],
 )
-def test_affine_is_told_by_the_form(text, affine):
+def test_an_expression_is_affine_by_its_form(text, affine):
     assert Expression.of(text).affine == affine
 
 
-def test_names_are_told_and_travel():
+def test_names_of_parameters_survive_pickling_and_exclude_functions():
     found = pickle.loads(pickle.dumps(Expression.of("K*exp(-pi/T)")))
     assert found.names == {"K", "T"}
     assert is_name("K_1")
@@ -107,8 +107,8 @@ DEEP = ["-" * 400 + "K", "K" + "*1" * 240, "K" + "+T" * 240, "1*(" * 80 + "K" + 
 
 
 @pytest.mark.parametrize("text", [*TEXTS, *DEEP, "K" + " " * 499])
-def test_what_is_made_of_expressions_is_worth_what_they_are(text):
-    """However long and deep the texts are: by the rules of products and quotients."""
+def test_products_and_quotients_of_expressions_follow_the_rules_of_calculus(text):
+    """The rules hold for long and deeply nested texts, too."""
     a, b = Expression.of(text), Expression.of("T*exp(zeta)")
     (x, dx), (y, dy) = (one.at(NAMES, VALUES) for one in (a, b))
     for made, value, slope in (
@@ -125,8 +125,8 @@ def test_what_is_made_of_expressions_is_worth_what_they_are(text):
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("count", [0, 1, 6, 60])
-def test_products_of_many_factors_are_those_of_numpy(count):
-    """And their slopes those of complex steps; each factor is worked through once."""
+def test_products_of_many_factors_agree_with_numpy(count):
+    """Their slopes agree with complex steps."""
     factors = [[Expression.of(f"T/{k}"), Expression.of("1 + K/T")] for k in range(1, count + 1)]
     found = [one.at(NAMES, VALUES) for one in product_of(factors)]
     step = 1e-20
@@ -144,12 +144,12 @@ def test_products_of_many_factors_are_those_of_numpy(count):
 
 
 @pytest.mark.parametrize("text", ["K*1e200*1e200", "K + 1e308*1e308*0", "K*1e308*1e-308 + 0*(1e308*1e308)"])
-def test_what_leaves_the_range_of_numbers_is_not_finite_and_quiet(text):
+def test_an_overflow_is_not_finite_and_raises_no_warning(text):
     with np.errstate(all="raise"):
         assert not math.isfinite(Expression.of(text).at(NAMES, VALUES)[0])
 
 
-def test_together_they_are_worth_what_each_is_alone_and_one_undefined_spoils_no_other():
+def test_joint_evaluation_equals_separate_evaluation_beside_undefined_expressions():
     texts = ("K*exp(-h/T)", "log(h - h*2)", "K*exp(-h/T)/(1 - exp(-h/T))", "sqrt(0)*K", "K/(T - 2)", "3")
     symbols, values = ("K", "T", "h"), np.array([1.5, 2.0, 0.3])
     several = tuple(map(Expression.of, texts))
@@ -167,8 +167,8 @@ def test_together_they_are_worth_what_each_is_alone_and_one_undefined_spoils_no_
     np.testing.assert_allclose(here.gradients[0], [q, 1.5 * q * 0.075, -0.75 * q], rtol=1e-14)
 
 
-def test_slopes_of_ratios_of_huge_and_tiny_numbers_hold():
-    """One over the divisor, or its square, would leave the range of numbers."""
+def test_slopes_of_ratios_of_huge_and_tiny_numbers_are_accurate():
+    """The reciprocal of the divisor, or of its square, would leave the range of doubles."""
     value, gradient = Expression.of("x/y").at(("x", "y"), np.array([1e-200, 1e-170]))
     np.testing.assert_allclose([value, *gradient], [1e-30, 1e170, -1e140], rtol=1e-14)
     value, gradient = Expression.of("x/y").at(("x", "y"), np.array([1e150, 1e160]))

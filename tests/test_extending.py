@@ -1,4 +1,4 @@
-"""The promise of docs/CONTRIBUTING.md: what another package adds by entry points is designed and proved."""
+"""Extensions of other packages are designed with and proved, as docs/CONTRIBUTING.md promises."""
 
 import json
 import os
@@ -126,17 +126,17 @@ def found(installed):
 
 
 def information_of(r):
-    """Of the three parameters of B, per sample and variance: the Toeplitz matrix of the autocovariances."""
+    """The information on B per sample, times the noise variance: a Toeplitz matrix of autocovariances."""
     return cp.bmat([[r[abs(i - j)] for j in range(3)] for i in range(3)])
 
 
-def test_an_even_weight_is_best_served_by_white_input(found):
+def test_white_input_is_optimal_for_an_even_weight(found):
     """tr R^-1 >= k^2 / tr R with equality for R in proportion to I: the power is k sigma^2 / (N max)."""
     assert found["flat"]["cost"] == pytest.approx(3 * VARIANCE / (SAMPLES * 0.01), rel=1e-7)
     assert found["flat"]["objective"]["relative_gap"] < 1e-6
 
 
-def test_the_optimum_is_that_of_a_plain_program(found):
+def test_the_optimum_agrees_with_a_plain_program(found):
     """The integral is the trace of P times the Toeplitz matrix of the autocovariances of W."""
     result = found["weighted"]
     weight = np.array([[1.64, -0.8, 0.0], [-0.8, 1.64, -0.8], [0.0, -0.8, 1.64]])
@@ -168,11 +168,11 @@ def test_a_new_family_of_spectra_is_designed_and_proved(found):
     assert found["pieces"]["spectrum"]["powers"] == pytest.approx(powers.value, abs=1e-5 * plain.value)
 
 
-def test_a_control_law_is_that_of_its_desired_loop(found):
+def test_a_new_control_law_has_the_design_of_its_stated_desired_loop(found):
     assert found["loop"]["objective"]["value"] == found["stated loop"]["objective"]["value"]
 
 
-def test_schema_and_explanations_know_it(found):
+def test_schema_and_explanations_contain_the_extensions(found):
     sections, keys = found["schema"]
     assert {"H2", "Pieces", "DeadBeat"} <= set(sections)
     assert "integrated_variance" in keys
@@ -194,7 +194,7 @@ def test_a_finding_of_another_package_stands_beside_ours(found):
 
 
 @pytest.mark.parametrize("what", FINDING)
-def test_a_finding_of_another_package_changes_no_verdict(what, tmp_path):
+def test_a_finding_of_another_package_that_judges_or_is_invalid_is_refused(what, tmp_path):
     (tmp_path / "judge.py").write_text(f"from inputdesign_cli.finding import *\n{FINDING[what]}")
     (tmp_path / "judge-1.dist-info").mkdir()
     (tmp_path / "judge-1.dist-info" / "entry_points.txt").write_text(
@@ -207,7 +207,7 @@ def test_a_finding_of_another_package_changes_no_verdict(what, tmp_path):
     assert (done.returncode, "bad-plug-in" in done.stderr) == (2, True)
 
 
-def test_its_words_are_checked_like_all_others(found):
+def test_the_keys_of_an_extension_are_checked_like_all_others(found):
     key = "accuracy.integrated_variance"
     assert found["wrong"] == [["out-of-range", f"{key}.max"], ["unknown-key", f"{key}.weihgt"]]
 
@@ -280,7 +280,7 @@ def test_a_kind_of_signal_that_nobody_added_is_refused():
     assert CliRunner().invoke(app, ["signal", "--kind", "schroeder_chirp"]).exit_code == 2
 
 
-def test_the_registry_names_every_kind_of_this_package_and_specs_take_its_words():
+def test_the_registry_names_every_kind_of_signal_and_the_schema_accepts_it():
     kinds = plugins.own("idesign.signals")
     assert all(isinstance(kind_of(name), SignalKind) for name in kinds)
     assert set(kinds) <= set(json_schema()["$defs"]["Signal"]["properties"]["type"]["enum"])

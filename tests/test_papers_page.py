@@ -24,7 +24,7 @@ def cells_of(line):
 
 @pytest.mark.parametrize("name", MAKER["sections"]())
 def test_the_page_is_up_to_date(name):
-    """Words and tables, but for what is computed: that the golden files hold to their tolerances."""
+    """Words and tables agree, except computed numbers, which the golden files hold to their tolerances."""
     section = MAKER["sections"]()[name]
     table = MAKER["table"](rows_of(name)).splitlines()
     for part in MAKER["LINE"].split(section)[::4]:
@@ -41,7 +41,7 @@ def test_the_page_is_up_to_date(name):
 
 
 @pytest.mark.parametrize("name", MAKER["sections"]())
-def test_what_is_computed_lies_within_the_tolerances(name):
+def test_computed_numbers_on_the_page_lie_within_their_tolerances(name):
     computed = {}
     for cells in map(cells_of, PAGE.splitlines()):
         if len(cells) == 6 and NUMBER.fullmatch(cells[2]):
@@ -53,7 +53,7 @@ def test_what_is_computed_lies_within_the_tolerances(name):
             assert abs(nearest - quantity.expected) <= quantity.tolerance + 1e-6 * abs(quantity.expected)
 
 
-def test_nothing_on_the_page_misses_its_tolerance_and_every_figure_and_printed_number_is_there():
+def test_the_page_has_every_figure_and_printed_number_and_no_missed_tolerance():
     assert "**misses**" not in PAGE
     images = set(re.findall(r"\]\((images/papers/[^)]+)\)", PAGE))
     shipped = {f"images/papers/{path.name}" for path in (ROOT / "docs/images/papers").iterdir()}

@@ -1,4 +1,4 @@
-"""The pages whose commands are run say what these say, and show what they draw."""
+"""Pages whose commands are run have the text and the figures of these commands."""
 
 import re
 
@@ -27,8 +27,8 @@ def shown(name):
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_the_page_is_that_of_the_script(name):
-    """But for what the commands say: that fills the gaps."""
+def test_the_page_has_the_text_of_its_script(name):
+    """The output of commands fills the gaps of the text."""
     text, _ = PAGES[name]
     gaps = r"(?:```\n.*?\n```|\d[\d.]*(?: %)?|(?:\|.*\|\n?)+)"
     expected = gaps.join(map(re.escape, re.split(r"\{\w+\}", text)))
@@ -38,17 +38,17 @@ def test_the_page_is_that_of_the_script(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
-def test_the_commands_still_say_what_the_page_says(name, tmp_path):
+def test_the_commands_still_print_the_text_of_the_page(name, tmp_path):
     images = tmp_path / "images"
     images.mkdir()
     _, page = PAGES[name]
     made = page(tmp_path, images)
-    # Digits may differ from machine to machine; what is done and found, in which words, may not.
+    # Digits may differ between machines; words may not.
     assert NUMBER.sub("#", made) == NUMBER.sub("#", written(name))
     assert {file.name for file in images.iterdir()} == shown(name)
 
 
-def test_the_tutorial_misses_and_then_meets():
+def test_the_tutorial_misses_and_then_meets_its_accuracy():
     verdicts = re.findall(
         r"^verdict +(these data (?:miss|meet)) the accuracy", written("tutorial"), re.MULTILINE
     )
@@ -56,7 +56,7 @@ def test_the_tutorial_misses_and_then_meets():
 
 
 def test_the_motor_of_mechatronics_is_identified_and_its_margin_kept():
-    """The estimates are within three standard deviations of what was played, and |S| there is below 6 dB."""
+    """The estimates are within three standard deviations of the simulated motor; |S| is below 6 dB."""
     text = written("mechatronics")
     (said,) = re.findall(
         r"^estimate +gain ([\d.]+) \+- ([\d.]+), time_constant ([\d.]+) \+- ([\d.]+)", text, re.M
@@ -86,7 +86,7 @@ def test_the_plant_of_the_tutorial_answers_a_step_as_its_numbers_say():
     assert np.abs(found - wanted).max() < 6 * make_tutorial.NOISE / np.sqrt(50)
 
 
-def test_the_tutorial_finds_what_was_played():
+def test_the_estimates_of_the_tutorial_agree_with_the_simulated_plant():
     """Every estimate on the page is within three of its standard deviations of the truth."""
     truth = {"K": make_tutorial.GAIN, "T": make_tutorial.LAG, "L": make_tutorial.DEAD}
     found = re.findall(r"\b([KTL]) ([\d.]+) \+- ([\d.]+)", written("tutorial"))

@@ -1,4 +1,4 @@
-"""No file that a user can replace by a pipe is waited for: every place that opens one is known, and tried."""
+"""A pipe in place of a file of the user is not waited for; every place that opens a file is known."""
 
 import ast
 import os
@@ -19,7 +19,7 @@ from tests.support.sweep_files import run_sweep
 from tests.test_architecture import FILES, ROOT, tree_of
 
 OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loadtxt", "genfromtxt", "cmp"}
-# Where a file is opened otherwise than by `read_regular`, how often, and why nothing waits there.
+# The files that open others without `read_regular`: how often, and why nothing waits there.
 OPENED = {
     "regular_file.py": (2, "the function itself"),
     "diagnostics.py": (1, "a file of the package"),

@@ -1,4 +1,4 @@
-"""Calibrated confidence: closed forms, plain Monte Carlo, properties; the designs that use it."""
+"""Calibrated confidence against closed forms and plain Monte Carlo, and the designs that use it."""
 
 import numpy as np
 import pytest
@@ -44,21 +44,21 @@ def errors_of(text):
     return [make(task.simulation.nominal) for make in task.asked.question.requirements]
 
 
-# Draws, and three standard errors of them.
+# The number of draws, and about three relative standard errors of their quantile.
 DRAWS = pytest.mark.parametrize(
     ("draws", "close"), [(2500, 0.045), pytest.param(20_000, 0.02, marks=pytest.mark.slow)]
 )
 
 
 @DRAWS
-def test_of_one_parameter_it_is_the_normal_quantile(draws, close):
+def test_alpha_for_one_parameter_is_the_normal_quantile(draws, close):
     errors = errors_of(FIR.replace("[1.0, -0.4, 0.2]", "[1.0]"))
     alpha = Calibration(0.95, draws).alpha(errors, np.array([[7.0]]))
     assert alpha == pytest.approx(scipy.stats.norm.ppf(0.975), rel=close)
 
 
 @DRAWS
-def test_of_a_finite_response_it_is_that_of_a_plain_simulation(draws, close):
+def test_alpha_for_a_finite_impulse_response_agrees_with_plain_monte_carlo(draws, close):
     errors = errors_of(FIR)
     M = np.array([[900.0, 300.0, 0.0], [300.0, 800.0, 100.0], [0.0, 100.0, 500.0]])
     alpha = Calibration(0.9, draws).alpha(errors, M)
@@ -69,10 +69,10 @@ def test_of_a_finite_response_it_is_that_of_a_plain_simulation(draws, close):
     T = np.stack([phases.real, phases.imag], axis=1).transpose(2, 1, 0)
     size = np.linalg.norm(T @ np.linalg.cholesky(np.linalg.inv(M)), ord=2, axis=(1, 2)).max()
     assert alpha == pytest.approx(np.quantile(largest, 0.9) / size, rel=close)
-    assert alpha < np.sqrt(scipy.stats.chi2(3).ppf(0.9))  # G is linear in theta: the ellipsoid is enough
+    assert alpha < np.sqrt(scipy.stats.chi2(3).ppf(0.9))  # G is linear in theta: alpha is conservative
 
 
-def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
+def test_the_cost_of_a_linear_plant_is_proportional_to_alpha_squared():
     fast = "solver.any_spectrum=false"
     usual, exact = solve(spec(FIR, "0.9", fast)).result, solve(spec(FIR, FEW, fast)).result
     share = (exact["model_error"]["alpha"] / usual["model_error"]["alpha"]) ** 2
@@ -86,20 +86,20 @@ def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
     assert exact["signal"]["confidence"]["exact"] > 0.86
 
 
-def test_several_entries_keep_their_bounds_together():
+def test_all_entries_stay_within_their_bounds_jointly_with_the_stated_confidence():
     found = analyse(spec(TWO, FEW, "spectrum={given: {type: white, power: 1}}")).result
-    # Two outputs without common noise: with white inputs of power p the four gains are independent, each of
-    # variance 1 / (N p), and all four keep to 0.2 with the fourth power of what one does.
+    # With uncorrelated noise and white inputs of power p the four gains are independent, each of variance
+    # 1 / (N p). All four errors stay below 0.2 with the fourth power of the probability of one.
     one = scipy.stats.norm.ppf(0.5 + 0.5 * 0.9**0.25)
     assert found["model_error"]["alpha"] == pytest.approx(one, rel=0.05)
 
 
 @pytest.mark.parametrize("steepness", [0.3, 1.0, 1.6, 4.0])
-def test_the_alpha_that_its_design_needs_is_found(steepness):
+def test_settled_alpha_finds_the_alpha_that_its_own_design_needs(steepness):
     assert settled_alpha(lambda alpha: 3.0 * (alpha / 3.0) ** -steepness, 2.0) == pytest.approx(3, rel=1e-3)
 
 
-def test_it_says_when_there_is_none():
+def test_settled_alpha_without_a_solution_is_refused():
     assert (
         code_of(settled_alpha, lambda alpha: 2.0 * alpha, 1.0, kind=InaccurateError)
         == "confidence-not-settled"
@@ -108,7 +108,7 @@ def test_it_says_when_there_is_none():
 
 @pytest.mark.slow
 def test_estimates_that_are_normal_at_every_length_need_no_correction():
-    """A gain and a signal of two levels: least squares is normal with variance 1 / (N p) whatever N."""
+    """The least-squares estimate of a gain from a binary signal is normal of variance 1 / (N p) for all N."""
     told = solve(spec(GAIN, "{exact: 0.95, draws: 1000, runs: 1000}", "spectrum={type: white}")).result
     error = told["model_error"]
     assert error["confidence"]["excess"] == pytest.approx(1.0, abs=0.13)  # 3 standard errors
@@ -117,8 +117,8 @@ def test_estimates_that_are_normal_at_every_length_need_no_correction():
 
 
 @pytest.mark.slow
-def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
-    """The records are simulated and fitted plainly here: a pole, by least squares of the simulation error."""
+def test_alpha_for_short_records_keeps_the_confidence_in_plain_monte_carlo():
+    """The test simulates a first-order plant and fits it by least squares of the output error."""
     runs = "{exact: 0.9, draws: 1000, runs: 1000}"
     found = solve(spec(POLE, runs)).result
     power = found["power"]["excitation"][0]
@@ -158,8 +158,8 @@ def test_an_analysis_of_the_design_has_the_alpha_of_the_design(text, runs, close
     assert not runs or found["model_error"]["confidence"]["runs"] == runs
 
 
-def test_experiments_without_estimates_keep_no_confidence():
-    """A share of estimates that are missing, smaller and larger than that which may leave r_adm."""
+def test_missing_estimates_count_as_errors_beyond_r_adm():
+    """With 20 % of the estimates missing no alpha keeps 90 % confidence; with 5 % missing one does."""
     calibration = Calibration(0.9, 1000)
     errors, M = errors_of(FIR), np.diag([900.0, 800.0, 500.0])
     lost = np.full((100, 3), np.nan)
@@ -184,7 +184,7 @@ PLANTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*PLANTS, "flexible transmission"])
-def test_runs_keep_the_bound_with_the_probability(name):
+def test_simulated_runs_stay_within_r_adm_with_the_stated_confidence(name):
     study = {"simulation.runs": 1000, "simulation.seed": 3}
     if name in PLANTS:
         plant, error = PLANTS[name]
@@ -196,14 +196,14 @@ def test_runs_keep_the_bound_with_the_probability(name):
         asked = load_spec("specs/flexible_transmission.yaml").with_(
             **{"accuracy.model_error.alpha": None, "accuracy.model_error.confidence": {"exact": 0.95}}
         )
-        study["simulation.plant"] = None  # as the design takes it
+        study["simulation.plant"] = None  # the plant of the design
         study["simulation.noise"] = None
     kept = simulate(asked.with_(**study)).result["simulation"]["inputs"]["design"]["within_r_adm"]
     assert kept == pytest.approx(0.95, abs=0.015)
 
 
 @pytest.mark.slow
-def test_a_limit_that_leaves_just_enough_is_no_conflict():
+def test_a_power_limit_just_above_the_least_power_is_feasible_and_one_below_is_not():
     few = FEW.replace("500", "200")
     free = solve(spec(FIR, few)).result["power"]["input"][0]
     within = solve(spec(FIR, few, f"limits={{input_power: {1.002 * free!r}}}")).result
@@ -213,7 +213,7 @@ def test_a_limit_that_leaves_just_enough_is_no_conflict():
     assert caught.value.diagnostics[0].code == "infeasible"
 
 
-def test_of_the_best_accuracy_it_tells_what_is_kept_there():
+def test_a_best_accuracy_design_reports_the_coverage_at_its_own_ratio():
     best = ["objective=best_accuracy", "limits={input_power: 0.01}"]
     told = solve(spec(FIR, FEW, *best)).result
     assert told["objective"]["value"] > 1.1

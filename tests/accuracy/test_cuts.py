@@ -1,4 +1,4 @@
-"""Cones against the sets they stand for, and the inequalities they prove against random members."""
+"""Cones of cuts against the sets they describe, and proved inequalities against members of the sets."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def least_scale(cut, M):
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_cones_are_the_set(name, rng):
+def test_cones_describe_the_set_of_the_definition(name, rng):
     cut, definition = CUTS[name]
     for _ in range(3):
         M = random_matrix(rng)
@@ -81,7 +81,7 @@ def test_cones_are_the_set(name, rng):
 
 
 def proved(cut, rng):
-    """What random multipliers of the cones prove."""
+    """The inequality (Y, r) that random multipliers of the cones prove."""
     multipliers = []
     for block in cut.blocks(K):
         if block.kind == "psd":
@@ -93,7 +93,7 @@ def proved(cut, rng):
 
 
 def implied(cut, rng):
-    """What any one matrix implies."""
+    """The inequality (Y, r) that a random symmetric matrix implies."""
     order = K if cut.inequality is None else len(cut.inequality.constant)
     root = rng.normal(size=(order, order))
     return cut.implied(root @ root.T + 0.3 * rng.normal() * np.eye(order))
@@ -101,7 +101,7 @@ def implied(cut, rng):
 
 @pytest.mark.parametrize("way", [proved, implied])
 @pytest.mark.parametrize("name", CUTS)
-def test_proofs_hold_whatever_the_multipliers(name, way, rng):
+def test_proved_inequalities_hold_for_any_multipliers(name, way, rng):
     """tr(Y M) >= r for every M of the set: random multipliers, random members on the boundary."""
     cut, _ = CUTS[name]
     boundary = [least_scale(cut, M)[0] * M for M in (random_matrix(rng) for _ in range(6))]
@@ -123,7 +123,7 @@ def test_proofs_are_tight_at_the_optimum(name, rng):
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_moved_cuts_describe_the_same_set(name, rng):
+def test_transformed_cuts_describe_the_same_set(name, rng):
     cut, _ = CUTS[name]
     M, congruence = random_matrix(rng), rng.normal(size=(K, K))
     moved, _ = least_scale(cut.transformed(congruence), congruence @ M @ congruence.T)
@@ -134,8 +134,8 @@ CONCAVE = [name for name, (cut, _) in CUTS.items() if cut.concave is not None]
 
 
 @pytest.mark.parametrize("name", CONCAVE)
-def test_concave_functions_are_the_set(name, rng):
-    """g is of degree one, and reaches one where M reaches the set."""
+def test_concave_functions_equal_one_on_the_boundary_of_the_set(name, rng):
+    """g is homogeneous of degree one, and equals one where M reaches the set."""
     cut, definition = CUTS[name]
     M = random_matrix(rng)
     value, gradient = cut.concave.at(M, np.linalg.inv(M))
@@ -144,7 +144,7 @@ def test_concave_functions_are_the_set(name, rng):
 
 
 @pytest.mark.parametrize("name", CONCAVE)
-def test_derivatives_of_concave_functions(name, rng):
+def test_derivatives_of_concave_functions_agree_with_finite_differences(name, rng):
     """Gradient and curvature against finite differences."""
     function = CUTS[name][0].concave
     M = random_matrix(rng) + np.eye(K)
@@ -162,7 +162,7 @@ def test_derivatives_of_concave_functions(name, rng):
 
 
 @pytest.mark.parametrize("name", [name for name in CUTS if name not in CONCAVE])
-def test_inequalities_are_the_set(name, rng):
+def test_matrix_inequalities_are_tight_on_the_boundary_of_the_set(name, rng):
     """On the boundary of the set the largest least eigenvalue over nu is zero."""
     cut, _ = CUTS[name]
     part = cut.inequality

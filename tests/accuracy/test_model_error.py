@@ -41,8 +41,8 @@ SINGLE = PolynomialModel.single([0, 3.6], F=[1, -0.7], C=[1, -0.9], D=[1, 0.2])
 @pytest.mark.parametrize(
     ("model", "entry"), [(SINGLE, (0, 0)), (SINGLE, None), (arx(), (1, 0)), (arx(), None)]
 )
-def test_error_bound_is_the_definition(model, entry):
-    """alpha sqrt(lambda_max(T P T^T)) of (6), by plain matrices, of an entry or of the norm of G."""
+def test_error_bound_agrees_with_its_definition(model, entry):
+    """r_u is alpha sqrt(lambda_max(T P T^T)), equation (6), for an entry of G or for its Frobenius norm."""
     M = information(model.theta.size, 1)
     P = np.linalg.inv(M)
     requirement = ModelError(
@@ -92,8 +92,8 @@ def test_violations_find_the_worst_of_a_dense_grid(flexible):
     assert worst >= requirement.ratios(M, dense).max() * (1 - 1e-9)
 
 
-def test_sensitivity_bound_keeps_its_promise(flexible):
-    """|W S| <= 1 for every plant within r_adm of G, tried with random and with worst-phase perturbations."""
+def test_sensitivity_bound_keeps_the_weighted_sensitivity_below_one(flexible):
+    """|W S| <= 1 holds at 721 phases of a perturbation of size r_adm, with equality at the worst phase."""
     weight = Rational.build([0.527064, -0.472663], [1, -0.999455])
     model = flexible.model
     w = np.geomspace(1e-3, np.pi, 400)
@@ -105,7 +105,7 @@ def test_sensitivity_bound_keeps_its_promise(flexible):
     assert worst.min() >= 1 - 1e-3  # and no larger r_adm would do
 
 
-def test_tables_interpolate_in_logarithms_and_weights_divide():
+def test_tables_interpolate_logarithms_and_weights_divide_r_adm():
     table = Table(np.array([0.1, 1.0]), np.array([1.0, 100.0]))
     np.testing.assert_allclose(table.at([0.1, np.sqrt(0.1), 1.0]), [1.0, 10.0, 100.0])
     weighted = Weighted(Absolute(2.0), Rational.build([1.0, 1.0]))
@@ -138,7 +138,7 @@ def test_target_is_met_exactly_at_its_ratio():
         ("T", np.trace),
     ],
 )
-def test_criteria_are_the_textbook_ones(letter, value):
+def test_criteria_agree_with_their_textbook_formulas(letter, value):
     """In scaled coordinates: M stands for G M G^T; and s M reaches level one at s = ratio^2."""
     M, G = information(4, 3), np.random.default_rng(4).normal(size=(4, 4))
     criterion = Criterion(letter, G)
@@ -146,7 +146,7 @@ def test_criteria_are_the_textbook_ones(letter, value):
     assert criterion.level(criterion.ratio(M) ** 2 * M) == pytest.approx(1.0)
 
 
-def test_weighted_variance_is_the_definition(flexible):
+def test_weighted_variance_agrees_with_its_definition(flexible):
     """|W|^2 Lambda^* P Lambda over its limit, by complex arithmetic; the worst of a dense grid is found."""
     W = Rational.build([0.3, 0.1], [1, -0.5])
     model = flexible.model
@@ -225,8 +225,8 @@ def test_ellipsoid_bound_is_the_first_order_one_in_the_limit():
     ("model", "entry", "weighted"),
     [(SINGLE, (0, 0), False), (SINGLE, (0, 0), True), (arx(), (1, 0), False), (arx(), None, False)],
 )
-def test_the_slope_of_squared_ratios_is_their_difference(model, entry, weighted):
-    """Along a random change of M, of two rows, of several, and of a variance."""
+def test_the_slope_of_squared_ratios_agrees_with_finite_differences(model, entry, weighted):
+    """M changes in a random direction; the errors have two rows or several, or are a variance."""
     M = information(model.theta.size, 4)
     common = {"experiment": Experiment(model, 500), "band": (0.0, np.pi), "entry": entry}
     if weighted:
@@ -242,8 +242,8 @@ def test_the_slope_of_squared_ratios_is_their_difference(model, entry, weighted)
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("leak", [1e-5, 1.5e-4, 3e-4])
-def test_what_is_worst_at_zero_stands_at_zero(leak):
-    """A slow plant and an integrating controller round the ratio near zero: it stood at 3.7e-09 rad/s."""
+def test_a_worst_ratio_at_frequency_zero_is_reported_at_zero(leak):
+    """Rounding near zero, for a slow plant under integral action, once moved the maximum to 3.7e-09 rad/s."""
     found = analyse(
         parse_spec(f"""
 sample_time: 5

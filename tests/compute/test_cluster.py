@@ -53,7 +53,7 @@ class Loopback:
         return self.processes[-1]
 
     def add_worker(self) -> subprocess.Popen:
-        """A worker that the scheduler knows: on a busy machine that alone can take half a minute."""
+        """Start a worker and wait for its registration, which may take half a minute on a busy machine."""
         options = ["--no-nanny", "--no-dashboard", "--nthreads", "1"]
         options += [] if self.certificates else ["--host", "127.0.0.1"]
         place = ["--local-directory", str(self.folder / "scratch")]
@@ -88,14 +88,14 @@ def test_two_workers_share_the_work(loopback):
     assert len({f.answer[1] for f in done}) == 2
 
 
-def test_errors_come_back(loopback):
+def test_the_error_of_a_job_is_returned_with_that_job(loopback):
     done = {f.job: f for f in Cluster(loopback.address).run(jobs.fail_on_three, range(5))}
     assert str(done[3].error) == "three"
     assert done[4].answer == 4
 
 
 @pytest.mark.slow
-def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_path):
+def test_a_sweep_that_loses_a_worker_has_the_same_results_to_the_last_digit(loopback, tmp_path):
     spec = tmp_path / "small.yaml"
     spec.write_text(SPEC)
     settings = ["experiment.samples=60:71:1", "spectrum.order=1,-1"]
@@ -118,7 +118,7 @@ def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_p
 
 
 @pytest.mark.slow
-def test_data_files_travel_with_the_points(loopback, tmp_path):
+def test_data_files_are_sent_to_the_workers_with_the_points(loopback, tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "r.csv").write_text("frequency,r_adm\n0,1\n3.2,1\n")
     (tmp_path / "a" / "more.yaml").write_text("title: included\n")
@@ -132,7 +132,7 @@ def test_data_files_travel_with_the_points(loopback, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_cluster_without_workers_says_so_and_is_given_up(tmp_path):
+def test_a_cluster_without_workers_is_reported_and_given_up(tmp_path):
     cluster = Loopback(tmp_path)
     worker = cluster.add_worker()
     told = []
@@ -174,7 +174,7 @@ def test_a_sweep_whose_scheduler_ends_is_finished_later(tmp_path):
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "tls://127.0.0.1:9"])
-def test_no_cluster_is_a_complaint(address):
+def test_an_unreachable_cluster_is_refused(address):
     with pytest.raises(DataError, match="TLS asks for certificates" if "tls" in address else None) as caught:
         list(Cluster(address, patience=0.1).run(jobs.square, [1]))
     assert "tls" in address or caught.value.diagnostics[0].code == "cluster-unreachable"
@@ -211,7 +211,7 @@ NAMED = {
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
 def test_a_sweep_goes_through_tls(tmp_path):
-    """As docs/security.md sets it up: with certificates it computes, without it says so."""
+    """With the certificates of docs/security.md the sweep is computed; without them it is refused."""
     made = "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -keyout key.pem -out ca.pem"
     subprocess.run(made.split(), cwd=tmp_path, check=True, **SILENT)
     shutil.copy(tmp_path / "ca.pem", tmp_path / "cert.pem")

@@ -105,7 +105,7 @@ spectrum: {type: fir, order: 4}
 """
 
 
-def test_a_design_tells_its_rounds():
+def test_a_design_reports_its_rounds():
     told = []
     with watching(told.append):
         result = solve(parse_spec(SPEC)).result
@@ -116,8 +116,8 @@ def test_a_design_tells_its_rounds():
     assert len(told) > len(design), "the bound over every spectrum has rounds of its own"
 
 
-def test_what_comes_after_the_design_is_counted():
-    """Fresh plants, then runs: what takes longest is not silent."""
+def test_fresh_plants_and_simulated_runs_report_their_progress():
+    """These parts follow the design and take longest."""
     told = []
     uncertain = "uncertainty: {covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 70}\n"
     with watching(told.append):
@@ -127,7 +127,7 @@ def test_what_comes_after_the_design_is_counted():
 
 
 def ended(number):
-    """An end of which a compiled module makes an error of its own, which names it in words at most."""
+    """An interruption that a compiled module replaces by an error of its own, without a cause."""
     with bare_interruptions():
         try:
             interrupt(number, None)
@@ -138,13 +138,13 @@ def ended(number):
 @pytest.mark.parametrize(
     ("number", "end", "code"), [(signal.SIGINT, KeyboardInterrupt, ()), (signal.SIGHUP, SystemExit, (129,))]
 )
-def test_an_end_that_another_error_hides_is_itself(number, end, code):
+def test_an_interruption_that_another_error_replaced_is_raised_after_all(number, end, code):
     with pytest.raises(end) as raised:
         ended(number)
     assert raised.value.args == code
 
 
-def test_errors_without_an_end_stand():
+def test_errors_without_an_interruption_are_raised_unchanged():
     with pytest.raises(SystemExit):
         ended(signal.SIGTERM)
     with pytest.raises(ValueError, match="wrong"), bare_interruptions():
@@ -152,7 +152,7 @@ def test_errors_without_an_end_stand():
 
 
 def test_an_import_that_lasts_too_long_is_interrupted(tmp_path, monkeypatch):
-    """As that of a module which runs a command."""
+    """The patience with imports, five seconds otherwise, is zero here."""
     name = "inputdesign_cli.compute.interruptions"
     (tmp_path / "lasting.py").write_text(
         f"import sys\nfrom {name} import interrupt\ninterrupt(1, sys._getframe())\n"
@@ -165,7 +165,7 @@ def test_an_import_that_lasts_too_long_is_interrupted(tmp_path, monkeypatch):
 
 
 class Dropping:
-    """A key that is interrupted while it is compared, and drops that."""
+    """A key whose comparison is interrupted and drops the interruption."""
 
     def __hash__(self):
         return 1
@@ -190,7 +190,7 @@ def dropping(tidied):
             tidied.append(True)
 
 
-def test_an_end_that_is_dropped_comes_again_and_one_that_tidies_up_is_left_alone():
+def test_a_dropped_interruption_is_raised_again_but_not_during_clean_up():
     tidied = []
     with pytest.raises(SystemExit) as raised:
         dropping(tidied)

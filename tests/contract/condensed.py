@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-# They differ from run to run, from machine to machine, or are sentences, of which the wording is free.
+# Fields that differ between runs or machines, and sentences, whose wording is free.
 PASSED_OVER = {
     *("timing_s", "environment", "spec_sha256", "signal_sha256", "asked_sha256", "made_from", "files"),
     *("notes", "findings", "undecided", "reasons", "steps", "why", "message", "caveat", "no_top_up"),

@@ -1,8 +1,8 @@
 """The contract of `result.json`: what 04bdf145 wrote for the shipped specs is still there, field by field.
 
 Further fields are welcome; a missing one, another type or another number is a broken promise. Where a number
-was mended since, `results.json` has the new one; so it has where another design, of equal cost within the
-proved gap, or another record of it came out, and where `explore` lists fewer structures that it tried.
+was mended since, `results.json` has the new one. A later design of equal cost within the proved gap, or a
+later record of it, also replaced the earlier one, as did a shorter list of structures of `explore`.
 """
 
 import json
@@ -18,15 +18,15 @@ ROOT = HERE.parents[1]
 EXPECTED = json.loads((HERE / "results.json").read_text())
 QUICK = {"analyse-first_order_given", "simulate-first_order", "simulate-regression"}
 CLOSE = 2e-6
-# A design is proved to 1e-7 of its cost, and the cost is flat at its optimum. What another machine designs
-# differs by the root of that; costs, bounds and the error that binds agree.
+# A design is proved to 1e-7 of its cost, which is flat at the optimum. Designs of two machines differ by the
+# square root of that; their costs, bounds and binding errors agree.
 ALIKE = 4e-4
 PROVED = {"objective", "cost", "baseline", "model_error", "certificate", "samples"}
 # Proofs stop where they are good enough, and that depends on the order of additions.
 ROUGH = {
     *("lower_bound", "relative_gap", "any_spectrum_gap", "any_spectrum_bound", "any_structure_bound"),
     *("cuts", "rounds", "steps", "nodes", "active_frequencies", "spectral_factor_residual"),
-    "worst_scenario",  # of plants that bind alike
+    "worst_scenario",  # one of several plants that bind equally
 }
 DATA = [HERE / "data/w1_5.csv", "--operating-point", "u1=45,y1=82"]
 OTHERS = {
@@ -74,7 +74,7 @@ def differences(expected, found, where, close=CLOSE, scale=1e-9):
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in EXPECTED]
 )
-def test_results_hold_what_they_held(name, tmp_path, monkeypatch):
+def test_results_contain_every_recorded_field_and_number(name, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     caller(monkeypatch)(*command(name), "-o", tmp_path / "run", "--no-figures", "--quiet")
     result = json.loads((tmp_path / "run/result.json").read_text())

@@ -12,7 +12,7 @@ def page(monkeypatch):
     kept = []
 
     def keep(canvas, _, **settings):
-        canvas.draw()  # only then have ticks their texts, and panels their places
+        canvas.draw()  # gives ticks their texts, and panels their places
         kept.append(canvas.figure)
 
     monkeypatch.setattr(FigureCanvasAgg, "print_png", keep)

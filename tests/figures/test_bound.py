@@ -1,4 +1,4 @@
-"""Errors against what is admitted, spectra, signals, fits and residuals of records, studies, the loop."""
+"""Figures of errors and r_adm, spectra, signals, fits and residuals of records, studies and the loop."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_bound_shows_every_error_and_marks_the_limiting_frequencies(page):
     assert below.get_yscale() == "linear"
 
 
-def test_bound_shows_how_far_white_excitation_misses_in_the_range_of_the_errors_not_of_the_gain(page):
+def test_the_bound_beside_white_excitation_spans_the_errors_and_not_the_gain(page):
     above, below = page(CURVES["bound beside white"]).axes
     assert {"r_u, w", "r_u, white, 4 × the cost"} <= set(lines_by_label(above))
     np.testing.assert_allclose(lines_by_label(below)["w: up to 3"].get_ydata(), 3.0)
@@ -59,7 +59,7 @@ def test_ratios_keep_their_shape_far_from_the_limit(page, panel, scale, lowest, 
     assert lowest < low < 1.0 < high < highest
 
 
-def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
+def test_each_entry_has_the_panel_of_its_row_and_column_and_others_stay_empty(page):
     *panels, below = page(CURVES["bounds of entries"]).axes
     titles = {axes.get_subplotspec().num1: axes.get_title(loc="left") for axes in panels}
     assert titles == {1: "G₁₂", 2: "G₂₁"}
@@ -69,7 +69,7 @@ def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
     assert list(lines_by_label(below)) == ["G12: up to 0.8", "limit"]
 
 
-def test_numbers_stand_under_the_lowest_panel_only(page):
+def test_only_the_lowest_panel_has_numbers_on_its_frequency_axis(page):
     narrow = BoundPanel(
         W[120:150], G[120:150], G[120:150], 2 * G[120:150]
     )  # within a decade, minor ticks too
@@ -79,7 +79,7 @@ def test_numbers_stand_under_the_lowest_panel_only(page):
     assert any(text.get_visible() and text.get_text() for text in below.get_xticklabels(which="both"))
 
 
-def test_the_spectrum_beside_the_white_level(page):
+def test_the_spectrum_is_drawn_beside_the_level_of_white_excitation(page):
     (axes,) = page(CURVES["spectrum"]).axes
     lines = lines_by_label(axes)
     np.testing.assert_array_equal(lines["Φᵤ, design"].get_ydata(), DENSITY)
@@ -87,14 +87,14 @@ def test_the_spectrum_beside_the_white_level(page):
     assert axes.get_yscale() == "linear"
 
 
-def test_a_spectrum_over_decades_is_logarithmic_and_not_endless(page):
+def test_a_spectrum_over_decades_has_a_logarithmic_axis_of_limited_range(page):
     (axes,) = page(CURVES["spectrum with zeros"]).axes
     low, high = axes.get_ylim()
     assert axes.get_yscale() == "log"
     assert 1.0 < np.log10(high / low) < 7.0
 
 
-def test_lines_stand_as_stems_of_their_power(page):
+def test_spectral_lines_are_drawn_as_stems_of_their_power(page):
     (axes,) = page(CURVES["lines"]).axes
     (stems,) = axes.collections
     np.testing.assert_allclose(stems.get_segments(), [[[0.1553, 0.0], [0.1553, 0.1925]]])
@@ -102,14 +102,14 @@ def test_lines_stand_as_stems_of_their_power(page):
 
 
 @pytest.mark.parametrize(("lines", "inputs"), [(0, 1), (0, 2), (5, 2)])
-def test_a_spectrum_of_no_power_is_an_empty_page(lines, inputs):
-    """What a design is that needs no excitation."""
+def test_a_spectrum_without_power_is_drawn_as_an_empty_page(lines, inputs):
+    """A design that needs no excitation has this spectrum."""
     w, none = np.linspace(0.1, 1.0, lines), np.zeros((lines, inputs, inputs))
     nothing = SpectrumCurves(w, none, lines=not lines, band=(0.0, 1.0))
     assert draw(nothing).startswith(b"\x89PNG")
 
 
-def test_entries_that_coincide_are_dashed_apart_and_rounding_has_no_curve(page):
+def test_coinciding_entries_have_different_dashes_and_rounding_errors_no_curve(page):
     above, _ = page(CURVES["matrix of one direction"]).axes
     drawn = lines_by_label(above)
     assert list(drawn) == ["|Φ₁₁|", "|Φ₂₂|"]
@@ -151,7 +151,7 @@ def test_a_long_fit_is_shown_whole_and_closely_where_the_output_moves(page, begi
     np.testing.assert_array_equal(closer.lines[0].get_ydata(), y[begin : begin + 400])
 
 
-def test_gaps_of_a_record_and_samples_that_are_left_out_are_seen(page):
+def test_gaps_of_a_record_and_samples_left_out_of_the_estimate_are_marked(page):
     time = np.r_[0:100.0, 100:200.0, 400:500.0]
     y = np.sin(time)
     panel = FitPanel(y, y + 0.1, y - 0.1, label="level (m)", left_out=np.ones(50))
@@ -171,8 +171,8 @@ def test_gaps_of_a_record_and_samples_that_are_left_out_are_seen(page):
     ("column", "files", "label", "left"),
     [("TIC [°C]", 1, "TIC [°C]", [4, 5, 6]), ("y", 1, "", [4, 5, 6]), ("2", 2, "", [])],
 )
-def test_a_fit_to_a_log_has_its_column_and_what_was_left_out(column, files, label, left):
-    """Of several files the times may be the same: what was left out of them is not told apart."""
+def test_a_fit_to_a_log_has_its_column_name_and_the_samples_left_out(column, files, label, left):
+    """Several files may have the same times: samples left out of them are not drawn."""
     time = np.arange(10.0)
     log = Record(time[:, None], -time[:, None], None, time, (10,), (("a", 10),), names={"y1": column})
     used = log.at(np.r_[0:4, 7:10], (4, 3))
@@ -193,7 +193,7 @@ def test_a_fit_names_its_output_where_only_a_unit_is_known(page, stated, shown):
     assert axes[0].get_ylabel() == shown
 
 
-def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
+def test_the_applied_signal_is_held_and_drawn_above_the_predicted_output(page):
     figure = page(CURVES["predicted signal"])
     record, _, below, _ = figure.axes
     assert record.lines[0].get_drawstyle() == "steps-post"
@@ -231,13 +231,13 @@ def test_no_curve_goes_from_one_record_to_the_next(page, lengths, outputs):
     assert ("another record begins" in legend_of(figure)) == bool(len(begins))
 
 
-def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
+def test_residuals_have_a_column_for_each_signal_they_are_correlated_with(page):
     assert [axes.get_title() for axes in page(CURVES["residuals"]).axes] == ["with residual 1", "with u1"]
     titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
     assert titles == ["with residual 1", "with residual 2", "with u1", "", "", ""]
 
 
-def test_where_runs_leave_what_is_admitted_is_marked(page):
+def test_frequencies_at_which_simulated_runs_exceed_r_adm_are_marked(page):
     kept, missed = page(CURVES["error bands"]).axes[0], replace(BANDS, r_adm=np.where(W < 1, G, 0.3 * G))
     assert not any("leave" in label for label in lines_by_label(kept))
     (axes,) = page(ErrorBandCurves((missed,), "design", 100)).axes
@@ -246,7 +246,7 @@ def test_where_runs_leave_what_is_admitted_is_marked(page):
     assert lines_by_label(axes)["r_adm, admitted"].get_linestyle() == "--"
 
 
-def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
+def test_the_nyquist_plot_has_discs_of_uncertainty_and_the_circle_to_avoid(page):
     (axes,) = page(CURVES["nyquist"]).axes
     *discs, shade, circle = axes.patches
     near = Z[150]
@@ -259,7 +259,7 @@ def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
 
 
 @pytest.mark.parametrize(("levels", "label"), [(False, "level (m)"), (True, "Δ level (m)")])
-def test_levels_and_deviations_are_told_apart(page, levels, label):
+def test_levels_and_deviations_have_different_labels(page, levels, label):
     """The operating point of the input is known, and that of the output is not."""
     axes = page(replace(CURVES["predicted signal"], levels=levels)).axes
     assert [one.get_ylabel() for one in axes if one.get_ylabel()] == ["valve (%)", label]

@@ -61,7 +61,7 @@ def drawn(name, width="page"):
     return rendered(painter((CURVES | UNUSUAL)[name]), width=width, seen=found.append), found[0]
 
 
-def test_no_global_state():
+def test_drawing_changes_no_global_state():
     def state():
         # Reading the backend would choose one.
         settings = {key: mpl.rcParams[key] for key in mpl.rcParams if key != "backend"}
@@ -103,8 +103,8 @@ def test_a_label_wider_than_the_page_leaves_room_for_the_axes(width):
 
 @pytest.mark.first(12)
 @pytest.mark.parametrize("name", CURVES)
-def test_a_png_of_the_promised_size_has_labels_in_one_size_and_no_legend_hides_a_curve(name):
-    """Of panels side by side the left one has a label, for all; symbols of ours alone are typeset."""
+def test_a_png_has_its_size_one_text_size_and_no_legend_over_a_curve(name):
+    """Panels side by side share the label of one; only the symbols r_u and r_adm are typeset."""
     data, figure = drawn(name)
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     width, height = struct.unpack(">II", data[16:24])
@@ -184,7 +184,7 @@ def headings(page):
 
 
 def overlap(one, other):
-    """Pixels by which two boxes lie on each other, across or down, whichever is less."""
+    """The overlap of two boxes in pixels, across or down, whichever is less."""
     both = Bbox.intersection(one, other)
     return min(both.width, both.height) if both else 0.0
 
@@ -205,7 +205,7 @@ def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kin
 
 
 def test_files_for_papers_keep_their_text():
-    """TrueType in a PDF (no Type 3), letters in an SVG, and what is drawn was given, not designed."""
+    """A PDF has TrueType fonts (no Type 3), an SVG has letters, and a given spectrum is labelled as given."""
     curves = replace(CURVES["spectrum"], label="given")
     assert b"/Subtype /Type3" not in (pdf := draw(curves, "s", "pdf"))
     assert b"/FontFile2" in pdf
@@ -228,7 +228,7 @@ def test_a_limiting_frequency_far_outside_does_not_push_the_axes_aside():
 
 
 @pytest.mark.parametrize(
-    ("curves", "told"),
+    ("curves", "labels"),
     [
         (
             ResponseCurves(tuple(replace(SEEN, entry=entry) for entry in product(range(2), repeat=2))),
@@ -240,14 +240,14 @@ def test_a_limiting_frequency_far_outside_does_not_push_the_axes_aside():
         ),
     ],
 )
-def test_who_reads_values_is_told_of_which_panel_and_axis(curves, told):
+def test_readings_of_values_name_their_panel_and_axis(curves, labels):
     found = []
     rendered(painter(curves), seen=lambda page: found.extend(readings(page)))
-    assert [panel["y"] for panel in found] == told
+    assert [panel["y"] for panel in found] == labels
 
 
 @pytest.mark.parametrize("most", [1.02, 1.1, 1.64, 3.0, 7.0, 30.0, 2000.0])
-def test_the_worst_ratio_of_a_campaign_stands_beside_three_numbers_or_more(most):
+def test_the_axis_of_the_worst_ratio_of_a_campaign_has_at_least_three_numbers(most):
     ratios = np.array([most, np.sqrt(most), 0.99])
     curves = CampaignCurves(np.array([10.0, 20.0, 30.0]), ratios, np.array([1.0, 2.0, 3.0]), 500)
 
@@ -279,7 +279,7 @@ def apart(lines):
 
 
 @pytest.mark.parametrize("families", [1, 6, 8, 20])
-def test_every_family_is_drawn_and_told_apart(page, families):
+def test_every_family_of_structures_is_drawn_in_its_own_style(page, families):
     fits = {f"F{n}": (SIZES, np.array([90.0 - n, 80.0 - n])) for n in range(families)}
     (axes,) = (figure := page(OrderCurves(fits, (2.0, 90.0)))).axes
     named = lines_by_label(axes)
@@ -290,15 +290,15 @@ def test_every_family_is_drawn_and_told_apart(page, families):
     assert {text.get_text() for text in figure.legends[0].get_texts()} == set(named)
 
 
-def test_fits_that_hardly_differ_are_decades_apart_and_the_worst_is_shown(page):
+def test_distances_to_the_best_fit_are_logarithmic_and_the_worst_is_shown(page):
     (axes,) = page(OrderCurves({"OE": (np.arange(4.0), np.array([95.0, 94.9, 94.0, -1e9]))}, (0, 95))).axes
     shown = axes.transAxes.inverted().transform(axes.transData.transform(axes.lines[0].get_xydata()))[:, 1]
     assert np.all(np.diff(shown) < -0.2)
     assert np.all((shown > 0.0) & (shown < 1.0))
 
 
-def test_runs_are_counted_up_to_each_value(page):
-    """At the limit one reads the share of runs that meet it; a way without a result is left out."""
+def test_ratios_of_runs_are_drawn_as_a_cumulative_distribution(page):
+    """The curve at the limit is the share of runs that meet it; an input without runs is left out."""
     ratios = {"one_shot": np.array([1.2, 0.8, 1.1, 0.9]), "none": np.zeros(0), "single": np.array([0.7])}
     (axes,) = page(RunCurves(ratios, limit=1.0)).axes
     drawn = lines_by_label(axes)
@@ -309,8 +309,8 @@ def test_runs_are_counted_up_to_each_value(page):
 
 
 @pytest.mark.parametrize("curves", [CURVES["fan"], NINE], ids=["fan", "nine entries"])
-def test_every_line_has_a_name_and_looks_of_its_own(page, curves):
-    """The plants, the largest ratio, that of the spec and the binding one; the limit beside nine entries."""
+def test_every_line_has_its_own_name_and_style(page, curves):
+    """A fan of plants has five lines; nine entries of a plant have one each, beside the limit."""
     drawn = lines_by_label(page(curves).axes[-1])
     assert len(drawn) == (5 if curves is CURVES["fan"] else 10)
     assert apart(list(drawn.values()))
@@ -334,8 +334,8 @@ def test_a_figure_that_a_run_lacks_is_refused_with_the_names_of_the_others():
         figure(results, "foo")
 
 
-def test_the_sign_of_every_gain_is_seen(page):
-    """Of G and of -G the magnitudes are the same, and the phases are half a turn apart."""
+def test_the_phase_shows_the_sign_of_every_gain(page):
+    """G and -G have the same magnitude, and their phases are half a turn apart."""
     panels = tuple(
         replace(SEEN, G=s * SEEN.G, model=s * SEEN.model, entry=(0, j)) for j, s in enumerate((1, -1))
     )

@@ -1,4 +1,4 @@
-"""Which figures a sweep has, and what is on them."""
+"""The figures of a sweep, and their content."""
 
 from itertools import pairwise
 
@@ -40,7 +40,7 @@ M = "spectrum.order"
         (table({N: "11", M: "12"}, [4, 3]), ["curves"]),
     ],
 )
-def test_the_figures_that_suit_a_sweep(given, names, tmp_path):
+def test_a_sweep_has_the_figures_that_suit_it(given, names, tmp_path):
     assert [path.stem for path in draw_sweep(given, tmp_path)] == names
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in tmp_path.iterdir())
 
@@ -50,7 +50,7 @@ def pages(given):
 
 
 def test_cost_against_samples_is_sorted_logarithmic_and_has_its_floor():
-    """The points have the ticks, unless they stand too close, and one without a result has a cross."""
+    """Every point has a tick, unless points are too close, and a point without a result has a cross."""
     given = table({N: ["1000", "250", "500", "800"]}, [1.0, 40.0, 2.0, ""], floor=[0.5, 20.0, 1.0, 0.7])
     (page,) = pages(given)
     axes = page.axes[0]
@@ -130,7 +130,7 @@ TEN = [(f"R_{i}_{j}", [1.0, 2.0]) for i in range(1, 5) for j in range(i, 5)]
     ],
 )
 def test_moments_are_drawn_over_the_parameter(alphas, entries, trace, labels, scale, marked):
-    """Infeasible points are marked; of large moments the diagonal is drawn."""
+    """Infeasible points are marked; only the diagonal of a large matrix of moments is drawn."""
     given = table({"accuracy.mean_squared_error.neglected_norm": alphas}, trace)
     given.columns.update({f"moments.entries.{name}": [str(v) for v in column] for name, column in entries})
     given.columns["moments.trace"] = [str(v) for v in trace]
@@ -141,7 +141,7 @@ def test_moments_are_drawn_over_the_parameter(alphas, entries, trace, labels, sc
     assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == marked
 
 
-def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_is_named():
+def test_three_keys_have_a_panel_for_each_value_of_the_third_and_name_the_best_point():
     points = [(n, m, x) for n in ("10", "20", "40") for m in ("1", "2") for x in ("a", "b")]
     values = [float(len(points) - i) for i in range(len(points))]
     given = table(dict(zip((N, M, "x"), map(list, zip(*points, strict=True)), strict=True)), values)
@@ -154,13 +154,13 @@ def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_
     assert legend.get_title().get_text() == f"best: {N} = 40, {M} = 2, x = b"
 
 
-def test_points_that_stand_too_close_have_no_tick_each():
+def test_points_that_are_too_close_do_not_all_have_a_tick():
     (close,) = pages(table({M: ["1", "1.01", "40"]}, [3.0, 2.0, 1.0]))
     assert 1.01 not in list(close.axes[0].get_xticks())
 
 
 def test_a_long_title_has_several_lines_within_the_page():
-    """Of three keys with long names: the sentence reached over the edge of a narrow page."""
+    """The title of three keys with long names once exceeded the edge of a narrow page."""
     keys = ("spectrum.order", "experiment.samples", "noise.variance")
     points = [(n, m, x) for n in ("10", "20", "40") for m in ("1", "2") for x in ("1", "3")]
     given = table(

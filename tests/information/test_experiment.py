@@ -37,14 +37,14 @@ def single() -> Experiment:
 
 
 def as_matrices(density, inputs):
-    """(n, .., r, r), of one input too."""
+    """The densities as matrices (n, .., r, r), for one input too."""
     return density[..., None, None] if inputs == 1 else density
 
 
 @pytest.mark.parametrize(
     "experiment", [paper_experiment(), Experiment(box_jenkins(), 10).whitened(1.0), single().whitened(2.0)]
 )
-def test_densities_are_the_definition(experiment):
+def test_information_densities_agree_with_their_definition(experiment):
     """(3) of the spectral design paper, for a random Hermitian spectrum at each frequency."""
     rng = np.random.default_rng(0)
     r, k = experiment.inputs, experiment.size
@@ -70,7 +70,7 @@ def test_densities_are_the_definition(experiment):
     np.testing.assert_allclose(value, np.einsum("nlm,lm->n", ours, Y), rtol=1e-10)
 
 
-def test_noise_alone_informs_about_arx_parameters_as_a_lyapunov_equation_says():
+def test_the_noise_information_of_an_arx_model_follows_from_a_lyapunov_equation():
     """y_i = -a y_i(t-1) + e: E y^2 = s^2 / (1 - a^2); errors are correlated across outputs."""
     model = arx()
     M0 = Experiment(model, 1).baseline_information
@@ -82,7 +82,7 @@ def test_noise_alone_informs_about_arx_parameters_as_a_lyapunov_equation_says():
     assert np.all(M0[2:] == 0)
 
 
-def test_information_of_an_arx_model_with_white_input():
+def test_information_of_an_arx_model_with_white_input_has_its_closed_form():
     """y + a y(t-1) = b u(t-1) + e: E y^2 = (b^2 P + sigma^2) / (1 - a^2), E y u(t-.) at lag one of phi: 0."""
     a, b, variance, power, N = -0.7, 2.0, 0.5, 1.3, 100
     model = PolynomialModel.single([0.0, b], A=[1.0, a], variance=variance)
@@ -96,7 +96,7 @@ def test_information_of_an_arx_model_with_white_input():
     np.testing.assert_allclose(M, N / variance * np.diag([y_power, power]), rtol=1e-10, atol=1e-8)
 
 
-def test_loop_norms_of_the_flexible_transmission(flexible):
+def test_loop_norms_of_the_flexible_transmission_agree_with_the_errata(flexible):
     """||S||^2 and ||G S||^2 (H2), recomputed independently in docs/errata.md."""
     basis = FirBasis(1, 0)
     for kind, expected in (("input", 1.0606348409), ("output", 1.8022202466)):
@@ -114,7 +114,7 @@ RAW = {
 
 @pytest.mark.parametrize("name", RAW)
 @pytest.mark.parametrize("power", [1.0, 2.5, 30.0])
-def test_whitened_coordinates(name, power):
+def test_white_excitation_has_identity_information_in_whitened_coordinates(name, power):
     """White excitation gives the identity, and the way back to raw parameters gives the raw matrix."""
     raw = RAW[name]
     white, basis = raw.whitened(power), FlatBasis(raw.inputs, raw.band)
@@ -160,8 +160,8 @@ def test_parameters_that_a_common_factor_leaves_without_information_are_named(ex
     assert caught.value.diagnostics[0].code == "not-identifiable"
 
 
-def test_all_parameters_that_cannot_be_told_apart_are_named():
-    """p1 and p2, and p3 and p4: whatever vectors span the space of these directions."""
+def test_all_parameters_that_cannot_be_distinguished_are_named():
+    """The pairs p1, p2 and p3, p4 are named for any basis of the space of these directions."""
     names, rng = ("p1", "p2", "p3", "p4", "p5"), np.random.default_rng(1)
     space = np.array([[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 2.0, 0.0]]).T
     for _ in range(20):
@@ -210,8 +210,8 @@ def plants(request):
     return [nominal, *(moved(nominal, theta) for theta in around(nominal, 40, 0.03))]
 
 
-def test_each_is_white_in_coordinates_of_its_own(plants):
-    """Flat excitation of that power tells the identity, by the integrals of the plant alone."""
+def test_each_plant_has_identity_information_in_its_own_coordinates(plants):
+    """White excitation of power two gives the identity, by the integrals of each plant alone."""
     for white in jointly_whitened(plants, 2.0):
         basis = FlatBasis(white.inputs, white.band)
         told = basis.integrals(white.information_density, white.singularities, white.information_factor)
@@ -220,7 +220,7 @@ def test_each_is_white_in_coordinates_of_its_own(plants):
         )
 
 
-def test_the_noise_tells_what_it_tells_of_each(plants):
+def test_joint_noise_information_equals_that_of_each_plant_alone(plants):
     told = joint_noise(plants)
     for own, plant in zip(told, plants, strict=True):
         alone = replace(plant).noise_information
@@ -228,7 +228,7 @@ def test_the_noise_tells_what_it_tells_of_each(plants):
 
 
 @pytest.mark.parametrize("basis", [FirBasis(1, 7), LinesBasis.at(np.array([0.1, 0.9, 2.2]), 1)])
-def test_integrals_are_those_of_each(plants, basis):
+def test_joint_information_equals_the_integrals_of_each_plant_alone(plants, basis):
     if plants[0].inputs > 1:
         basis = LinesBasis.at(np.array([0.1, 0.9, 2.2]), 2)
     white = jointly_whitened(plants, 1.0)
@@ -249,7 +249,7 @@ def test_the_mean_cost_is_the_mean_of_the_powers(plants, samples):
     np.testing.assert_allclose(mean_cost(plants, weights, w), np.mean(each, axis=0), rtol=1e-10)
 
 
-def test_what_loops_cause_is_the_definition():
+def test_joint_loop_responses_are_g_s_at_the_output_and_s_at_the_input():
     """G S at y and S at u, with S = 1 / (1 + C G), also where one of the plants integrates."""
     w = np.array([0.3, 1.2, 2.9])
     q = np.exp(-1j * w)
@@ -268,7 +268,7 @@ def test_what_loops_cause_is_the_definition():
 def test_gradients_of_loops_are_the_derivatives_of_the_predictor(samples, controllers):
     """y = G S r + .. and u = S r put into (D A / C) y - (D B / (C F)) u, by finite differences.
 
-    The last coefficients of the first plant vanish: those of the others do not.
+    The last coefficients of the first plant are zero; the other plants have none that is zero.
     """
     w = np.linspace(0.2, 3.0, samples)
     models = [

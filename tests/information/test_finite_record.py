@@ -1,4 +1,4 @@
-"""What a finite record tells is what a simulation of the same samples measures."""
+"""The information of a finite record against simulations of the same samples."""
 
 import dataclasses
 from functools import partial
@@ -116,7 +116,7 @@ def test_records_are_filtered_exactly(model):
     assert np.sum(plant.adjoint("output", v) * u) == pytest.approx(np.sum(wanted * v), rel=1e-10)
 
 
-def test_a_slow_loop_is_filtered_exactly_and_at_once():
+def test_a_slow_loop_is_filtered_exactly_without_waiting_for_it_to_settle():
     """Integrators of gain 1e-5 settle in a million samples; the record has 200."""
     model = arx()
     gains = 1e-5 * np.linalg.inv(model.plant_at(np.zeros(1))[0].real)
@@ -132,8 +132,8 @@ def test_a_slow_loop_is_filtered_exactly_and_at_once():
 
 @pytest.mark.parametrize("of", ["input", "output", "excitation"])
 @pytest.mark.parametrize("models", [(arx(), SLOW), (random_case(1).model, random_case(5).model)])
-def test_several_plants_answer_side_by_side(models, of):
-    """Each answers as it does alone, whether they share transforms or have difference equations."""
+def test_joint_responses_of_several_plants_equal_the_responses_of_each_alone(models, of):
+    """The plants share transforms, or each has its own difference equation."""
     experiments = [Experiment(model, 120) for model in models]
     together = FiniteRecords(experiments[0], 120, others=(experiments[1],))
     record = np.random.default_rng(2).normal(size=(120, models[0].inputs))
@@ -147,7 +147,7 @@ def test_several_plants_answer_side_by_side(models, of):
 
 
 @pytest.mark.parametrize("model", [arx(), SLOW, random_case(1).model, random_case(5).model])
-def test_several_records_answer_as_each_does_alone(model):
+def test_results_for_several_records_equal_the_results_of_each_alone(model):
     plant = FiniteRecord(Experiment(model, 120).whitened(1.0), 120)
     records = np.random.default_rng(4).normal(size=(3, 120, model.inputs))
     outputs = (partial(one, "output") for one in (plant.signals, plant.mean_squares))
@@ -157,7 +157,7 @@ def test_several_records_answer_as_each_does_alone(model):
 
 
 def test_an_experiment_remembers_no_record_for_another():
-    """Whatever was evaluated before, and though samples change in place, as an experiment that is new."""
+    """A new experiment gives the same results, after other records and after changes in place."""
     experiment, draw = Experiment(arx(), 120).whitened(1.0), np.random.default_rng(6)
     records = [draw.normal(size=(120, 1)) for _ in range(7)]
     for record in [*records, records[0], records[5]]:
@@ -209,7 +209,7 @@ def test_integrals_equal_lyapunov_to_1e_10(radius):
 
 
 @pytest.mark.parametrize("lag", [0, 1, 17, 300])
-def test_moments_of_a_first_order_spectrum(lag):
+def test_moments_of_a_first_order_spectrum_are_its_autocovariances(lag):
     """1 / |1 - a e^{jw}|^2 has the autocovariances a^lag / (1 - a^2)."""
     a = 0.999
 
@@ -221,7 +221,7 @@ def test_moments_of_a_first_order_spectrum(lag):
 
 
 @pytest.mark.parametrize("several", [False, True])
-def test_however_many_nodes_are_taken_at_once_the_integral_is_the_same(several):
+def test_the_integral_does_not_depend_on_the_number_of_nodes_per_evaluation(several):
     """1 / |1 - a e^{jw}|^2 has the mean 1 / (1 - a^2)."""
     a = 0.95
 

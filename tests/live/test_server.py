@@ -40,7 +40,7 @@ def ask(address, path, method="GET", **headers):
         return answer.status, answer.headers, answer.read().decode()
 
 
-def test_the_page_has_its_number_and_nothing_may_come_from_elsewhere(served):
+def test_the_page_has_its_version_and_a_policy_against_content_from_elsewhere(served):
     _, address = served
     status, headers, text = ask(address, address.path)
     assert (status, headers["Cache-Control"]) == (200, "no-store")
@@ -90,7 +90,7 @@ def test_nothing_can_be_sent_and_head_has_no_body(served):
     assert int(headers["Content-Length"]) > 0
 
 
-def test_news_come_as_soon_as_there_are_any(served):
+def test_a_waiting_request_is_answered_as_soon_as_the_page_changes(served):
     board, address = served
     threading.Timer(0.3, board.show, [PAGE.replace("one", "two")]).start()
     started = time.monotonic()
@@ -102,8 +102,8 @@ def test_news_come_as_soon_as_there_are_any(served):
         assert json.loads(ask(address, f"{address.path}news?version={strange}")[2]) == {"version": 2}
 
 
-def test_a_browser_that_goes_away_is_no_news_for_the_terminal(served, capsys):
-    """Whoever closes a tab leaves a request for news behind."""
+def test_a_browser_that_disconnects_prints_nothing_in_the_terminal(served, capsys):
+    """A closed tab leaves a waiting request for news behind."""
     board, address = served
     with socket.create_connection((address.hostname, address.port), timeout=10) as waiting:
         lines = f"GET {address.path}news?version=1 HTTP/1.1\r\nHost: {address.netloc}\r\n\r\n"
@@ -118,7 +118,7 @@ def test_a_browser_that_goes_away_is_no_news_for_the_terminal(served, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_port_that_is_taken_is_told(served):
+def test_a_port_that_is_taken_is_refused(served):
     _, address = served
     with pytest.raises(OutputError) as caught, serving(Board(), address.port):
         pass
@@ -126,7 +126,7 @@ def test_a_port_that_is_taken_is_told(served):
 
 
 def malformed() -> list[bytes]:
-    """Requests that are none: broken targets, versions and headers, and random bytes in each place."""
+    """Malformed requests: broken targets, versions and headers, and random bytes."""
     rng = np.random.default_rng(1)
     marks = [*rb"[ ] // % %zz @: #".split(), b"\x00", b"\xff", b"\x85", b"?version=\xb2", b" ", b"\t", b"\r"]
     targets = [
@@ -166,7 +166,7 @@ PATIENCE = 120.0
 
 @contextmanager
 def watching(path, *more, stderr=None):
-    """The address of the page; what else is told goes to the file `stderr`."""
+    """The address of the page while `watch` runs; its messages go to the file `stderr`."""
     command = [sys.executable, "-m", "inputdesign_cli", "watch", str(path), *map(str, more)]
     with running(command, stdout=subprocess.PIPE, stderr=stderr, text=True, cwd=path.parent) as process:
         yield process.stdout.readline().strip()
@@ -205,7 +205,7 @@ def answers(text):
     return re.findall(r'<p class="answer">[^<]*?: cost ([0-9.e-]+)', text)
 
 
-def test_a_saved_file_is_solved_and_stands_beside_what_was_good(spec, tmp_path):
+def test_a_saved_file_is_solved_and_shown_beside_the_last_good_design(spec, tmp_path):
     run = tmp_path / "run"
     with watching(spec, "-o", run, "--no-figures") as address:
         (first,) = answers(page_with(address, "The certificate"))
@@ -225,7 +225,7 @@ def test_a_saved_file_is_solved_and_stands_beside_what_was_good(spec, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_answer_is_shown_before_its_pictures_and_the_terminal_keeps_a_line_of_every_round(spec, tmp_path):
+def test_the_answer_precedes_its_pictures_and_every_round_has_a_terminal_line(spec, tmp_path):
     with (
         open(tmp_path / "told.txt", "w") as told,
         watching(spec, "-o", tmp_path / "run", "--no-figures", stderr=told) as address,
@@ -248,7 +248,7 @@ def test_the_answer_is_shown_before_its_pictures_and_the_terminal_keeps_a_line_o
     assert "did you mean" in lines
 
 
-def test_what_the_user_writes_is_text_on_the_page():
+def test_text_of_the_user_is_escaped_on_the_page():
     line = "a: '<script>alert(1)</script>'"
     wrong = SpecError.because("unknown-key", line, line, location=Location("s.yaml", 1, 1, line))
     text = Followed("<b>.yaml").failed(wrong, [line], "s.yaml").page
@@ -261,7 +261,7 @@ def test_what_the_user_writes_is_text_on_the_page():
 @needs_browser
 @pytest.mark.browser
 @pytest.mark.slow
-def test_a_browser_follows_by_itself(spec, tmp_path):
+def test_a_browser_shows_each_saved_change_without_a_reload(spec, tmp_path):
     with watching(spec, "-o", tmp_path / "run", "--no-figures") as address, started() as browser:
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         faults = []
@@ -277,7 +277,7 @@ def test_a_browser_follows_by_itself(spec, tmp_path):
             (each) => each.querySelector("figure").getBoundingClientRect().top)"""
         before, after = page.evaluate(tops)
         assert before == after
-        # What judges a page is a script that the policy of the server would forbid.
+        # A script judges the page; the policy of the server would forbid it.
         other = browser.new_page(viewport={"width": 400, "height": 900})
         other.set_content(page.content().replace('<script src="follow.js" defer=""></script>', ""))
         assert violations(other) == []

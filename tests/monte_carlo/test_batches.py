@@ -55,14 +55,14 @@ def test_errors_of_a_batch_are_raised():
 
 
 @pytest.mark.slow
-def test_a_batch_whose_processes_are_killed_is_said():
+def test_a_batch_whose_processes_are_killed_is_reported():
     with pytest.raises(IdesignError, match="a batch of 2 simulated runs has no result") as caught:
         run_batches(jobs.end, runs=2, size=2, seed=0, executor=Processes(1))
     assert caught.value.diagnostics[0].code == "worker-lost"
 
 
 @pytest.mark.parametrize(("successes", "runs"), [(0, 20), (17, 20), (20, 20), (415, 500)])
-def test_binomial_limits(successes, runs):
+def test_binomial_limits_agree_with_scipy(successes, runs):
     expected = scipy.stats.binomtest(successes, runs).proportion_ci(0.95, method="exact")
     assert binomial_limits(successes, runs) == pytest.approx((expected.low, expected.high))
 
@@ -85,7 +85,7 @@ POWERS = np.array([2.0, 3.0])
 
 
 def experiment(channels):
-    """A plant without memory to speak of: the finite sample shows little else than the spectrum."""
+    """A plant with a memory of one sample: a record has nearly the information of its spectrum."""
     one = (np.ones(1),)
     F = (one * channels,) * channels
     B = tuple(tuple(np.array([0.0, gain]) for gain in row[:channels]) for row in GAINS[:channels])
@@ -98,7 +98,7 @@ def flat(method, channels, samples=SAMPLES):
 
 
 def check_information(tried, excitation):
-    """The information of the spectrum is the mean of that of the records."""
+    """The information of the spectrum is the mean information of the records."""
     records = excitation.draw(20, SAMPLES, np.random.default_rng(1))
     assert records.shape == (20, SAMPLES, tried.inputs)
     exact = FiniteRecord(tried, SAMPLES, 1.0)
@@ -127,7 +127,7 @@ def test_the_information_of_sinusoids_is_that_of_their_records(channels):
 
 @pytest.mark.parametrize("method", ["white", "prbs", "multisine", "binary"])
 def test_flat_excitations_have_their_power_exactly(method):
-    """And a reapplied excitation applies each of its records a number of times."""
+    """A reapplied excitation repeats each of its records."""
     tried = flat(method, 2, 300)
     records = tried.draw(3, 300, np.random.default_rng(2))
     np.testing.assert_allclose(np.mean(records**2, axis=1), np.tile(POWERS, (3, 1)))
@@ -157,7 +157,7 @@ def arx(plant):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_adjugate_and_determinant(n):
+def test_a_matrix_times_its_adjugate_is_its_determinant(n):
     matrix = np.random.default_rng(n).standard_normal((4, n, n, 3))
     det, adj = determinant_and_adjugate(matrix)
     product = multiply(matrix, adj)
@@ -167,7 +167,7 @@ def test_adjugate_and_determinant(n):
 
 
 def check_filters(plant, law, law_of, desired, theta):
-    """Check the filters behind r - v of estimates: the loop of each less the loop that the law asks for."""
+    """Check the filters of r - v: the loop of each estimate minus the loop that the law asks for."""
     numerator, denominator = error_filters(plant, desired, *estimated_polynomials(plant, theta))
     q = np.exp(-1j * W)
     above = np.einsum("kl,rijl->rkij", q[:, None] ** np.arange(numerator.shape[-1]), numerator)

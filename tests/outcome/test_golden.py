@@ -75,7 +75,7 @@ def test_rows_compare_with_the_tolerance(tmp_path):
         ),
     ],
 )
-def test_what_is_not_there_does_not_agree(tmp_path, results, notes):
+def test_a_missing_or_non_numeric_quantity_does_not_pass(tmp_path, results, notes):
     rows = compare(load_golden(written(tmp_path, GOOD)), results)
     assert [row.note for row in rows] == notes
     assert not any(row.passed for row in rows)
@@ -124,12 +124,12 @@ def test_complaints_name_the_line_and_the_key(tmp_path, old, new, line, key):
 
 
 @pytest.mark.parametrize("text", ["", "- a", "runs: 5", "runs: [", "runs:\n\t- x", "runs: [5]"])
-def test_what_is_no_golden_file(tmp_path, text):
+def test_malformed_golden_files_are_refused(tmp_path, text):
     assert diagnostics(tmp_path, text)
 
 
 def test_the_shipped_files_are_sound():
-    """Where a recomputed figure stands beside a printed one, it lies within the tolerance of that."""
+    """A recomputed figure beside a printed one lies within the tolerance of the printed one."""
     pairs = 0
     for path in SHIPPED:
         golden = load_golden(path)
@@ -148,7 +148,7 @@ def test_the_shipped_files_are_sound():
     assert pairs >= 7
 
 
-def test_a_spec_in_place_of_a_golden_file_is_told_as_one():
+def test_a_spec_in_place_of_a_golden_file_is_recognised():
     for spec in sorted((Path(__file__).parents[2] / "specs").glob("*.yaml"))[::5]:
         (one,) = refused(load_golden, spec)
         assert one.code == "golden-is-spec"

@@ -28,7 +28,7 @@ FILES = ["spec.yaml", "signal.csv", "optimality.csv", "signal.png", "optimality.
 
 
 def a_run(mark: str, *, optimality: bool = False) -> Results:
-    """A small run whose every file tells which run it is of."""
+    """A small run whose files all carry its mark."""
     number = float(len(mark))
     curves = {"signal": SignalCurves(np.arange(4.0), {"u1": np.array([1.0, -1.0, 1.0, -1.0]) * number})}
     tables = {"signal": Table({"time_s": np.arange(4.0), "u1": np.full(4, number)})}
@@ -45,12 +45,12 @@ def a_run(mark: str, *, optimality: bool = False) -> Results:
 
 
 def write_with_figures(results, directory):
-    """A run with what passes for figures."""
+    """Write a run with placeholders for its figures."""
     return write_run(results, directory, {f"{stem}.png": b"drawn" for stem in results.curves})
 
 
 def marks(directory) -> set[str]:
-    """Which runs the text files of a directory are of."""
+    """The marks of the runs that the text files of a directory belong to."""
     found = set()
     for name in ("spec.yaml", "result.json", "signal.csv"):
         if (directory / name).exists():
@@ -80,7 +80,7 @@ def test_a_run_is_read_as_it_was_written_with_its_files_its_software_and_its_spe
     assert set(result["environment"]) >= {"platform", "idesign", "scipy", "cvxpy", "clarabel"}
 
 
-def test_a_later_run_replaces_an_earlier_one_with_its_stale_figure_and_no_file_of_the_user(tmp_path):
+def test_a_run_replaces_the_files_of_the_earlier_run_and_no_file_of_the_user(tmp_path):
     write_with_figures(a_run("first", optimality=True), tmp_path / "a")
     (tmp_path / "a" / "notes.txt").write_text("mine")
     (tmp_path / "a" / "photo.png").write_text("mine")
@@ -121,7 +121,7 @@ OPERATIONS = [
 
 
 def sabotaged(write, failing, error):
-    """Write while one of the operations on files fails, and all before it work: how many there were."""
+    """Write while one operation on files fails; return the number of operations that were begun."""
     count = 0
 
     def wrapped(original):
@@ -217,11 +217,11 @@ def test_whenever_the_writer_is_killed_the_next_call_finds_a_whole_run(tmp_path,
         assert "error" not in kill
         assert (kill["strange"], kill["in_the_end"], kill["notes"]) == ([], "second", "mine"), kill
     assert {kill["then"] for kill in left} == {"first", "second"}
-    # There are moments without a run that the next call ends, or this test would prove nothing.
+    # At some moments there is no run until the next call; otherwise this test would prove nothing.
     assert "none" in {kill["at_once"] for kill in left}
 
 
-def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
+def test_a_nan_in_the_result_raises_an_error_and_writes_nothing(tmp_path):
     bad = Results(typed({"format": 1, "value": np.nan}), resolved_spec="")
     with pytest.raises(ValueError, match=r"result\.value"):
         write_with_figures(bad, tmp_path / "a")
@@ -243,7 +243,7 @@ def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
         ({"result.json": '{"format": 1, "files": ["spec.yaml"]}'}, "run-incomplete"),
     ],
 )
-def test_read_run_explains_what_is_wrong(tmp_path, files, code):
+def test_read_run_refuses_missing_broken_and_incomplete_runs(tmp_path, files, code):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     assert refused(read_run, tmp_path, kind=DataError)[0].code == code
@@ -271,7 +271,7 @@ def test_a_record_that_names_files_elsewhere_moves_none(tmp_path, name):
     assert precious.read_text() == "mine"
 
 
-def test_links_in_a_run_directory_lead_nowhere(tmp_path):
+def test_links_in_a_run_directory_are_not_followed(tmp_path):
     (tmp_path / "elsewhere" / "new").mkdir(parents=True)
     (tmp_path / "elsewhere" / "new" / "result.json").write_text("mine")
     (tmp_path / "a").mkdir()
@@ -282,7 +282,7 @@ def test_links_in_a_run_directory_lead_nowhere(tmp_path):
     assert (tmp_path / "elsewhere" / "new" / "result.json").read_text() == "mine"
 
 
-def test_a_page_about_the_run_before_does_not_stay(tmp_path):
+def test_the_report_of_the_earlier_run_is_removed(tmp_path):
     write_run(a_run("first"), tmp_path / "a")
     page = '<html><head><meta name="generator" content="idesign 0.1.0"></head></html>'
     (tmp_path / "a" / "report.html").write_text(page)
@@ -293,7 +293,7 @@ def test_a_page_about_the_run_before_does_not_stay(tmp_path):
     assert (tmp_path / "a" / "report.html").read_text() == "<html>mine</html>"
 
 
-def test_a_link_stays_a_link_and_the_current_folder_the_current_one(tmp_path, monkeypatch):
+def test_a_linked_run_directory_stays_a_link_and_the_current_folder_is_kept(tmp_path, monkeypatch):
     (tmp_path / "disc").mkdir()
     (tmp_path / "a").symlink_to(tmp_path / "disc")
     write_run(a_run("first"), tmp_path / "a")

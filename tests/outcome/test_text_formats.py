@@ -101,7 +101,7 @@ def test_columns_have_the_fewest_digits_and_are_read_back():
     "columns",
     [{"a": np.zeros(2), "b": np.zeros(3)}, {"a": np.zeros((2, 2))}, {"a": np.zeros(2, dtype=complex)}],
 )
-def test_csv_refuses_what_is_no_table(columns):
+def test_csv_refuses_columns_that_form_no_table(columns):
     with pytest.raises(ValueError, match="column"):
         csv_text(Table(columns))
 
@@ -110,7 +110,7 @@ SIZES = st.floats(1e-30, 1e30) | st.floats(-1e30, -1e-30) | st.just(0.0)
 
 
 @given(value=SIZES, digits=st.integers(2, 9))
-def test_what_is_rounded_is_on_its_side_and_near(value, digits):
+def test_rounding_down_and_up_encloses_the_value_closely(value, digits):
     down, up = (Fraction(rounded(value, digits)) for rounded in (rounded_down, rounded_up))
     slack = abs(Fraction(value)) / 10**11
     assert down - slack <= Fraction(value) <= up + slack
@@ -118,7 +118,7 @@ def test_what_is_rounded_is_on_its_side_and_near(value, digits):
 
 
 @pytest.mark.parametrize(("value", "down", "up"), [(3.14159265, "3.141", "3.142"), (0.5, "0.5", "0.5")])
-def test_numbers_that_have_their_digits_keep_them(value, down, up):
+def test_rounding_to_four_digits_keeps_shorter_numbers(value, down, up):
     assert (rounded_down(value, 4), rounded_up(value, 4)) == (down, up)
 
 
@@ -153,14 +153,14 @@ BAD = [math.nan, math.inf, np.array([1.0, np.nan]), complex(0, -math.inf)]
 
 
 @pytest.mark.parametrize(
-    ("bad", "kind", "told"),
+    ("bad", "kind", "place"),
     [
         *(({"deep": [one]}, ValueError, r"result\.deep\[0\]") for one in BAD),
         *((one, TypeError, "result") for one in ({1: 2}, {"a": object()}, {"a": {1, 2}})),
     ],
 )
-def test_json_has_no_nan_and_no_foreign_types(bad, kind, told):
-    with pytest.raises(kind, match=told):
+def test_json_has_no_nan_and_no_foreign_types(bad, kind, place):
+    with pytest.raises(kind, match=place):
         plain(bad)
 
 
@@ -219,7 +219,7 @@ def test_plain_data_come_back_as_they_were_with_the_types_of_their_fields():
         ("several", "text"),
     ],
 )
-def test_what_has_another_form_is_an_error_that_names_the_place(key, value):
+def test_data_of_another_form_raise_an_error_that_names_the_key(key, value):
     with pytest.raises(OutcomeError, match=f'"{key}'):
         read_plain(Whole, {**PLAIN, key: value})
 
@@ -229,7 +229,7 @@ def test_what_has_another_form_is_an_error_that_names_the_place(key, value):
 @given(
     st.dictionaries(st.sampled_from(list(PLAIN)), st.recursive(st.none() | st.floats() | st.text(), st.lists))
 )
-def test_whatever_is_written_there_nothing_else_is_raised(changes):
+def test_reading_arbitrary_data_raises_no_other_error(changes):
     with suppress(OutcomeError):
         read_plain(Whole, {**PLAIN, **changes})
 
@@ -257,7 +257,7 @@ def test_json_keeps_the_order_of_keys_and_letters_of_all_scripts():
 
 
 def same(one, other):
-    """Whether two values are of one kind, and equal to the digits that a figure shows."""
+    """Return whether two values have one type, and are equal to the digits that a figure shows."""
     if is_dataclass(one):
         return type(one) is type(other) and all(
             same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)
@@ -272,7 +272,7 @@ def same(one, other):
     return one == other
 
 
-def test_what_figures_show_comes_back_as_it_was(tmp_path):
+def test_curves_of_figures_are_read_back_as_they_were_written(tmp_path):
     (tmp_path / FIGURES).write_bytes(curves_json(CURVES))
     found = read_curves(tmp_path)
     assert list(found) == list(CURVES)
@@ -285,7 +285,7 @@ def test_what_figures_show_comes_back_as_it_was(tmp_path):
     [b"", b"[]", b'{"a": 1}', b'{"a": {}}', b'{"a": {"kind": "Path"}}', b'{"a": {"kind": "RunCurves"}}',
      b'{"a": {"kind": "ErrorCurves", "energy": "x"}}', b'{"a": {"kind": "BoundCurves", "panels": [3]}}'],
 )  # fmt: skip
-def test_what_is_no_such_file_is_told_by_its_name(content, tmp_path):
+def test_a_broken_file_of_curves_is_refused_by_its_name(content, tmp_path):
     (tmp_path / FIGURES).write_bytes(content)
     (told,) = refused(read_curves, tmp_path, kind=DataError)
     assert (told.code, "figures.json" in told.message) == ("run-unreadable", True)

@@ -1,4 +1,4 @@
-"""Models built of others: coloured noise, drifts, other parameters; by polynomials and differences."""
+"""Models with coloured noise, drift or other parameters, against polynomials and differences."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ ROWS = [[[0, 0.3], [0, 0, -0.2]], [[0.0], [0, 0.5]]], [[[1, -0.5], [1, 0.2]], [[
 
 
 def outside():
-    """C and D around a model with none, in the order of the one that has them inside: b, c, d, f."""
+    """A model with C and D around it, and the order of its parameters in `inside`: b, c, d, f."""
     model = Coloured(PolynomialModel.single(B, F=F, variance=0.3), (C,), (D,))
     order = [0, 1, 4, 5, 6, 2, 3]
     assert [model.names[i] for i in order] == ["b1", "b2", "c1", "c2", "d1", "f1", "f2"]
@@ -38,7 +38,7 @@ def inside(D=D):
     return PolynomialModel.single(B, F=F, C=C, D=D, variance=0.3)
 
 
-def test_gradients_are_those_of_polynomials_inside():
+def test_coloured_noise_gives_the_gradients_of_a_polynomial_model():
     (model, order), known = outside(), inside()
     rng = np.random.default_rng(0)
     y, u, e = (rng.standard_normal((W.size, 1, 2)) + 0j for _ in range(3))
@@ -52,7 +52,7 @@ def test_gradients_are_those_of_polynomials_inside():
 
 
 @pytest.mark.parametrize("loop", [False, True])
-def test_experiments_are_those_of_polynomials_inside(loop):
+def test_coloured_noise_gives_the_information_of_a_polynomial_model(loop):
     (model, order), known = outside(), inside()
     loops = [close_loop(m, PI) if loop else None for m in (model, known)]
     a, b = (Experiment(m, 50, loop=one) for m, one in zip((model, known), loops, strict=True))
@@ -71,8 +71,8 @@ def test_experiments_are_those_of_polynomials_inside(loop):
 
 
 @pytest.mark.parametrize("loop", [False, True])
-def test_drift_is_a_root_of_d_that_is_known(loop):
-    """D (1 - q^-1) inside, its coefficients known: F_x and the noise information of the others."""
+def test_drift_equals_a_known_root_of_d_at_one(loop):
+    """D (1 - q^-1) with known coefficients gives the same gradients by r and by e."""
     drifting = Coloured(inside(), drift=(True,))
     whole = inside(np.convolve(D, [1, -1]))
     pair, w = (known(drifting, "d1"), known(whole, "d1", "d2")), W[W > 0.02]
@@ -85,7 +85,7 @@ def test_drift_is_a_root_of_d_that_is_known(loop):
 
 
 def test_each_output_has_its_own_drift_and_filters():
-    """Simulated noise of two outputs, one of which is summed; the gradient of a record by differences."""
+    """Simulated noise of two outputs, one integrated; the gradient of a record by differences."""
     one = (np.ones(1),)
     plant = PolynomialModel(arrays(ROWS[0]), one, arrays(ROWS[1]), one, one, COVARIANCE)
     model = Coloured(plant, (C, np.ones(1)), (np.ones(1), D), (False, False), (True, False))
@@ -109,8 +109,8 @@ def heater():
     ids=["ARMA", "random walk", "IMA"],
 )
 @pytest.mark.parametrize("feedback", [False, True])
-def test_estimates_with_coloured_and_drifting_noise(noise, feedback):
-    """Within four standard deviations of the truth from afar, in open loop and in a loop."""
+def test_estimates_with_coloured_and_drifting_noise_agree_with_their_covariance(noise, feedback):
+    """The search starts far from the truth and ends within four standard deviations of it."""
     model = Coloured(heater(), **noise)
     rng = np.random.default_rng(7)
     r = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
@@ -142,7 +142,7 @@ def test_a_root_on_the_circle_may_be_known():
 AT = np.array([0.05, 0.4, 1.3, 2.9])
 
 
-def test_what_is_known_leaves_a_part_of_the_information():
+def test_known_parameters_lose_their_rows_and_columns_of_the_information():
     """Knowing parameters is the same as deleting their rows and columns."""
     model = box_jenkins()
     names = ["c1[2]", "b2[1,1]", "a1"]
@@ -153,7 +153,7 @@ def test_what_is_known_leaves_a_part_of_the_information():
     np.testing.assert_allclose(part.noise_information, whole.noise_information[np.ix_(kept, kept)], rtol=1e-9)
 
 
-def test_a_loop_is_that_of_the_coefficients():
+def test_a_loop_in_physical_parameters_equals_that_of_its_coefficients():
     model = in_words(SampledModel(process(), 0.7))
     C = TransferMatrix.build([[[0.1]]], [[(1.0, -1.0)]])
     loop, inner = close_loop(model, C), close_loop(model.coefficients, C)
@@ -164,7 +164,7 @@ def test_a_loop_is_that_of_the_coefficients():
     np.testing.assert_allclose(loop.excitation_gradient(AT), expected, atol=1e-12)
 
 
-def test_a_fraction_is_affine_where_nothing_free_bends_it():
+def test_a_fraction_is_affine_unless_a_free_parameter_enters_nonlinearly():
     inner = process()
     assert np.array_equal(inner.bends(0, 0), [False, False, True])
     assert not np.any(known(inner, "delay").bends(0, 0))

@@ -40,7 +40,7 @@ def fine_step(model, u, steps=1000):
 
 
 @pytest.mark.parametrize("tau", DELAYS)
-def test_the_sampled_plant_is_that_of_a_fine_step_simulation_and_of_its_fraction_in_q(tau):
+def test_the_sampled_plant_agrees_with_a_fine_step_simulation_and_its_fraction_in_q(tau):
     u, model = np.random.default_rng(0).normal(size=(40, 1)), late(tau)
     sampled = SampledModel(model, STEP)
     y, _ = sampled.simulate(u, np.zeros((40, 1)), 1.0)
@@ -50,14 +50,14 @@ def test_the_sampled_plant_is_that_of_a_fine_step_simulation_and_of_its_fraction
 
 
 @pytest.mark.parametrize("model", [late(0.37), late(1.0), late_entries(), late_entries(common=True)])
-def test_realisation_and_response_are_one_plant(model):
+def test_the_realisation_has_the_frequency_response_of_the_plant(model):
     sampled, z = SampledModel(model, STEP), np.exp(1j * W)
     A, B, C, D = sampled.realisation
     expected = np.array([C @ np.linalg.solve(x * np.eye(len(A)) - A, B) + D for x in z])
     np.testing.assert_allclose(sampled.plant_at(W), expected, atol=1e-12)
 
 
-def test_the_gradient_has_two_sides_at_a_boundary():
+def test_the_dead_time_gradient_has_two_one_sided_limits_at_a_whole_sample():
     """Relative degree one: b e^(-at) jumps at t = 0, so that the sides differ by the first sample."""
     first = lambda tau: SampledModel(late(tau, (2.0,), (1.0, 0.7)), STEP)  # noqa: E731
     right = first(1.0).plant_gradient(W)[:, -1, 0, 0]
@@ -74,14 +74,14 @@ def test_a_dead_time_of_whole_samples_shifts_the_output(hold):
     np.testing.assert_allclose(shifted[3:], at_once[:-3], atol=2e-2 if not hold else 1e-12)
 
 
-def test_dead_times_beyond_the_record_leave_nothing():
+def test_a_dead_time_beyond_the_record_gives_no_output():
     u = np.ones((10, 1))
     assert np.all(late(10 * STEP).driven(u, Intersample(STEP, hold=True)) == 0.0)
 
 
 @pytest.mark.parametrize("tau", [0.37, 1.0])
-def test_a_loop_is_that_of_the_plant_in_q(tau):
-    """Against the recursion of y and u with the sampled plant's polynomials."""
+def test_a_loop_satisfies_the_difference_equations_of_plant_and_controller(tau):
+    """The recursion of y and u uses the polynomials of the sampled plant."""
     sampled = SampledModel(late(tau), STEP)
     C = TransferMatrix.build([[[0.2, -0.15]]], [[(1.0, -1.0)]])
     loop = close_loop(sampled, C)
@@ -113,7 +113,7 @@ def lagging_tank(b, a, z):
     return G, in_k / a, -in_k * b / a**2 - in_T / a**2
 
 
-def test_response_and_gradient_are_those_of_the_closed_form_down_to_the_pole():
+def test_response_and_gradient_agree_with_the_closed_form_down_to_the_pole():
     model = plant_of([0.3], [1, 0.8, 0])
     gradient = model.plant_gradient(DOWN)[:, :, 0, 0]
     G, in_b, in_a1 = lagging_tank(0.3, 0.8, np.exp(1j * DOWN))
@@ -123,7 +123,7 @@ def test_response_and_gradient_are_those_of_the_closed_form_down_to_the_pole():
     np.testing.assert_allclose(gradient[:, 2], in_a1, rtol=1e-9)
 
 
-def test_gradient_of_a_free_pole_is_that_of_differences():
+def test_gradient_of_a_free_pole_agrees_with_finite_differences():
     """b / ((s + p)(s + q)) near p = 0, a0 = p q: the closed form of the sampled plant with two real poles."""
     b, a1, step = 0.3, 0.8, 3e-4
     z = np.exp(1j * np.linspace(0.05, 3.0, 20))
@@ -140,7 +140,7 @@ def test_gradient_of_a_free_pole_is_that_of_differences():
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
-def test_double_integrator_and_dead_time():
+def test_double_and_delayed_integrators_have_their_closed_forms():
     z = np.exp(1j * DOWN)
     np.testing.assert_allclose(
         plant_of([1.0], [1, 0, 0]).plant_at(DOWN)[:, 0, 0], H**2 / 2 * (z + 1) / (z - 1) ** 2, rtol=1e-9
@@ -153,7 +153,7 @@ def test_double_integrator_and_dead_time():
 
 
 @pytest.mark.parametrize("controller", [([1.2, -1.0], [1, -1]), ([0.9], [1])], ids=["PI", "P"])
-def test_the_loop_around_an_integrator_is_that_of_polynomials_down_to_zero(controller):
+def test_the_loop_around_an_integrator_equals_that_of_polynomials_down_to_zero(controller):
     """b / s and b1 q^-1 / (1 - q^-1) with b1 = b H; the poles are known."""
     C = TransferMatrix.build(*([[one]] for one in controller))
     models = (
@@ -166,7 +166,7 @@ def test_the_loop_around_an_integrator_is_that_of_polynomials_down_to_zero(contr
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-5)
 
 
-def test_integrators_that_inputs_share_are_one():
+def test_an_integrator_shared_by_two_inputs_is_one_state():
     """A tank with two inflows is held by one controller: its level is a single state."""
     rows = [[[0.2], [0.5]]], [[[1, 0], [1, 0]]]
     plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), np.eye(1))
@@ -175,12 +175,12 @@ def test_integrators_that_inputs_share_are_one():
     apart = [[[0.2], [0]], [[0], [0.5]]], [[[1, 0], [1]], [[1], [1, 0]]]
     plant = ContinuousModel.monic(descending(apart[0]), descending(apart[1]), np.eye(2))
     C = TransferMatrix.build([[[0.8], [0.0]], [[0.0], [0.0]]], [[[1], [1]], [[1], [1]]])
-    with pytest.raises(SpecError):  # the other tank is left to itself
+    with pytest.raises(SpecError):  # the other tank is not controlled
         Loop(SampledModel(plant, H), C).check_stability()
 
 
 @pytest.mark.parametrize("hold", [True, False])
-def test_samples_drive_an_integrator_as_a_sum(hold):
+def test_an_integrator_driven_by_samples_is_a_cumulative_sum(hold):
     rng = np.random.default_rng(1)
     u = np.convolve(rng.standard_normal(3000), np.hanning(64) / 32, mode="same")
     entry = HeldEntry.of(np.array([1.0]), np.array([0.0, 1.0]), H)
@@ -191,7 +191,7 @@ def test_samples_drive_an_integrator_as_a_sum(hold):
     np.testing.assert_allclose(y, expected, atol=1e-9 if hold else 0.02 * np.abs(expected).max())
 
 
-def test_the_gradient_of_a_record_is_that_of_differences():
+def test_the_gradient_of_a_record_agrees_with_finite_differences():
     model, record = plant_of([0.3], [1, 0.8, 0]), np.random.default_rng(2).standard_normal((300, 1))
     e = np.zeros((300, 1))
 
@@ -204,7 +204,7 @@ def test_the_gradient_of_a_record_is_that_of_differences():
     np.testing.assert_allclose(psi, np.concatenate(expected, axis=1), atol=1e-6 * np.abs(psi).max())
 
 
-def test_estimates_hold_the_integrator():
+def test_estimates_keep_a_known_integrator():
     """The pole stays where it is known to be: a0 = 0 in s, and f1 + f2 = -1 in q^-1."""
     in_s = SampledModel(lag_of([0.3], [1, 0.8, 0], variance=0.01), H)
     in_q = PolynomialModel.single([0, 0.2], F=[1, -1.6, 0.6], variance=0.01)

@@ -1,4 +1,4 @@
-"""Difference equations, controllers in s as a computer runs them, and spectra of noise."""
+"""Difference equations, discretised controllers, and spectra of noise."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ SCIPY = {"tustin": "bilinear", "backward": "backward_diff", "zoh": "zoh"}
 
 @pytest.mark.parametrize("rule", SCIPY)
 @pytest.mark.parametrize("numerator", [[2.0, 3.0], [0.5], [1.0, 0.4, 2.0]])
-def test_a_transfer_function_is_that_of_scipy(rule, numerator):
+def test_a_discretised_transfer_function_agrees_with_scipy(rule, numerator):
     factors = [[2.0, 1.0], [1.0, 0.7]]
     found = discretised(numerator, factors, H, rule)
     top, bottom, _ = scipy.signal.cont2discrete((numerator, np.polymul(*factors)), H, SCIPY[rule])
@@ -62,7 +62,7 @@ def test_a_transfer_function_is_that_of_scipy(rule, numerator):
 
 @pytest.mark.parametrize("rule", SCIPY)
 def test_a_pid_is_the_sum_of_its_parts(rule):
-    """Each part by scipy; the integrator is exact."""
+    """Each part is discretised by scipy; the pole of the integrator is exactly one."""
     Kp, Ti, Td, Tf = 2.0, 3.0, 0.5, 0.1
     found = pid(Kp, Ti, Td, Tf, H, rule)
     expected = Kp * np.ones(W.size, dtype=complex)
@@ -82,7 +82,7 @@ def test_backward_differences_need_no_filter():
 
 
 def test_a_row_keeps_a_factor_that_entries_share_once():
-    """Two PI controllers that drive one input have one integrator, and a third factor stays of its own."""
+    """Two PI controllers that drive one input have one integrator; the filter of one is kept."""
     rows = [
         [pid(2.0, 3.0, 0.0, 0.0, H, "zoh"), pid(1.0, 4.0, 0.5, 0.1, H, "zoh")],
         [Rational(np.zeros(1))] * 2,
@@ -101,7 +101,7 @@ def noise(text):
     return NoiseSpectrum.of(stated(PLANT + text))
 
 
-def test_of_a_moving_average():
+def test_the_noise_spectrum_of_a_moving_average_has_its_closed_form():
     k, period, periods = np.arange(1, 40), 81, 3
     w = 2 * np.pi * k / period
     found = noise("noise: {C: [1, -0.9], variance: 2.0}")
@@ -111,7 +111,7 @@ def test_of_a_moving_average():
     assert found.averaged(period, k, periods)[:, 0] == pytest.approx(seen, rel=1e-12)
 
 
-def test_of_an_autoregression_through_a_record_shorter_than_its_memory():
+def test_the_mean_periodogram_of_a_short_record_has_covariances_with_fejer_weights():
     a, period = 0.95, 24
     k = np.arange(1, 12)
     found = noise(f"noise: {{D: [1, -{a}], variance: 1.0}}").averaged(period, k, 1)[:, 0]
@@ -121,7 +121,7 @@ def test_of_an_autoregression_through_a_record_shorter_than_its_memory():
     assert found == pytest.approx(plain, rel=1e-10)
 
 
-def test_of_correlated_outputs():
+def test_the_noise_spectra_of_correlated_outputs_have_their_closed_form():
     model = stated(
         "plant: {B: [[[0, 1]], [[0, 2]]], F: [[[1, -0.5]], [[1, -0.2]]]}\n"
         "noise: {C: [[1, 0.5], [1]], variance: [[1.0, 0.6], [0.6, 2.0]]}"
@@ -131,7 +131,7 @@ def test_of_correlated_outputs():
     assert found.at(20, k) == pytest.approx(np.stack([1.25 + np.cos(w), np.full(2, 2.0)], axis=1), rel=1e-12)
 
 
-def test_noise_that_hardly_forgets_is_refused():
+def test_noise_with_a_pole_too_close_to_the_circle_is_refused():
     assert (
         code_of(noise, "noise: {D: [1, -0.99999], variance: 1.0}", kind=InaccurateError)
         == "integral-inaccurate"

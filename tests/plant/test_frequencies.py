@@ -1,4 +1,4 @@
-"""Grids see resonances; maxima are found where calculus puts them."""
+"""Grids resolve resonances; maxima are found where calculus puts them."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def test_grid_resolves_a_lightly_damped_pole():
     assert grid[-1] == np.pi
 
 
-# Functions, grids, where their maxima are, to this tolerance, and how exact their values are.
+# Functions, grids, the places of the maxima, and tolerances on the places and the values.
 MAXIMA = {
     # -7 sin(7 w) + 0.2 = 0 next to each maximum of the cosine
     "smooth": (
@@ -61,8 +61,8 @@ def test_maxima_are_where_calculus_puts_them(function, grid, exact, apart, off):
 
 
 @pytest.mark.parametrize("end", [0.0, np.pi])
-def test_a_maximum_at_an_end_is_told_as_that_end(end):
-    """cos(w) and its mirror are flat at 0 and pi: rounding cannot tell 1e-9 from 0."""
+def test_a_maximum_at_an_end_is_reported_at_that_end(end):
+    """cos(w) and its mirror are flat at 0 and pi: their values at 1e-9 and 0 are rounded alike."""
 
     def function(w):
         return 1.0 + np.cos(w - end)
@@ -99,7 +99,7 @@ def test_a_function_that_is_flat_but_for_rounding_has_one_maximum(noise):
         ([1.0, -1.5, 0.56], [0.7, 0.8]),
     ],
 )
-def test_roots_without_delays(coefficients, roots):
+def test_roots_in_z_do_not_count_delays(coefficients, roots):
     found = roots_in_z(coefficients)
     np.testing.assert_allclose(np.sort(found.real), roots, rtol=1e-12)
     np.testing.assert_array_equal(found.imag, 0.0)

@@ -35,7 +35,7 @@ def single():
 
 
 def held():
-    """Second order, resonances, an entry that acts at once and one that is zero; inputs and outputs."""
+    """Second order behind a hold: resonances, an entry with direct feedthrough and one that is zero."""
     numerator = [[[3.0], [0.5, 1.0], [0.0]], [[0.4], [0.2, 0.6, 1.0], [1.0]]]
     denominator = [[[1, 0.8, 4], [1, 1.2], [1, 1]], [[1, 0.9], [1, 1.5, 2], [1, 1.1, 0.3]]]
     plant = ContinuousModel.monic(descending(numerator), descending(denominator), COVARIANCE)
@@ -48,7 +48,7 @@ def tank():
 
 
 def sampled_tank():
-    """It by its polynomials."""
+    """The tank as a polynomial model."""
     return known(PolynomialModel.single([0, 0.4 * T], F=[1, -1]), "f1")
 
 
@@ -80,7 +80,7 @@ def textbook(model):
 
 
 def latest(b, a, u, x, t):
-    """x(t) of a x = b u, from what was before."""
+    """x(t) of a x = b u, from u and earlier x."""
     driven = sum(c * u[t - lag] for lag, c in enumerate(b) if t >= lag)
     return driven - sum(c * x[t - lag] for lag, c in enumerate(a) if 0 < lag <= t)
 
@@ -95,7 +95,7 @@ def simulation(controller):
         v = np.stack([scipy.signal.lfilter(C[i], D[i], e[:, i]) for i in range(model.outputs)], axis=1)
         x, k = np.zeros((len(r), *shape)), np.zeros((len(r), *shape))
         for t in range(len(r)):
-            for _ in range(2):  # once more for what acts at once
+            for _ in range(2):  # twice, for direct feedthrough
                 for i, j in np.ndindex(shape):
                     x[t, i, j] = latest(*entries[i][j], u[:, j], x[:, i, j], t)
                 for i in range(model.outputs):
@@ -145,12 +145,12 @@ def case(request):
     return Experiment(model, 7, loop=loop), simulation(controller)
 
 
-def test_information_is_that_of_simulated_impulses(case):
+def test_information_agrees_with_simulated_impulse_responses(case):
     experiment, simulated = case
     check_information(experiment, *(impulse_gradients(experiment.model, simulated, s) for s in "re"))
 
 
-def test_powers_are_those_of_simulated_impulses(case):
+def test_powers_agree_with_simulated_impulse_responses(case):
     experiment, simulated = case
     inputs, outputs = experiment.model.inputs, experiment.model.outputs
     c = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 0.5]])[:inputs, :inputs]
@@ -171,11 +171,11 @@ def test_powers_are_those_of_simulated_impulses(case):
             assert unit @ x == pytest.approx(expected, rel=1e-8)
 
 
-def test_signals_are_those_of_the_equations_sample_by_sample(case):
+def test_signals_agree_with_the_equations_sample_by_sample(case):
     check_signals(case[0].loop, case[1])
 
 
-def test_noise_at_the_inputs_has_the_deviation_of_simulated_impulses(case):
+def test_the_deviation_of_noise_at_the_inputs_agrees_with_impulse_responses(case):
     experiment, simulated = case
     model, inputs = experiment.model, experiment.model.inputs
     first = (np.arange(LONG) == 0)[:, None]
@@ -186,7 +186,7 @@ def test_noise_at_the_inputs_has_the_deviation_of_simulated_impulses(case):
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
-def test_responses_are_those_of_matrix_algebra(case):
+def test_closed_loop_responses_agree_with_matrix_algebra(case):
     w, (experiment, _) = np.array([0.3, 1.0, 2.5]), case
     y_r, u_r = experiment.loop.excited(w)
     y_e, u_e = experiment.loop.disturbed(w)
@@ -240,7 +240,7 @@ def test_integrating_plant_in_a_stable_loop_has_finite_gradients(plant):
 
 ALONE = Loop(box_jenkins(), TransferMatrix.build([[[0.0]] * 2] * 3, [[[1.0]] * 2] * 3))
 DIRECT = PolynomialModel.single([1.0, 0.5])
-BORNE = 1.9 / (1 - np.exp(-T)) - 1.0  # by 1 / (s + 1) without a delay in the controller
+STABLE_GAIN = 1.9 / (1 - np.exp(-T)) - 1.0  # stable around 1 / (s + 1) without a delay in the controller
 
 
 @pytest.mark.parametrize(
@@ -249,8 +249,8 @@ BORNE = 1.9 / (1 - np.exp(-T)) - 1.0  # by 1 / (s + 1) without a delay in the co
         ("stability", ALONE, "unstable"),
         ("stability", looped(PolynomialModel.single([0.0, 1.0], A=[1.0, -0.9]), [-0.5]), "unstable"),
         ("stability", looped(DIRECT, [-1.0]), "algebraic"),
-        ("stability", one([1.0], [1, 1.0], [BORNE]), None),
-        ("stability", one([1.0], [1, 1.0], [0, BORNE]), "unstable"),
+        ("stability", one([1.0], [1, 1.0], [STABLE_GAIN]), None),
+        ("stability", one([1.0], [1, 1.0], [0, STABLE_GAIN]), "unstable"),
         # (s + 3) / (s + 1) acts at once with gain 1, the controller with -1.
         ("stability", one([1.0, 3.0], [1.0, 1.0], [-1.0, 0.5]), "algebraic"),
         ("delay", looped(DIRECT, [0.3]), "algebraic"),
@@ -263,7 +263,7 @@ BORNE = 1.9 / (1 - np.exp(-T)) - 1.0  # by 1 / (s + 1) without a delay in the co
         ("delay", Loop(held(), TransferMatrix.build(*CONTROLLERS[held])), None),
     ],
 )
-def test_loops_that_are_unstable_or_answer_the_noise_at_once_are_refused(check, loop, code):
+def test_unstable_and_algebraic_loops_are_refused(check, loop, code):
     checked = {"stability": loop.check_stability, "delay": loop.check_delay}[check]
     if code is None:
         checked()
@@ -272,7 +272,7 @@ def test_loops_that_are_unstable_or_answer_the_noise_at_once_are_refused(check, 
 
 
 @pytest.mark.parametrize("gain", [0.98, 1.02])
-def test_stability_ends_at_the_largest_gain(gain):
+def test_a_loop_is_stable_up_to_its_largest_gain(gain):
     """1 / (s + 1) under u = -K y: z = E - K (1 - E) leaves the circle at K = (1 + E) / (1 - E)."""
     E = np.exp(-T)
     loop = one([1.0], [1, 1.0], [gain * (1 + E) / (1 - E)])

@@ -66,8 +66,8 @@ MODELS = {
     "late entries": SampledModel(late_entries(), STEP),
     "late entries, continuous": late_entries(),
     "integrating": SampledModel(lag_of([0.3], [1, 0.8, 0]), STEP),
-    "in words": in_words(SampledModel(process(), 0.7)),
-    "in words, continuous": in_words(process()),
+    "gain and time constant": in_words(SampledModel(process(), 0.7)),
+    "gain and time constant, continuous": in_words(process()),
     "partly known": known(box_jenkins(), "c1[2]", "b2[1,1]", "a1"),
 }
 
@@ -82,8 +82,8 @@ def slope(f, step=1e-3):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_plant_gradients_are_differences(name):
-    """Towards longer dead times, which at the boundary of a sample is the side that is promised."""
+def test_plant_gradients_agree_with_one_sided_differences(name):
+    """Differences go towards longer dead times, the side promised at a whole number of samples."""
     model = MODELS[name]
     exact, theta = model.plant_gradient(W), model.theta
     assert exact.shape == (W.size, len(model.names), model.outputs, model.inputs)
@@ -101,7 +101,7 @@ def bode(polynomials, w):
 
 
 @pytest.mark.parametrize("name", POLYNOMIALS)
-def test_noise_and_input_gradients_are_those_of_the_responses(name):
+def test_noise_and_input_gradients_agree_with_the_responses(name):
     """H^-1 dG, and H^-1 dH by differences; G and H of one channel by their polynomials, name by name."""
     model, step = POLYNOMIALS[name], 1e-5
     H = model.noise_at(W)
@@ -155,7 +155,7 @@ def test_names_carry_output_and_input():
     assert list(delayed.in_plant) == [True, True, True, False]
 
 
-def test_sampled_zeros_and_poles_are_those_of_the_sampled_entry():
+def test_zeros_and_poles_of_a_sampled_entry_agree_with_python_control():
     system = control.tf([3.125], [1, 1.5, 1.563]).sample(0.4)
     roots = np.concatenate([system.poles(), system.zeros()])
     points = np.abs(np.angle(roots)) + 1j * np.abs(np.log(np.abs(roots)))
@@ -169,6 +169,6 @@ def test_widely_separated_time_constants_survive_sampling():
     assert sampled.plant_at(np.zeros(1))[0, 0, 0] == pytest.approx(1.0, rel=1e-9)
 
 
-def test_plant_of_any_scale_of_leading_coefficients_is_the_same():
+def test_scaling_numerator_and_denominator_alike_changes_no_parameter():
     scaled = ContinuousModel.monic(arrays([[[4.0, 2.0]]]), arrays([[[2.0, 6.0, 2.0]]]), np.eye(1))
     np.testing.assert_allclose(scaled.theta, [2.0, 1.0, 1.0, 3.0])

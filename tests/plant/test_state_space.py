@@ -73,10 +73,10 @@ def analytic(m, delay, z, sample_time):
 
 
 @pytest.mark.parametrize("sample_time", [H, None], ids=["held", "discrete"])
-def test_responses_and_gradients(sample_time):
+def test_responses_and_gradients_agree_with_complex_steps(sample_time):
     """Responses, and their slopes in every entry and the dead time by steps along the imaginary axis.
 
-    The direct term is late by whole samples, and what it tells of the dead time is not counted.
+    The direct term is delayed by whole samples; its dependence on the dead time is not counted.
     """
     places = (*PLACES, *([("delay", 0, 0)] if sample_time else []))
     found = model(sample_time=sample_time, delay=0.4 if sample_time else 0.0, places=places)
@@ -136,7 +136,7 @@ def predicted(models, y, u):
 
 
 @pytest.mark.parametrize("unstable", [False, True])
-def test_the_loop_is_that_of_the_equations(unstable):
+def test_the_loop_agrees_with_the_state_space_equations(unstable):
     """Information by impulses and differences of the predictor; with an unstable plant, too."""
     found = model()
     if unstable:
@@ -161,8 +161,8 @@ def test_the_loop_is_that_of_the_equations(unstable):
     check_information(Experiment(found, 7, loop=loop), *parts)
 
 
-def test_records():
-    """psi by differences of the prediction errors, which at the truth are the noise; by frequency as well."""
+def test_the_gradient_of_a_record_agrees_with_differences_of_prediction_errors():
+    """At the true parameters the prediction errors are the noise; psi is also computed by frequency."""
     found, rng = model(), np.random.default_rng(0)
     check_record(found, 150)
     u, e = rng.standard_normal((2, 150, 2))
@@ -189,8 +189,8 @@ def motor(known=()):
     return Reparametrised(plain, Parametrisation(names, names, values, free, expressions)).at(values[free])
 
 
-def test_a_motor_is_its_transfer_function():
-    """The same position by states and by k / (s (s + a)): one information, in J and K, in a loop."""
+def test_a_motor_in_states_has_the_information_of_its_transfer_function():
+    """The position by states and by k / (s (s + a)) gives the same information on J and K in a loop."""
     states = motor(known=("R",))
     b, a = 0.3 / (1.5 * 0.02), (0.01 + 0.3**2 / 1.5) / 0.02
     plant = lag_of([b], [1, a, 0], variance=1e-4)
@@ -210,7 +210,7 @@ def test_a_motor_is_its_transfer_function():
         np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9 * np.abs(one).max())
 
 
-def test_estimates_of_physical_parameters():
+def test_estimates_of_physical_parameters_agree_with_their_covariance():
     truth, rng = motor(known=("J",)), np.random.default_rng(4)
     u = np.repeat(rng.choice([-1.0, 1.0], (150, 1)), 4, axis=0)
     y = sum(truth.simulate(u, 0.01 * rng.standard_normal((600, 1)), 1.0))
@@ -218,8 +218,8 @@ def test_estimates_of_physical_parameters():
 
 
 @pytest.mark.slow
-def test_an_estimate_with_a_gain_is_as_good_as_its_covariance():
-    """Innovations form: the gain estimated along, from another start and about another level."""
+def test_estimates_of_an_innovation_gain_agree_with_their_covariance():
+    """Innovations form: K is estimated too, from another start and with a level of 3 at the outputs."""
     places = [("A", 0, 0), ("A", 1, 1), ("B", 1, 0), ("K", 0, 0), ("K", 1, 1)]
     plain, rng = model(delay=0.0, direct=0 * D, places=places), np.random.default_rng(6)
     names = tuple("abcde")

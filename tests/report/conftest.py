@@ -1,4 +1,4 @@
-"""Runs that pages are about."""
+"""Runs for tests of their pages."""
 
 import pytest
 

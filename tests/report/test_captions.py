@@ -1,4 +1,4 @@
-"""Captions and a result in words speak of what there is."""
+"""Captions and summaries in words mention what a result contains."""
 
 import re
 from dataclasses import replace
@@ -28,7 +28,7 @@ from inputdesign_cli.report.facts import facts, said
 from tests.support.curves import CURVES
 from tests.support.outcomes import typed
 
-# What was told of figures of which nobody knows what they show.
+# The beginning of the caption of a figure of unknown content.
 PLACEHOLDER = "The figure"
 W = np.array([0.1, 1.0])
 ONES = np.ones(2)
@@ -78,7 +78,7 @@ def test_a_caption_names_what_is_drawn_and_no_more(drawn, other, words):
 
 
 def test_every_kind_of_figure_has_a_caption():
-    """Whatever a run calls its files."""
+    """A caption does not depend on the name of a file."""
     assert {type(one) for one in CURVES.values()} == set(Curves.__subclasses__())
     for curves in CURVES.values():
         assert not captioned(curves).startswith(PLACEHOLDER)
@@ -110,25 +110,25 @@ DESIGN = {"kind": "least_cost", "value": 2.0, "lower_bound": 2.0}
 
 
 def robust(kind, value, share):
-    """A design whose worst plant that was found takes this share of what the design reaches or may err."""
+    """A robust design whose worst plant found has this share of the error that is admitted or reached."""
     found = ROBUST | {"searched": SEARCHED | {"share": share}}
     return {"objective": {"kind": kind, "value": value}, "robust": found}
 
 
 @pytest.mark.parametrize(
-    ("gap", "told"),
+    ("gap", "written"),
     [*((gap, "below 1e-6") for gap in (0.0, 7.8e-11, 9.99e-7)), (1e-6, "1.0e-06"), (0.021, "2.1e-02")],
 )
-def test_a_gap_that_only_rounding_decides_is_told_as_closed(gap, told):
+def test_a_gap_of_the_size_of_rounding_is_reported_as_below_1e_6(gap, written):
     result = {"objective": DESIGN | {"relative_gap": gap}, "spectrum": {"type": "fir"}}
-    assert list(said("proofs", typed(result))) == [f"no FIR spectrum gets below 2, gap {told}"]
+    assert list(said("proofs", typed(result))) == [f"no FIR spectrum gets below 2, gap {written}"]
 
 
 @pytest.mark.parametrize(
     ("limits", "said"),
     [((0.9567, 0.9686), True), ((0.9473, 0.9605), False), ((0.9501, 0.9633), False), ((0.93, 0.94), False)],
 )
-def test_an_exact_confidence_that_is_exceeded_is_told(limits, said):
+def test_an_exceeded_exact_confidence_is_reported(limits, said):
     result = {"model_error": {"confidence": KEPT | {"kept_limits": limits}, "alpha": 7.7}}
     (line,) = [text for name, text, _ in facts(typed(result), "s") if name == "confidence"]
     assert ("more than asked" in line) is said
@@ -147,26 +147,26 @@ PEAKS = {"samples": 10, "peak": [3.0], "output_peak": [5.0]}
         ({"signal": PEAKS | {"input_peak": [2.0]}}, "signal", "10 3 2 5"),
         ({"signal": PEAKS | {"input_peak": [3.0]}}, "signal", "10 3"),
         (robust("least_cost", 0.5, 1.0), "plants", "30 1"),
-        # The share is one of the ratio that is reached where the best accuracy is sought: times that ratio.
+        # For the best accuracy the share is multiplied by the ratio that the design reaches.
         (robust("accuracy_factor", 0.148, 1.0 + 1e-9), "worst plant", "0.148"),
         (robust("accuracy_factor", 0.5, 1.002), "worst plant", "0.2 0.501"),
         (robust("least_cost", 3.0, 0.9), "worst plant", "0.9"),
     ],
 )
-def test_a_fact_says_its_numbers(result, name, numbers):
+def test_a_fact_contains_its_numbers(result, name, numbers):
     told = {name: "; ".join(filter(None, rest)) for name, *rest in facts(typed(result), "s")}
     assert re.findall(r"\d[\d.]*(?<!\.)", told[name].split("; searched")[0]) == numbers.split()
 
 
-@pytest.mark.parametrize(("ratio", "told"), [(0.04, "25"), (0.5, "")])
-def test_a_large_reserve_is_told(ratio, told):
+@pytest.mark.parametrize(("ratio", "reserve"), [(0.04, "25"), (0.5, "")])
+def test_a_large_reserve_is_reported(ratio, reserve):
     asked = [{"name": "model_error", "worst_ratio": ratio, "frequency": None}]
     (line,) = said("verdict", typed({"assessment": {"verdict": "met", "met": True, "requirements": asked}}))
-    assert re.findall(r"(\d+)-fold", line) == [told] * bool(told)
+    assert re.findall(r"(\d+)-fold", line) == [reserve] * bool(reserve)
 
 
 def test_numbers_have_their_deviations():
-    """Of an estimate, and those that a design will give."""
+    """An estimate and a design report the standard deviations of parameters."""
     found = {"theta": {"gain": 2.0, "L": 25.0}, "standard_deviation": {"gain": 0.1, "L": 2.5}}
     assert "gain 2 +- 0.1, L 25 +- 2.5" in summary(typed({"identification": found}), "s", [])
     information = {"parameters": ["b1", "f1"], "matrix": [[100.0, 0.0], [0.0, 2500.0]]}
@@ -183,7 +183,7 @@ def test_numbers_have_their_deviations():
         (["recent_residuals"], [], "note", 0),
     ],
 )
-def test_what_was_looked_for_is_said_where_nothing_speaks_against_the_model(tests, failed, severity, signs):
+def test_the_tests_of_a_model_are_listed_if_none_failed_or_refutes_it(tests, failed, severity, signs):
     test = {"statistic": 1.0, "degrees_of_freedom": 1, "probability": 0.3}
     found = {"theta": {"gain": 2.0}, "tests": dict.fromkeys(tests, test), "failed": failed}
     finding = {"code": "x", "severity": severity, "message": "A finding."}
@@ -205,7 +205,7 @@ def test_on_trouble_the_terminal_shows_one_finding_and_the_next_command(tmp_path
 
 
 @pytest.mark.slow
-def test_a_loop_error_says_which_theory_its_ratios_are_of():
+def test_a_loop_error_names_the_theory_of_its_ratios():
     """Table I of errata.md: N J of formula (19) and of white noise, and 27.7 % in the mean loss."""
     spec = load_spec("specs/distillation_column.yaml", ["signal={samples: 100, candidates: 1}"])
     found = {name: f"{text} {remark}" for name, text, remark in facts(solve(spec).outcome, "s")}

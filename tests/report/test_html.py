@@ -1,4 +1,4 @@
-"""The page about a run or a sweep: strict HTML that needs nothing, says what it must, and escapes text."""
+"""The page about a run or a sweep: strict HTML without outside resources, its content, and escaped text."""
 
 import base64
 import copy
@@ -55,7 +55,7 @@ def test_the_page_of_a_run(runs, name):
     assert (runs / name / "spec.yaml").read_text() in "".join(page.itertext())
 
 
-def test_a_page_tells_which_result_it_is_about_and_is_the_same_for_the_same_run(runs, unpictured):
+def test_a_page_has_the_hash_of_its_result_and_is_the_same_for_the_same_run(runs, unpictured):
     text = report_text(runs / "open")
     assert report_text(runs / "open") == text
     digest = hashlib.sha256((runs / "open" / "result.json").read_bytes()).hexdigest()
@@ -77,14 +77,14 @@ def copied(runs, tmp_path):
     return tmp_path / "run"
 
 
-def test_what_is_no_run_is_said(copied, tmp_path):
+def test_a_directory_without_a_run_is_refused(copied, tmp_path):
     (copied / "result.json").write_text('{"format": 1}')
     for directory, code in ((copied, "run-unreadable"), (tmp_path, "run-missing")):
         assert refused(report_text, directory, kind=DataError)[0].code == code
 
 
 def paths(value, path=()):
-    """Of every entry below a value; of lists the first."""
+    """The path of every entry below a value; a list counts by its first element."""
     if path:
         yield path
     first = enumerate(value[:1]) if isinstance(value, list) else ()
@@ -93,7 +93,7 @@ def paths(value, path=()):
 
 
 @pytest.mark.parametrize("broken", ["x", {}, [[1]]])
-def test_an_entry_that_is_not_of_its_kind_is_named_wherever_it_stands(copied, unpictured, broken):
+def test_an_entry_of_the_wrong_type_is_named_wherever_it_is(copied, unpictured, broken):
     file = copied / "result.json"
     whole = json.loads(file.read_text())
     named = 0
@@ -110,11 +110,11 @@ def test_an_entry_that_is_not_of_its_kind_is_named_wherever_it_stands(copied, un
             report_text(copied)
         except DataError as error:
             found = re.findall('of a run: "([^"]*)" ', str(error))
-            if not found:  # what a kind of spectrum says of itself has no types
+            if not found:  # the entries of a kind of spectrum have no types
                 continue
             (told,) = found
             name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)[1:]
-            # What was put there may be read one step further.
+            # The error may lie one level above or below the entry.
             assert told.startswith(name) or name.startswith(told)
             named += 1
     assert named > 5
@@ -128,7 +128,7 @@ def test_a_pipe_in_a_run_directory_is_not_waited_for(copied, name):
         report_text(copied)
 
 
-def test_charts_are_pictures_with_words(runs):
+def test_charts_are_svg_pictures_with_alternative_texts(runs):
     page = parse(page_of(runs / "open"))
     images = list(page.iter(f"{XHTML}img"))
     assert len(images) == 4
@@ -139,8 +139,8 @@ def test_charts_are_pictures_with_words(runs):
         assert ElementTree.fromstring(base64.b64decode(data)).tag.endswith("svg")
 
 
-def test_the_sources_of_a_run_are_those_of_the_bibliography(runs):
-    """As the page lists them, each under a key of docs/references.md."""
+def test_the_sources_of_a_run_stand_on_its_page_and_in_the_bibliography(runs):
+    """Each source has a key of docs/references.md."""
     text = bibtex_text(runs / "open")
     keys = re.findall(r"^@\w+\{(.*),$", text, re.MULTILINE)
     assert keys == ["bombois-least-costly", "kiefer-wolfowitz-1960", "ljung-1999"]
@@ -167,7 +167,7 @@ def swept(runs, folder, *settings):
 
 
 def test_the_page_of_a_sweep(runs, tmp_path):
-    """Also of one without any result."""
+    """A sweep without any result has a page, too."""
     page = swept(runs, tmp_path, "experiment.samples=50,100,-1", "spectrum.order=1,2")
     said = words(page)
     for part in ("6 points: 2 invalid, 4 optimal", "best at experiment.samples = 100",
@@ -273,8 +273,8 @@ MSE = {"mse": 1.25, "mse_standard_error": 0.1, "theory": {"mse": 1.2, "mean_esti
 @pytest.mark.parametrize(
     ("entry", "cells"), [(LOSS, ["2 ± 0.5", "1.9 ± 0.4"]), (MSE, ["1.25 ± 0.1", "1.2"]), ({"a": 0.5}, None)]
 )
-def test_studies_of_other_kinds(entry, cells, copied, unpictured):
-    """A study of a kind that is not known is among all numbers."""
+def test_studies_of_other_kinds_have_their_numbers_on_the_page(entry, cells, copied, unpictured):
+    """A study of an unknown kind is listed among all numbers."""
     result = json.loads((copied / "result.json").read_text())
     result["simulation"] = {"runs": 10, "seed": 1, "inputs": {"white": entry}}
     (copied / "result.json").write_text(json.dumps(result))
@@ -283,8 +283,8 @@ def test_studies_of_other_kinds(entry, cells, copied, unpictured):
 
 
 @pytest.mark.slow
-def test_the_chart_of_the_error_says_what_gave_it(data, tmp_path):
-    """A top-up has a design of its own; what the data gave stands beside it."""
+def test_charts_of_the_error_of_a_top_up_are_labelled_design_and_data(data, tmp_path):
+    """A top-up has its own design; the error from the data is drawn beside it."""
     spec = parse_spec(SPEC % "", overrides=["accuracy.model_error.relative=0.1"])
     write_run(assess(spec, data).results, tmp_path / "run")
     panels = {stem: one.panels for stem, one in read_curves(tmp_path / "run").items() if "bound" in stem}
@@ -314,8 +314,8 @@ def test_the_page_of_an_explored_log_names_its_command(sources, command):
 
 
 @pytest.mark.parametrize("left", [None, 0, 40, -40])
-def test_whatever_becomes_of_a_file_the_error_names_it(left, runs, unpictured, tmp_path, monkeypatch):
-    """Of a run and of a sweep; a page that needs nothing of the file may stand as it is."""
+def test_an_error_names_the_file_that_is_missing_empty_or_cut(left, runs, unpictured, tmp_path, monkeypatch):
+    """Every file of a run and of a sweep is tried; a page that does not need the file may be made."""
     monkeypatch.setattr("inputdesign_cli.report.sweep_page.sweep_figures", lambda _: [])
     run_sweep(runs / "open.yaml", ["experiment.samples=50,-1"], directory=tmp_path / "sweep")
     shutil.copytree(runs / "open", tmp_path / "run")

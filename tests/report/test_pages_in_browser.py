@@ -1,4 +1,4 @@
-"""Pages in a real browser: no part is clipped, the width is used, and axe-core has nothing to say."""
+"""Pages in a real browser: no part is clipped, the width is used, and axe-core finds no violation."""
 
 import re
 import subprocess
@@ -29,7 +29,7 @@ FAULT = SpecError.because("unknown-key", "relativ is unknown", "did you mean rel
 WRONG = Followed("s.yaml").failed(FAULT, [LINE], "s.yaml")
 
 
-# Small specs that leave a page of each kind, and the verb that is asked of them.
+# Small specs with a page of each kind, and the verb that is called with them.
 KINDS = {
     "two inputs": (solve, "two_by_two_given", []),
     "robust": (solve, "robust_first_order", ["uncertainty.scenarios=5", "uncertainty.fresh=10"]),
@@ -62,13 +62,13 @@ NAMES = ["open", "closed", *KINDS, *SWEEPS, *OF_RECORDS, "campaign", "campaign b
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
-    """A record that misses what is asked."""
+    """A record that misses the accuracy."""
     return recorded(tmp_path_factory.mktemp("record") / "data.csv")
 
 
 @pytest.fixture(scope="module")
 def place(runs, record, tmp_path_factory):
-    """The directory that a page is of, by its kind: made when it is first asked for."""
+    """The directory with the run of a page, by the kind of page; it is made at its first use."""
     folder = tmp_path_factory.mktemp("pages")
 
     def sweep(name):
@@ -107,7 +107,7 @@ def idesign(*words):
 
 @pytest.fixture(scope="module")
 def address(place, tmp_path_factory):
-    """Where a browser finds a page, by its kind."""
+    """The address of a page, by the kind of page."""
     folder = tmp_path_factory.mktemp("html")
 
     @cache
@@ -154,7 +154,7 @@ def test_a_page_is_accessible_and_nothing_is_clipped(address, browser, name, sch
 
 
 def small_text(page):
-    """Pictures, but drawings of this page: their text is as large as that of all others."""
+    """The kinds of pictures that are no SVG, whose text may be smaller than that of the page."""
     return page.evaluate("""() => [...document.querySelectorAll("figure img")]
         .map((e) => e.src.slice(0, 22)).filter((kind) => kind !== "data:image/svg+xml;bas")""")
 
@@ -169,8 +169,8 @@ def test_the_contents_lead_to_headings_by_keyboard(shown):
     assert missing == []
 
 
-def test_values_are_told_where_one_points_and_by_the_arrow_keys(shown, runs):
-    """They are those of bound.csv, to the digits that are shown, at the frequency that is shown."""
+def test_values_are_shown_at_the_pointer_and_by_the_arrow_keys(shown, runs):
+    """The values agree with bound.csv at the frequency that is shown, to the digits that are shown."""
     table = np.genfromtxt(runs / "open" / "bound.csv", delimiter=",", names=True)
     w, r_u = table[table.dtype.names[0]], table["r_u"]
     page = shown("open")
@@ -194,7 +194,7 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(shown, runs):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "told", "figure"),
+    ("name", "parts", "figure"),
     [
         ("sweep", ["number of samples N (100|50) ", "cost: order = 1 [0-9.]+; floor"], 0),
         (
@@ -210,7 +210,7 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(shown, runs):
         ("assessed", ["time", "predicted one step ahead"], 0),
     ],
 )
-def test_every_kind_of_curve_tells_its_values(shown, name, told, figure):
+def test_every_kind_of_curve_shows_its_values(shown, name, parts, figure):
     page = shown(name)
     plot = page.locator("figure").nth(figure).locator("[role=slider]")
     answer = plot.locator("xpath=following-sibling::p")
@@ -220,15 +220,15 @@ def test_every_kind_of_curve_tells_its_values(shown, name, told, figure):
     plot.press("End")
     plot.press("ArrowLeft")
     for text in (pointed, answer.inner_text()):
-        for part in told:
+        for part in parts:
             assert re.search(part, text), (part, text)
     assert plot.get_attribute("aria-valuetext") == answer.inner_text()
     assert violations(page) == []
 
 
 @pytest.mark.slow
-def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(shown, place):
-    """What is said at the ring is C G at the frequency that is said, by nyquist.csv."""
+def test_the_point_of_a_nyquist_plot_is_on_its_curve(shown, place):
+    """The values at the ring are C G of nyquist.csv at the frequency that is shown."""
     table = np.genfromtxt(place("loop") / "nyquist.csv", delimiter=",", names=True)
     w, loop = table[table.dtype.names[0]], table["CG_re"] + 1j * table["CG_im"]
     page = shown("loop")

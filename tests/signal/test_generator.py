@@ -46,8 +46,8 @@ def generator(spectrum, samples=240, **settings):
 
 @pytest.mark.parametrize("method", KINDS)
 @pytest.mark.parametrize("spectrum", SPECTRA)
-def test_periods_and_hold(method, spectrum):
-    """Three equal periods of 20 values, each held four times."""
+def test_the_values_are_equal_periods_before_the_hold(method, spectrum):
+    """The 120 values are three equal periods of 40; each value is to be held for four samples."""
     values = generator(spectrum, 480, method=method, periods=3, hold=4).values(rng())
     assert values.shape == (120, SPECTRA[spectrum].inputs)
     np.testing.assert_array_equal(values[:40], values[40:80])
@@ -68,7 +68,7 @@ def test_the_ramp_fades_every_input_in_and_out(method, spectrum):
 
 
 @pytest.mark.parametrize("spectrum", ["moving average", "density", "two inputs"])
-def test_the_hold_is_allowed_for(spectrum):
+def test_the_spectrum_is_corrected_for_the_hold(spectrum):
     """Up to pi / hold the held record has the designed spectrum."""
     inputs = SPECTRA[spectrum].inputs
     held = np.repeat(generator(spectrum, 4800, method="multisine", hold=4).values(rng()), 4, axis=0)
@@ -111,7 +111,7 @@ def test_gaussian_noise_has_the_spectrum_on_average():
 
 
 def test_shifted_sequences_are_nearly_uncorrelated():
-    """Over one sequence: -1/n at every lag but those of the shifts, n/2 away."""
+    """The correlation over one sequence is -1/n at every lag except the shift, about n/2."""
     values = generator("two inputs", 254, method="prbs", bits=7, periods=2).values(rng())[:127]
     values = values / np.abs(values).max(axis=0)
     spectrum = np.fft.rfft(values, axis=0)
@@ -148,7 +148,7 @@ def record_of(experiment, basis, x, seed=0):
     return best_record(made, FiniteRecord(experiment, 500), Target(lambda _: 0.0)).samples[:, 0]
 
 
-def test_free_lines_that_a_record_cannot_tell_apart_do_not_cancel(first_order):
+def test_free_lines_that_a_record_cannot_resolve_do_not_cancel(first_order):
     """Four sinusoids near w = 0 are one constant of their power; the line at 2.0 keeps its own power."""
     basis = replace(LinesBasis.at(np.array([1e-5, 2.0, 1.1e-5, 3e-4, 2.0 + 1e-6, 4e-4]), 1), free=True)
     for seed in range(6):
@@ -158,7 +158,7 @@ def test_free_lines_that_a_record_cannot_tell_apart_do_not_cancel(first_order):
         assert line == pytest.approx(1.0, rel=0.05)
 
 
-def test_given_lines_are_made_as_they_are_given(first_order):
+def test_given_lines_keep_their_frequencies_and_amplitudes(first_order):
     samples = record_of(first_order, LinesBasis.at(np.array([1.0, 1.001]), 1), np.ones(2))
     rows = np.exp(1j * np.outer([1.0, 1.001], np.arange(500)))
     regressors = np.concatenate([rows.real, rows.imag]).T
@@ -172,8 +172,8 @@ def test_given_lines_are_made_as_they_are_given(first_order):
 @pytest.mark.parametrize("samples", [500, 5000])
 @pytest.mark.parametrize("method", ["filtered_noise", "multisine"])
 @pytest.mark.parametrize("seed", range(20))
-def test_random_designs(seed, samples, method):
-    """The design of a random case, its record, and what that attains, all recomputed."""
+def test_records_of_random_designs_meet_the_accuracy_with_little_extra_power(seed, samples, method):
+    """The accuracy and the cost of the record are recomputed."""
     case = random_case(seed)
     design = solve(
         case.experiment(samples), "cost", [case.requirement], case.order, cost=case.cost, tolerance=1e-6

@@ -29,8 +29,8 @@ COLOURED = np.array([1.0, 0.7, 0.3])
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("rate", [0.01, 0.3, 2.0])
-def test_slow_moves_against_the_definition(seed, rate):
-    """Half way between the Lipschitz envelopes, written out over all pairs of samples."""
+def test_slow_moves_are_half_way_between_the_lipschitz_envelopes(seed, rate):
+    """The envelopes are written out over all pairs of samples."""
     values = np.random.default_rng(seed).normal(size=80)
     found = slow_moves(values, rate)
     assert largest_move(found) <= rate * (1 + 1e-12)
@@ -48,9 +48,9 @@ def test_compression_keeps_the_periodogram():
 
 
 @pytest.mark.parametrize("known", [0.0, 0.3, 0.9, 0.999])
-def test_least_level_of_any_size(known):
-    """ratio(a) = (m + g a^2)^-0.4 has the root sqrt((1 - m) / g): over twelve decades, a bracket's ends are
-    roots up to rounding.
+def test_the_least_level_is_found_over_twelve_decades(known):
+    """ratio(a) = (m + g a^2)^-0.4 is one at a = sqrt((1 - m) / g). At some scales an end of the bracket is a
+    root up to rounding.
     """
     for gain in 10.0 ** np.random.default_rng(0).uniform(-6, 6, 100):
         level = least_level(lambda a, g=gain: (known + g * a**2) ** -0.4, 1.0)
@@ -62,12 +62,12 @@ def test_no_level_is_needed_where_enough_is_known():
     assert least_level(lambda a: (1.5 + a**2) ** -0.5, 1.0) < 1e-8
 
 
-def test_the_last_level_that_holds_and_the_first_that_suffices():
+def test_the_last_level_that_holds_and_the_first_that_suffices_are_found():
     assert 0.3 >= last_level(lambda a: a <= 0.3, 1.0) == pytest.approx(0.3, rel=2e-3)
     assert first_level(lambda a: 3.0 / a, 1.0) == (pytest.approx(3.0, rel=2e-3), True)
 
 
-def test_a_level_that_helps_most():
+def test_the_level_that_helps_most_is_found_if_none_suffices():
     """Raising the level gains nothing beyond 4, and it is found without going to the end."""
     tried = []
 
@@ -82,7 +82,7 @@ def test_a_level_that_helps_most():
     assert first_level(lambda a: np.inf, 1.0)[1] is False
 
 
-def test_a_level_of_some_power():
+def test_the_level_of_a_given_power_is_found():
     assert level_of_power(lambda a: a**2, 4.0, 1.0) == pytest.approx(2.0, rel=2e-3)
     # Below half a step a converter gives nothing at all.
     assert level_of_power(lambda a: np.floor(a) ** 2, 4.0, 0.5) == pytest.approx(2.0, rel=2e-3)
@@ -114,7 +114,7 @@ CONVERTERS = {"noise": 8, "binary": 8, "held": 7}
 
 
 def bounds_of(inputs, **figures):
-    """Figures of one input as they are; of two, both for units of their own."""
+    """Bounds of one input as given; two inputs have different units."""
     units = {"amplitude": [1.25, 3.1], "rate": [1.4, 3.5], "output": [0.6, 0.45]}
     scale = {key: np.ones(1) if inputs == 1 else np.array(units[key]) for key in figures}
     return Bounds(**{key: figure * scale[key] for key, figure in figures.items()})
@@ -172,7 +172,7 @@ def experiment(request, first_order):
 @pytest.mark.parametrize("limited", [*LIMITS, "none"])
 @pytest.mark.parametrize("kind", SETTINGS)
 def test_values_that_are_zero_make_a_record_of_zeros(monkeypatch, experiment, kind, limited, meets):
-    """A few samples may all be zeros of the sinusoids: nothing is divided by what they cause."""
+    """A few samples may all be zeros of the sinusoids: no division by zero follows."""
 
     def ratio(information):
         return 0.45 / float(np.linalg.norm(np.linalg.cholesky(information), -2))
@@ -192,7 +192,7 @@ def test_values_that_are_zero_make_a_record_of_zeros(monkeypatch, experiment, ki
 
 
 @pytest.mark.parametrize("kind", ["binary", "ternary"])
-def test_levels_of_a_signal_of_zeros(monkeypatch, kind):
+def test_levels_of_a_signal_of_zeros_are_finite(monkeypatch, kind):
     """The alternation may begin with a multisine of zeros."""
     monkeypatch.setattr(levels, "multisine_record", lambda lines, samples, *_, **__: np.zeros((samples, 1)))
     lines = Lines.of_period(np.ones((9, 1, 1), dtype=complex), 16)
@@ -211,7 +211,7 @@ def test_limits_hold_exactly(experiment, kind, limited):
 @pytest.mark.first(4)
 @pytest.mark.parametrize("limited", ["amplitude", "both", "output"])
 @pytest.mark.parametrize("kind", CONVERTERS)
-def test_converters_hold_the_limits_too(experiment, kind, limited):
+def test_quantised_records_keep_the_limits(experiment, kind, limited):
     bounds = bounds_of(experiment.inputs, **LIMITS[limited])
     quantisers = (Quantiser(CONVERTERS[kind], 4.0), Quantiser(CONVERTERS[kind], 10.0))[: experiment.inputs]
     check(
@@ -224,12 +224,12 @@ def test_converters_hold_the_limits_too(experiment, kind, limited):
 @pytest.mark.first(2)
 @pytest.mark.parametrize("limits", [{"amplitude": 2.0}, {"rate": 2.5}, {"output": 2.5}])
 @pytest.mark.parametrize("kind", ["noise", "optimised", "binary"])
-def test_limits_in_closed_loop_are_those_of_what_r_causes(flexible, kind, limits):
+def test_limits_in_closed_loop_apply_to_the_response_to_r(flexible, kind, limits):
     check(flexible.whitened(1.0), SETTINGS[kind], bounds_of(1, **limits))
 
 
 def test_powers_of_each_channel_are_kept_below_their_limits(experiment):
-    """With less power than the accuracy needs the record takes what there is and says so."""
+    """The limit is below the power that the accuracy needs: the record uses it all and reports a miss."""
     last = experiment.inputs - 1
     bounds = Bounds(powers=(("input", last, 0.02), ("output", None, 50.0)))
     _, record = made(experiment, {"method": "multisine"}, bounds)
@@ -239,7 +239,7 @@ def test_powers_of_each_channel_are_kept_below_their_limits(experiment):
 
 @pytest.mark.parametrize("returns", [False, True])
 def test_a_record_within_its_limits_is_the_nearest_and_returns_if_asked(returns):
-    """Against the quadratic program, of a lag whose output must stay below the half of what it would be."""
+    """A quadratic program agrees; the output of a lag must stay below half of its unlimited peak."""
     import cvxpy as cp
 
     wanted = np.random.default_rng(0).standard_normal((60, 1))

@@ -95,7 +95,7 @@ def test_the_factor_of_a_moving_average_is_its_taps():
     np.testing.assert_allclose(factor.taps[2:], 0, atol=1e-10)
 
 
-def test_a_spectrum_that_touches_zero_is_lifted_and_says_so():
+def test_a_spectrum_that_touches_zero_is_lifted_by_a_reported_floor():
     problem = column()
     design, *_ = problem.asymptotic()
     factor = matrix_factor(lambda w: problem.spectrum_at(w, design.multipliers))
@@ -135,8 +135,8 @@ def test_low_order_filters_of_the_column_are_stable_and_nearly_as_good(order):
 
 
 @pytest.mark.parametrize("order", [0, 1, 5, 40, 200])
-def test_spectral_factor_of_a_known_factor(order):
-    """Random zeros inside the circle: the minimum-phase factor is recovered."""
+def test_the_spectral_factor_has_the_spectrum_of_a_known_factor(order):
+    """The known factor has random taps."""
     rng = np.random.default_rng(order)
     taps = rng.normal(size=order + 1) * 0.7 ** np.arange(order + 1)
     factor = spectral_factor(autocorrelation(taps))
@@ -147,7 +147,7 @@ def test_spectral_factor_of_a_known_factor(order):
     np.testing.assert_allclose(response, wanted, rtol=1e-9, atol=1e-11 * wanted.max())
 
 
-def test_spectral_factor_with_zeros_on_the_circle():
+def test_a_spectral_factor_with_zeros_on_the_circle_has_a_small_residual():
     """(1 - q^-1)^2 touches zero at DC, of order four in Phi: the residual still vanishes."""
     factor = spectral_factor(autocorrelation(np.array([1.0, -2.0, 1.0])))
     assert factor.residual < 1e-10

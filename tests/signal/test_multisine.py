@@ -68,7 +68,7 @@ def test_lines_anywhere_have_their_powers():
     np.testing.assert_allclose(record.T @ record / len(record), powers[0].real, atol=2e-3)
 
 
-def test_lines_that_a_record_cannot_tell_apart_become_one():
+def test_lines_that_a_record_cannot_resolve_become_one():
     powers = np.array([np.eye(2), 2 * np.eye(2), 3 * np.eye(2)], dtype=complex)
     found = merged(Lines(np.array([1.0, 1e-9, 2e-7]), powers), 100)
     assert found.frequencies[1] == 1.0
@@ -99,7 +99,7 @@ def test_the_time_limit_ends_a_record_that_is_being_made():
 @pytest.mark.parametrize("period", [64, 65, 1000, 997])
 @pytest.mark.parametrize("odd", [False, True])
 @pytest.mark.parametrize("lines", [1, 2, 7, 15])
-def test_so_many_harmonics_rise_inside_the_band(period, odd, lines):
+def test_the_requested_number_of_harmonics_ascends_inside_the_band(period, odd, lines):
     band = (0.05, 2.9)
     found = harmonics_between(period, band, lines, odd=odd)
     assert found.size == lines
@@ -110,7 +110,7 @@ def test_so_many_harmonics_rise_inside_the_band(period, odd, lines):
     assert not odd or np.all(found % 2 == 1)
 
 
-def test_harmonics_are_even_in_the_logarithm_or_all_or_too_few_or_the_nearest():
+def test_harmonics_are_spaced_logarithmically_or_all_or_nearest_or_too_few():
     found = harmonics_between(10**6, (0.01, 1.0), 21, odd=False)
     assert np.diff(np.log(found)) == pytest.approx(np.log(100.0) / 20, rel=1e-2)
     assert harmonics_between(10, (0.0, np.pi), None, odd=False).tolist() == [1, 2, 3, 4]
@@ -123,7 +123,7 @@ def test_harmonics_are_even_in_the_logarithm_or_all_or_too_few_or_the_nearest():
     assert nearest_harmonics(100, w * np.array([1.9, 2.1, 48.9]), odd=True).tolist() == [1, 3, 49]
 
 
-def test_one_of_each_group_is_left_out_and_watched():
+def test_one_harmonic_of_each_group_is_left_out_and_monitored():
     candidates = np.arange(1, 49, 2)
     kept = thinned(candidates, 4, np.random.default_rng(3))
     missing = np.setdiff1d(candidates, kept)
@@ -146,8 +146,8 @@ def rng(seed=0):
     return np.random.default_rng(seed)
 
 
-def test_slopes_are_those_of_the_record():
-    """Finite differences, on and off the grid, with a filter in between."""
+def test_slopes_of_a_record_in_its_phases_agree_with_finite_differences():
+    """The frequencies lie on and off the grid, and the record passes a filter."""
     gains = np.exp(1j * np.linspace(0, 3, 5)) * np.linspace(1, 2, 5)
     for lines in (flat(5, 32), Sinusoids(np.array([0.0, 0.3, 1.0, 2.2, np.pi]), np.ones(5), 32)):
         phases, weight = lines.random_phases(rng()), rng(1).normal(size=32)
@@ -165,7 +165,7 @@ def test_both_ways_to_sum_sinusoids_agree():
     np.testing.assert_allclose(on.record(phases), off.record(phases), atol=1e-13)
 
 
-def test_schroeder_phases_of_a_flat_multisine_are_his():
+def test_schroeder_phases_of_a_flat_multisine_have_the_published_form():
     """phi_n = phi_1 - pi n (n - 1) / L up to a delay: second differences are -2 pi / L."""
     lines = flat(31, 256)
     second = np.diff(lines.schroeder_phases(), 2)
@@ -173,7 +173,7 @@ def test_schroeder_phases_of_a_flat_multisine_are_his():
 
 
 @pytest.mark.parametrize("samples", [512, 1024])
-def test_crest_factor_of_64_flat_lines(samples):
+def test_optimised_phases_of_64_flat_lines_have_a_crest_factor_below_1_42(samples):
     """At most 1.42, where Schroeder's phases give 1.7 and random ones 3; the lines keep their powers."""
     lines = flat(64, samples)
     phases = optimise_phases(lines, lines.schroeder_phases())
@@ -198,7 +198,7 @@ def test_crest_factors_of_classical_cases_beat_the_published_constructions(count
     assert found < 1.42
 
 
-def test_crest_factor_of_several_signals_at_once():
+def test_the_joint_peak_of_input_and_output_falls_by_a_third():
     """Input and output of a resonance: neither alone decides, and the joint peak falls by a third."""
     lines = flat(40, 512)
     gains = 1 / (1 - 1.8 * np.exp(-1j * lines.frequencies) + 0.9 * np.exp(-2j * lines.frequencies))
@@ -219,7 +219,7 @@ def coloured(lines, period):
     return Lines(2 * np.pi * np.arange(1, lines + 1) / period, powers, period)
 
 
-def test_low_peaks_of_all_inputs_and_periods_at_once():
+def test_low_peak_phases_lower_the_peaks_of_all_inputs_and_periods():
     lines, rng = coloured(40, 256), np.random.default_rng(1)
     start = 2 * np.pi * rng.random(40)
     rms = np.sqrt(lines.mean_squares)
@@ -233,7 +233,7 @@ def test_low_peaks_of_all_inputs_and_periods_at_once():
     assert np.isfinite(crest(schroeder_phases(lines, 512)))
 
 
-def test_weights_of_the_inputs():
+def test_a_larger_size_of_one_input_lowers_the_peak_of_the_other():
     """An input that may reach little is kept low at the expense of the other."""
     lines, rng = coloured(40, 256), np.random.default_rng(1)
     start = 2 * np.pi * rng.random(40)
@@ -251,8 +251,8 @@ def test_weights_of_the_inputs():
 @pytest.mark.first(2)
 @pytest.mark.parametrize("method", ["multisine", "binary", "ternary", "filtered_noise"])
 @pytest.mark.parametrize("samples", [1, 2, 3, 5])
-def test_records_of_fewer_samples_than_lines_are_numbers(method, samples):
-    """Phases of many lines can make all of a few samples zero: nothing is divided by what that leaves."""
+def test_records_of_fewer_samples_than_lines_are_finite(method, samples):
+    """Phases of many lines can make all of a few samples zero: no division by zero follows."""
     spectrum = DesignedSpectrum.of(LinesBasis.at(np.pi * np.arange(1, 61) / 60, 1), np.ones(60))
     for seed in range(80, 100):
         kind = SignalSettings(method, phases="optimised" if method == "multisine" else "random")

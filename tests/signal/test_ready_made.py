@@ -1,4 +1,4 @@
-"""Ready-made signals, and those of few levels: shift registers, converters, ramps, when to switch."""
+"""Ready-made signals and signals of few levels: shift registers, converters, ramps and switching times."""
 
 import re
 from dataclasses import replace
@@ -91,7 +91,7 @@ def test_steps_take_every_level_once():
         assert np.count_nonzero(np.diff(channel)) == 5
 
 
-def test_ranges_are_those_asked_for():
+def test_signals_are_scaled_to_the_requested_ranges():
     found = scaled(np.array([[-1.0, 1.0], [1.0, -1.0]]), [(0.0, 5.0), (2.0, 3.0)])
     assert found.tolist() == [[0.0, 3.0], [5.0, 2.0]]
 
@@ -112,7 +112,7 @@ def test_a_constant_excites_nothing():
         ReadyMade("steps", number=1_000_000_000),
     ],
 )
-def test_what_would_not_fit_is_refused_before_it_is_made(asked):
+def test_a_signal_that_is_too_large_is_refused_before_it_is_made(asked):
     found = refused(make_signal, asked)
     assert found[0].code == "too-large"
     assert "at most" in found[0].hint
@@ -139,8 +139,8 @@ def test_inputs_of_a_period_are_independent_or_refused(bits):
         assert singular[-1] > 0.1
 
 
-def test_what_is_told_is_that_of_the_samples_that_are_made():
-    """A hundred samples of a sequence of 31 end within a period: its mean, power and lines are others."""
+def test_reported_properties_agree_with_the_samples_of_a_cut_sequence():
+    """A hundred samples of a sequence of 31 end within a period, which changes mean, power and lines."""
     results = make_signal(ReadyMade("prbs", bits=5, samples=100))
     u, told = results.tables["signal"].columns["u1"], results.result["signal"]["channels"]["u1"]
     assert told["mean"] == pytest.approx(np.mean(u))
@@ -151,7 +151,7 @@ def test_what_is_told_is_that_of_the_samples_that_are_made():
 
 
 @pytest.mark.parametrize("band", [(0.001, 0.01), (0.0, 0.02), (0.1, 1.0), (0.3, 0.4), (2.0, 3.1)])
-def test_a_chirp_that_is_shorter_than_a_turn_is_refused_with_the_samples_that_cover_its_range(band):
+def test_a_chirp_shorter_than_a_turn_is_refused_with_the_samples_it_needs(band):
     levels = ((20.0, 80.0),)
     (told,) = refused(make_signal, ReadyMade("chirp", band=band, samples=2, levels=levels))
     assert told.code == "bad-period"
@@ -171,7 +171,7 @@ def rng(seed=0):
 
 
 @pytest.mark.parametrize(("kind", "values"), [("binary", {-1.0, 1.0}), ("ternary", {-1.0, 0.0, 1.0})])
-def test_levels_of_one_input_and_their_spectrum(kind, values):
+def test_signals_of_few_levels_at_one_input_come_near_the_spectrum(kind, values):
     """Few levels only, and a spectrum nearer to the wanted one than that of the signs of noise."""
     samples = 512
     lines = grid_lines(FirBasis(1, 3).density(COLOURED, 2 * np.pi * np.arange(257) / samples), samples, 1.0)
@@ -193,7 +193,7 @@ def test_levels_of_one_input_and_their_spectrum(kind, values):
 
 @pytest.mark.parametrize(("kind", "number"), [("binary", 2), ("ternary", 3)])
 @pytest.mark.parametrize("samples", [480, 481])
-def test_few_levels_at_several_inputs(kind, number, samples):
+def test_signals_of_few_levels_at_two_inputs_come_near_the_spectrum(kind, number, samples):
     """Levels of the powers of the inputs, and a matrix spectrum nearer than that of clipped multisines."""
     lines = grid_lines(of_two_inputs(2 * np.pi * np.arange(121) / 240), 240, 1.0)
     record = few_levels(lines, samples, rng(), kind_of(kind).nearest)
@@ -211,7 +211,7 @@ def test_few_levels_at_several_inputs(kind, number, samples):
     assert error(record) < 0.8 * min(error(signs(seed)) for seed in range(5))
 
 
-def test_quantiser():
+def test_a_quantiser_rounds_to_its_steps_and_saturates():
     converter = Quantiser(bits=3, span=4.0, offset=1.4)  # values -4, -3, .., 3
     assert converter.step == 1.0
     assert converter.operating_point == 1.0
@@ -245,7 +245,7 @@ def test_slow_records_are_followed_as_they_are_and_others_at_full_speed(seed, ra
 
 
 def test_the_search_finds_switches_that_are_known():
-    """Of all signals of two levels the sign of a sinusoid has the largest product with it."""
+    """The sign of a sinusoid has the largest product with it of all signals of two levels."""
     wave = np.sin(2 * np.pi * (np.arange(60) + 0.5) / 20)
     best = np.abs(wave).sum()
     start = np.where(np.random.default_rng(0).random((60, 1)) < 0.5, -2.0, 2.0)
@@ -257,7 +257,7 @@ def test_the_search_finds_switches_that_are_known():
     np.testing.assert_array_equal(found[:, 0], 2.0 * np.sign(wave))
 
 
-def test_the_search_keeps_what_is_best_and_ends_where_it_is_enough():
+def test_the_search_keeps_the_best_values_and_ends_when_they_suffice():
     rng, start, asked = np.random.default_rng(2), np.ones((30, 2)), []
 
     def figure(values):
@@ -273,7 +273,7 @@ def test_the_search_keeps_what_is_best_and_ends_where_it_is_enough():
     np.testing.assert_array_equal(start, 1.0)
 
 
-def test_a_pace_that_does_not_lead_there_ends_the_search_and_so_does_its_time():
+def test_a_search_that_improves_too_slowly_or_runs_out_of_time_ends():
     start, asked = np.ones((40, 1)), []
 
     def figure(values):
@@ -291,7 +291,7 @@ def test_a_pace_that_does_not_lead_there_ends_the_search_and_so_does_its_time():
 @pytest.mark.parametrize("quantiser", [None, Quantiser(5, 0.8)], ids=["plain", "converter"])
 @pytest.mark.parametrize(("periods", "hold"), [(1, 1), (2, 1), (1, 2)])
 def test_every_sample_is_at_a_level_or_moves_at_the_rate(first_order, quantiser, periods, hold):
-    """With the limits exact, whatever the converter; the height is the largest that they leave."""
+    """The limits hold exactly with and without a converter; the height is the largest within them."""
     experiment = replace(first_order, samples=240)
     spectrum = DesignedSpectrum.of(FirBasis(1, 2), np.array([1.0, 0.7, 0.3]), inputs=1)
     settings = SignalSettings("slewed", periods=periods, hold=hold, candidates=1, most_candidates=1)

@@ -1,4 +1,4 @@
-"""What can be wrong with a spec: where it is reported, under which code and key.
+"""Errors in a spec: the place, the code and the key under which each is reported.
 
 The sign § in a row marks the place that the diagnostic must point at; it is removed before reading.
 """
@@ -12,7 +12,7 @@ import pytest
 from inputdesign_cli.specification import parse_spec
 from tests.support.refusals import refused
 
-UNTOLD = ("Input should", "valid dictionary", "Field required", "Extra inputs", "{key}", "type=", "\x00")
+JARGON = ("Input should", "valid dictionary", "Field required", "Extra inputs", "{key}", "type=", "\x00")
 BASE: dict[str, str | None] = {
     "plant": "{B: [0, 1], F: [1, -0.5]}",
     "noise": "{variance: 1}",
@@ -27,7 +27,7 @@ REGRESSION: dict[str, str | None] = {
 MIMO = "{B: [[[0, 1], [0, 2]], [[0, 3], [0, 4]]]}"
 CONTINUOUS = "{continuous: {numerator: [1], denominator: [1, 1]}}"
 
-# Code, key, words of the message or hint, and the sections that differ from those of `BASE`.
+# Code, key, words of the message or hint, and the sections that differ from `BASE`.
 Row = tuple[str, str, str, dict[str, str | None]]
 
 ROWS: list[Row] = [
@@ -44,7 +44,7 @@ ROWS: list[Row] = [
     ("empty-value", "plant.F", "no value", {"plant": "{B: [0, 1], §F: null}"}),
     ("empty-value", "accuracy.model_error.45", "decimal point", {
         "accuracy": "{model_error: {relative: 0.01, alpha: 2,§45}}"}),
-    # What states the variance, too, is not missed a second time.
+    # A broken key that states the variance is not reported as missing as well.
     ("empty-value", "noise.standard_deviation", "no value", {"noise": "{§standard_deviation: null}"}),
     ("empty-value", "noise.standard_deviation", "no value", {
         **STEP, "noise": "{§standard_deviation: null, correlation_time: 60}"}),
@@ -80,12 +80,12 @@ ROWS: list[Row] = [
     ("not-a-whole-number", "experiment.samples", "500 or 501", {"experiment": "{samples: §500.5}"}),
     ("out-of-range", "experiment.samples", "at least 1", {"experiment": "{samples: §0}"}),
     ("out-of-range", "experiment.samples", "at most", {"experiment": "{samples: §1e30}"}),
-    # YAML that is read but not wanted
+    # YAML that is valid but refused
     ("yaml-tag", "plant.B", "remove the tag", {"plant": "{B: §!!python/tuple [0, 1]}"}),
     ("yaml-merge-key", "plant.<<", "alias", {"plant": "{B: [0, 1], §<<: {F: [1]}}"}),
     ("bad-key", "plant", "not a word", {"plant": "{B: [0, 1], §[1]: 2}"}),
     ("bad-text", "title", "U+0001", {"title": '§"\\x01"'}),
-    # noise in words
+    # noise by standard deviation and correlation time
     ("missing-key", "noise.correlation_time", "needs sample_time", {
         "noise": "{standard_deviation: 0.1, §correlation_time: 60}"}),
     ("missing-key", "noise.correlation_time", "add standard_deviation", {**STEP, "noise": "{§correlation_time: 60}"}),
@@ -304,7 +304,7 @@ ROWS: list[Row] = [
 
 @pytest.fixture
 def diagnostics():
-    """What is said of a text that is no spec, and the line and column that the sign § marks in it."""
+    """The diagnostics of a broken spec, and the line and column that the sign § marks in it."""
 
     def found(marked):
         index = marked.index("§") if "§" in marked else None
@@ -332,7 +332,7 @@ def test_the_complaint_names_code_key_place_and_remedy(row, diagnostics):
     if place is not None:
         assert (diagnostic.location.line, diagnostic.location.column) == place
         assert diagnostic.location.text == text.replace("§", "").splitlines()[place[0] - 1]
-    for phrase in UNTOLD:
+    for phrase in JARGON:
         assert phrase not in diagnostic.message + diagnostic.hint
 
 
@@ -349,7 +349,7 @@ NOISE = "noise: {variance: 1}\n"
 TOGETHER = {
     "in the order of the file": (MANY, "noise sampletime plant.B[1] plant.F accuracy.model_error.relative "
         "accuracy.model_error.confidence limits.band signal.phases"),
-    # A broken controller makes the unstable plant no mistake; a broken requirement is asked all the same.
+    # With a broken controller the unstable plant is no error; a broken requirement still counts as asked.
     "no consequences": (NOISE + "plant: {B: [0, 1], A: [1, -2]}\n"
         "experiment: {controller: {numerator: [x], denominator: [1]}}\naccuracy: {model_error: {relative: x}}\n",
         "experiment.controller.numerator[0] accuracy.model_error.relative"),
@@ -364,7 +364,7 @@ TOGETHER = {
 
 
 @pytest.mark.parametrize("name", TOGETHER)
-def test_which_complaints_come_together(name, diagnostics):
+def test_independent_errors_are_reported_together_in_the_order_of_the_file(name, diagnostics):
     text, keys = TOGETHER[name]
     found, _ = diagnostics(text)
     assert [c.key for c in found] == keys.split()
@@ -385,6 +385,6 @@ CASES = {
 
 
 @pytest.mark.parametrize("text", CASES)
-def test_what_to_write_instead_of_a_key_of_another_place(text, diagnostics):
+def test_the_hint_for_a_misplaced_key_says_what_to_write_instead(text, diagnostics):
     found, _ = diagnostics(text + ASKED)
     assert any(CASES[text] in one.hint for one in found)

@@ -31,7 +31,7 @@ def test_the_samples_have_the_autocovariance_of_the_process(plant, step):
         np.testing.assert_allclose(autocovariance(found), closed, rtol=1e-9)
 
 
-def test_every_output_has_its_own():
+def test_every_output_has_its_own_deviation_and_correlation_time():
     noise = "noise: {standard_deviation: [0.1, 0.3], correlation_time: [60, 20]}\n"
     spec, common = parse_spec(TWO + ASKED + noise), parse_spec(TWO + ASKED + FADES)
     for output, (deviation, time) in enumerate(((0.1, 60.0), (0.3, 20.0))):
@@ -40,19 +40,19 @@ def test_every_output_has_its_own():
         np.testing.assert_allclose(autocovariance(common, output), 0.01 * closed[1], rtol=1e-9)
 
 
-def test_without_a_correlation_time_it_is_white():
+def test_noise_without_a_correlation_time_is_white():
     noise = parse_spec(LAG + ASKED + "noise: {standard_deviation: 0.2}\n").noise
     assert (noise.variance, noise.C, noise.D) == (pytest.approx(0.04), (1.0,), (1.0,))
 
 
-def test_the_true_noise_of_a_study_is_stated_alike():
+def test_the_true_noise_of_a_study_is_stated_with_the_same_keys():
     study = "simulation: {noise: {standard_deviation: 0.2, correlation_time: 30}}\n"
     found = parse_spec(LAG + ASKED + FADES + study).simulation.noise
     same = parse_spec(LAG + ASKED + "noise: {standard_deviation: 0.2, correlation_time: 30}\n").noise
     assert (found.variance, found.D) == (same.variance, same.D)
 
 
-def test_the_spec_keeps_the_words_and_can_be_read_again():
+def test_the_written_spec_keeps_the_stated_keys_and_can_be_read_again():
     spec = parse_spec(LAG + ASKED + FADES)
     assert "correlation_time: 60" in spec.to_yaml()
     assert "variance" not in spec.to_yaml()

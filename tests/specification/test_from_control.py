@@ -18,7 +18,7 @@ RATES = st.lists(st.floats(0.05, 20.0), min_size=1, max_size=5)
 
 
 def modes(rates, gains):
-    """Modes beside each other: the response is the sum of gain / (s + rate)."""
+    """Parallel modes: the response is the sum of gain / (s + rate)."""
     n = len(rates)
     return -np.diag(rates), np.ones((n, 1)), np.array([gains]), np.zeros((1, 1))
 
@@ -34,7 +34,7 @@ def response(entry, points):
 
 @settings(max_examples=20, deadline=None)
 @given(rates=RATES, seed=st.integers(0, 99), unit=st.sampled_from([1e-9, 1e-5, 1.0, 1e5, 1e9]))
-def test_the_response_is_that_of_the_states_in_every_unit_of_time(rates, seed, unit):
+def test_transfer_functions_have_the_response_of_the_states_in_every_unit_of_time(rates, seed, unit):
     """Coordinates are mixed, and time runs in units of `unit`."""
     rng = np.random.default_rng(seed)
     n = len(rates)
@@ -64,7 +64,7 @@ def test_the_response_is_that_of_the_states_in_every_unit_of_time(rates, seed, u
     ],
 )
 def test_neither_fast_nor_slow_systems_lose_zeros_or_poles(zeros, poles, unit):
-    """What was lost: leading coefficients small beside the last, and zeros near poles in rad/time_unit."""
+    """Small leading coefficients were lost, and zeros near poles in rad/time_unit."""
     gain = unit ** (len(poles) - len(zeros))
     above, below = (np.atleast_1d(np.poly(np.array(roots) * unit)) for roots in (zeros, poles))
     n = len(poles)
@@ -77,7 +77,7 @@ def test_neither_fast_nor_slow_systems_lose_zeros_or_poles(zeros, poles, unit):
     assert [len(part) for part in entry] == [len(zeros) + 1, len(poles) + 1]
 
 
-def test_a_slow_pole_of_samples_stays_beside_its_zero():
+def test_a_slow_discrete_pole_is_not_cancelled_by_a_nearby_zero():
     zero, pole = 0.9999999, 0.99999995
     ((entry,),) = transfer_functions(control.ss(control.zpk([zero], [pole, 0.5], 0.1, dt=1)))
     z = np.exp(1j * np.geomspace(1e-9, 3.0, 60))
@@ -110,9 +110,9 @@ def test_repeated_poles_go_to_the_entries_that_they_reach():
     ]
 
 
-def test_a_gain_alone_and_what_floats_cannot_hold():
+def test_a_pure_gain_is_converted_and_an_inaccurate_conversion_is_refused():
     assert transfer_functions(control.ss([], [], [], [[2.0]])) == [[([2.0], [1.0])]]
-    # Poles that the coefficients of a polynomial in z tell apart no more.
+    # Poles that the coefficients of a polynomial in z no longer distinguish.
     poles = [1 - k * 1e-6 for k in (1, 2, 3, 4)]
     states = control.ss(np.diag(poles), np.ones((4, 1)), np.ones((1, 4)), [[0.0]], 1.0)
     for system in (states, control.ss([[1e200, 1], [1, -1e200]], [[1.0], [1]], [[1.0, 1]], [[0.0]])):
@@ -153,13 +153,13 @@ def test_a_wrong_argument_of_from_control_is_named(system, name, arguments):
         assert one.hint or " must be " in one.message
 
 
-def test_places_count_as_in_python():
+def test_negative_places_in_a_matrix_count_from_its_end():
     spec = from_control(STATES, sample_time=0.1, parameters={"d": ("A", -1, np.int64(1)), "g": ["B", 1, 0]})
     assert build_model(spec).names == ("d", "g")
 
 
 def test_poles_at_zero_are_delays():
-    """z^-3 / (1 - 0.5 z^-1) has one parameter above and one below."""
+    """z^-3 / (1 - 0.5 z^-1) has one parameter in the numerator and one in the denominator."""
     assert build_model(from_control(control.tf([1], [1, -0.5, 0, 0], 1))).names == ("b3", "f1")
 
 
@@ -173,7 +173,7 @@ NO_DATA = [{1, 2}, 3j, b"x", object(), range(3), np.array([1j]), itself()]
 
 
 @pytest.mark.parametrize("value", NO_DATA, ids=[type(value).__name__ for value in NO_DATA])
-def test_what_no_file_could_hold_is_refused_by_name(value):
+def test_values_that_no_file_could_hold_are_refused_by_key(value):
     spec = from_control(HEATER)
     for key, call in (
         ("noise.variance", lambda: Spec.from_dict({"noise": {"variance": value}})),
@@ -183,7 +183,7 @@ def test_what_no_file_could_hold_is_refused_by_name(value):
         assert refused(call)[0].key.startswith(key)
 
 
-def test_keys_that_are_no_keys():
+def test_malformed_keys_are_refused():
     spec = from_control(HEATER)
     for call in (
         lambda: spec.with_(**{"title=x": 1}),

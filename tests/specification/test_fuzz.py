@@ -1,4 +1,4 @@
-"""Whatever the text, a spec is read or complained about; nothing else ever happens."""
+"""Any text is read as a spec or refused with diagnostics; nothing else happens."""
 
 from __future__ import annotations
 

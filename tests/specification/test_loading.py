@@ -1,4 +1,4 @@
-"""Good specs: what each says, its defaults, and what the other rooms ask of it."""
+"""Valid specs: their content, their defaults, and the places of their keys."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_factors_are_multiplied_and_variances_repeated():
     assert by_name("distillation_column").noise.covariance(2).tolist() == [[1e-10, 0.0], [0.0, 1e-10]]
 
 
-def test_defaults_that_depend_on_the_rest():
+def test_defaults_depend_on_the_rest_of_the_spec():
     open_loop = parse_spec(GOOD)
     assert (open_loop.cost.input_power, open_loop.cost.output_power) == (1.0, 0.0)
     assert open_loop.spectrum.type == "fir"
@@ -99,7 +99,7 @@ time_unit: min
 
 
 @pytest.mark.parametrize("extra", ALLOWED.splitlines())
-def test_what_the_contract_allows(extra):
+def test_valid_blocks_are_accepted_and_survive_writing(extra):
     spec = parse_spec(GOOD + extra + "\n")
     assert parse_spec(spec.to_yaml()).model_dump() == spec.model_dump()
 
@@ -131,7 +131,7 @@ BEST_ACCURACY = """\
         *(("best_accuracy", line) for line in BEST_ACCURACY.splitlines()),
     ],
 )
-def test_accuracy_of_the_contract(goal, accuracy):
+def test_valid_accuracies_are_accepted_and_set_the_goal(goal, accuracy):
     extra = f"limits: {{input_power: 1}}\naccuracy: {accuracy}\n"
     spec = parse_spec("plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\n" + extra)
     assert spec.goal == goal
@@ -146,7 +146,7 @@ def test_the_spec_is_frozen():
         spec.plant.B = (1.0,)
 
 
-def test_places_of_keys():
+def test_keys_are_located_by_line_and_column():
     text = "plant:\n  B: [0, 1]\n  F:\n    - 1\n    - -0.5\nnoise: {variance: 1}\n"
     text += "accuracy:\n  standard_deviation:\n    b3[1,2]: 0.5\n"
     spec = parse_spec(text, "my.yaml")
@@ -160,7 +160,7 @@ def test_places_of_keys():
         "plant.F[1]": (5, 7),
         "noise.variance": (6, 19),
         "accuracy.standard_deviation.b3[1,2]": (9, 14),
-        # What is absent is located at what would hold it.
+        # An absent key is located at the entry that would hold it.
         "plant.A": (1, 1),
         "plant.B[7]": (2, 6),
         "noise.C[0]": (6, 1),
@@ -170,7 +170,7 @@ def test_places_of_keys():
     assert spec.locate("plant.B").text == "  B: [0, 1]"
 
 
-def test_complaints_of_other_rooms_are_placed():
+def test_errors_raised_elsewhere_are_located_in_the_spec():
     spec = parse_spec(GOOD, "my.yaml")
     error = spec.complain("unstable-polynomial", "no good", hint="mend", key="plant.F")
     assert isinstance(error, SpecError)
@@ -184,7 +184,7 @@ def test_complaints_of_other_rooms_are_placed():
     assert placed.diagnostics[1] == bare.diagnostics[1]
 
 
-def test_the_fingerprint_sees_content_only():
+def test_the_fingerprint_depends_on_the_content_only():
     spec = parse_spec(GOOD)
     lines = GOOD.replace("variance: 1}", "variance: 1.0}").splitlines()
     assert parse_spec("\n".join(["# comment", *reversed(lines)])).sha256 == spec.sha256

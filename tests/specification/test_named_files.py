@@ -1,4 +1,4 @@
-"""Which texts of a spec name files, from which folder, and that a spec is kept to a folder if one asks."""
+"""Texts of a spec that name files, the folder they start from, and specs that are confined to a folder."""
 
 import os
 import re
@@ -98,7 +98,7 @@ def test_sweeps_and_watch_see_every_file(project, key, text):
 
 @pytest.mark.parametrize("name", ["secret.csv", "secret.yaml", "secret"])
 @pytest.mark.parametrize("key", ["accuracy.model_error.table", "uncertainty.covariance"])
-def test_nothing_is_shown_of_a_file_outside(project, key, name):
+def test_no_content_of_a_file_outside_the_folder_is_shown(project, key, name):
     (project.parent / name).write_text("frequency,r_adm,u,hunter2\n0,hunter2,1,1\nhunter2,1,1,1\n")
     found = refused(
         load_spec, project / "spec.yaml", [f"{key}={NAMING[key] % f'../{name}'}"], confine=project
@@ -111,7 +111,7 @@ def test_a_title_is_no_file(project, title):
     (project / "spec.yaml").write_text(f'title: "{title}"\n' + MODEL.replace("2", "1"))
     try:
         draft = read_template(project / "spec.yaml")
-    except SpecError:  # of the NUL
+    except SpecError:  # the title with a NUL
         return
     assert draft.files(draft.data) == []
     assert draft.digest(draft.data)
@@ -124,7 +124,7 @@ OUTSIDE = ["../r.csv", "{}/r.csv", "link.csv", "sub/../../r.csv", "/etc/passwd",
     ("key", "name"),
     [*((key, OUTSIDE[0]) for key in NAMING), *(("limits.spectrum.min", name) for name in OUTSIDE[1:])],
 )
-def test_a_spec_is_kept_to_a_folder(project, key, name):
+def test_a_confined_spec_names_no_file_outside_its_folder(project, key, name):
     setting = f"{key}={NAMING[key] % name.format(project.parent)}"
     for reading in (load_spec, read_template):
         found = {
@@ -139,7 +139,7 @@ def test_a_spec_is_kept_to_a_folder(project, key, name):
 
 
 @pytest.mark.parametrize("name", ["../more.yaml", "link.yaml", "/etc/passwd"])
-def test_what_is_included_is_kept_there_too(project, name):
+def test_a_confined_spec_includes_no_file_outside_its_folder(project, name):
     found = refused(load_spec, project / "spec.yaml", [f"include={name}"], confine=project)
     assert found[0].code == "file-outside"
     assert load_spec(project / "spec.yaml", ["include=more.yaml"], confine=project).experiment.samples == 7
@@ -153,7 +153,7 @@ SECRETS = [
 
 
 @pytest.mark.parametrize("text", SECRETS)
-def test_nothing_is_shown_of_an_included_file_that_holds_no_blocks(project, text):
+def test_no_content_of_an_included_file_without_blocks_is_shown(project, text):
     (project.parent / "secret.conf").write_bytes(text)
     assert "hunter2" not in repr(refused(load_spec, project / "spec.yaml", ["include=../secret.conf"]))
 
@@ -166,7 +166,7 @@ def test_a_pipe_is_not_waited_for(project):
 
 
 @pytest.mark.parametrize("written", ["r.csv", '"r.csv"', "sub/r.csv", "'a b.csv'"])
-def test_files_that_exist_are_named_from_the_new_folder(written, tmp_path):
+def test_a_relocated_spec_names_existing_files_from_its_new_folder(written, tmp_path):
     name, there = written.strip("\"'"), tmp_path / "runs" / "one"
     (tmp_path / "specs" / name).parent.mkdir(parents=True, exist_ok=True)
     (tmp_path / "specs" / name).touch()
@@ -178,7 +178,7 @@ def test_files_that_exist_are_named_from_the_new_folder(written, tmp_path):
     assert relocated(moved, there, tmp_path / "specs") == text
 
 
-def test_names_of_no_file_and_absolute_ones_stay(tmp_path):
+def test_a_relocated_spec_keeps_absolute_names_and_names_of_missing_files(tmp_path):
     (tmp_path / "r.csv").touch()
     for name in ("gone.csv", str(tmp_path / "r.csv")):
         text = f"accuracy: {{model_error: {{table: {name}}}}}\n"
@@ -186,7 +186,7 @@ def test_names_of_no_file_and_absolute_ones_stay(tmp_path):
 
 
 @pytest.mark.parametrize(("key", "text"), NAMING.items())
-def test_every_key_that_names_a_file_names_the_same_one_from_a_run_and_from_a_point(key, text, tmp_path):
+def test_every_key_names_the_same_file_from_a_run_and_from_a_point_of_a_sweep(key, text, tmp_path):
     table = tmp_path / "in" / "r.csv"
     table.parent.mkdir()
     table.touch()
@@ -204,6 +204,6 @@ def test_every_key_that_names_a_file_names_the_same_one_from_a_run_and_from_a_po
         assert (folder / name).samefile(table)
 
 
-def test_a_key_that_is_swept_has_no_other_value():
+def test_a_key_that_is_swept_may_not_have_another_value():
     settings = ["experiment.samples=100,200", "experiment.samples=300"]
     assert code_of(parse_settings, settings, kind=SpecError) == "sweep-twice"

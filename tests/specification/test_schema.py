@@ -31,7 +31,7 @@ def schema():
     return found
 
 
-def test_it_is_json_and_closed(schema):
+def test_the_schema_is_json_and_allows_no_other_keys(schema):
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
     whole, included, estimated = schema["anyOf"]
@@ -59,7 +59,7 @@ def test_it_is_json_and_closed(schema):
         "sample_time: 10\nsimulation: {noise: {standard_deviation: 1, correlation_time: 60}}",
     ],
 )
-def test_it_accepts_shorthands(extra, schema):
+def test_the_schema_accepts_shorthands(extra, schema):
     text = GOOD if "accuracy" not in extra else GOOD.rsplit("accuracy", 1)[0]
     assert accepts(read(text + extra, "x").data, schema)
 
@@ -83,7 +83,7 @@ def test_it_accepts_shorthands(extra, schema):
         GOOD + "sweep: {}",
     ],
 )
-def test_it_refuses(text, schema):
+def test_the_schema_refuses_invalid_specs(text, schema):
     assert not accepts(read(text, "x").data, schema)
 
 
@@ -126,7 +126,7 @@ PLANTS = [
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("plant", PLANTS)
-def test_the_schema_and_the_models_take_the_same_words(plant, schema):
+def test_the_schema_and_the_models_accept_the_same_plants(plant, schema):
     text = f"plant: {plant}\n{DESIGN}"
     assert accepts(read(text, "x").data, schema)
     spec = parse_spec(text)

@@ -35,7 +35,7 @@ FAMILIES = {
 
 
 def matrices(values):
-    """(n, r, r), of one input too."""
+    """The values as matrices (n, r, r), for one input too."""
     return values[:, None, None] if values.ndim == 1 else values
 
 
@@ -63,7 +63,7 @@ def of_gram(basis, Q):
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_integrals_are_those_of_the_density(name):
+def test_integrals_agree_with_quadrature_of_the_density(name):
     basis, experiment = FAMILIES[name]
     rng = np.random.default_rng(3)
     x = of_gram(basis, random_gram(basis, rng))
@@ -133,7 +133,7 @@ def test_enlarged_faces_keep_the_solution(hermitian):
     np.testing.assert_allclose(larger.columns @ residual, x, atol=1e-8 * np.abs(x).max())
 
 
-def test_lower_orders_are_heads():
+def test_functionals_of_a_lower_order_are_the_first_entries_of_a_higher_one():
     for basis in (FirBasis(2, 6), PolynomialBasis(2, 6, (0.0, 2.0), True)):
         experiment = DISCRETE if isinstance(basis, FirBasis) else PAPER
         lower = basis.of_order(2)
@@ -171,14 +171,14 @@ def test_vectors_of_matrices_keep_inner_products(vector, matrix, turn):
 
 @pytest.mark.parametrize("experiment", [PAPER, SINGLE], ids=["two inputs", "one input"])
 @pytest.mark.parametrize("free", [False, True])
-def test_atoms_pick_up_what_sinusoids_do_and_prices_bound_them(free, experiment):
+def test_added_atoms_attain_the_best_ratio_of_price_to_value(free, experiment):
     grid, r = graded_grid(experiment.singularities, 0.01, 2.0), experiment.inputs
     basis = LinesBasis.anywhere(0.01, 2.0, r) if free else LinesBasis.at(np.linspace(0.1, 2.0, 12), r)
     price, value = functionals(basis, experiment)
     assert basis.even.sum() == pytest.approx(1.0)
     pricing = basis.price(price, value, grid)
     grown, face = basis.enlarge(basis.first_face(price), np.zeros(0), pricing.directions, price)
-    if r > 1:  # of one input the first lines may hold the best already
+    if r > 1:  # for one input the first lines may contain the best one
         assert grown.size > basis.size
     assert face.order == grown.size
     larger = functionals(grown, experiment)
@@ -199,12 +199,12 @@ def test_flat_basis_prices_its_one_spectrum():
     assert basis.price(price, value, w).scale == pytest.approx(price.at(basis.even) / value.at(basis.even))
 
 
-def test_lines_pick_up_the_density_at_their_frequencies():
+def test_integrals_of_lines_are_the_density_at_their_frequencies():
     lines = LinesBasis.at(np.array([0.3, 1.0, 2.0]), 1)
     np.testing.assert_allclose(lines.integrals(lambda w: w**2, np.zeros(0)), [0.09, 1.0, 4.0])
 
 
-def test_each_frequency_is_judged_by_itself_and_one_without_a_price_is_left_out():
+def test_each_frequency_has_its_own_ratio_and_one_without_a_price_is_left_out():
     rng = np.random.default_rng(5)
     half = rng.standard_normal((6, 2, 3, 2)) @ np.array([1.0, 1.0j])
     price, value = (np.einsum("nij,nkj->nik", h, h.conj()) for h in (half, half[::-1]))
@@ -233,8 +233,8 @@ def test_ratios_do_not_depend_on_the_units_of_the_channels(unit):
     np.testing.assert_allclose(ratios, expected, rtol=1e-9)
 
 
-def test_a_dear_channel_does_not_make_a_cheap_one_dearer():
-    """By adding a share of what all cost to each, a bound on every spectrum was off by 2e6."""
+def test_an_expensive_channel_does_not_change_the_ratio_of_a_cheap_one():
+    """A share of the total price, added to each channel, once made a bound wrong by 2e6."""
     price, value = np.diag([1e30, 1.0])[None], np.diag([1e30, 2.0])[None]
     ratios, _ = best_directions(price, value)
     np.testing.assert_allclose(ratios, 2.0, rtol=1e-9)
@@ -252,5 +252,5 @@ def test_the_best_frequency_beside_one_that_costs_nothing_has_a_price(corner, ne
     grid = np.concatenate([[0.0], next_to_zero, np.geomspace(3e-6, np.pi, 400)])
     scale, peaks = directed_scale(price, value, grid)
     assert scale == pytest.approx(1.0, rel=1e-9)
-    # As good as zero itself, and as dear as that allows.
+    # The peak is as good as zero itself, at the highest price for which that holds.
     assert peaks[0] == pytest.approx(1e-5 * corner, rel=0.3)

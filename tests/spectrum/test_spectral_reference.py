@@ -50,7 +50,7 @@ def real():
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("criterion", ["E", "T", "A", "D"])
-def test_climbs_and_stays_below_the_optimum(real, criterion):
+def test_the_hill_climb_ascends_and_stays_below_the_optimum(real, criterion):
     problem = design(real, criterion)
     found = hill_climb(problem, 2, starts=1, rng=np.random.default_rng(0))
     history = np.array(found.histories[0])
@@ -59,7 +59,7 @@ def test_climbs_and_stays_below_the_optimum(real, criterion):
     bound = real.bound(x, criterion, weight)
     assert found.value <= bound + 1e-9 * abs(bound)
     assert abs(bound - found.value) <= 5e-3 * abs(bound)
-    # What it reports is what the factor attains.
+    # The reported value is attained by the factor.
     S = found.factor @ found.factor.T
     M = np.array([[np.sum(A * S) for A in row] for row in problem.maps])
     assert textbook_value(real.experiment.to_raw(M), criterion) == pytest.approx(found.value, rel=1e-9)
@@ -75,7 +75,7 @@ def test_a_factor_of_the_optimum_as_a_guess_loses_little_with_twice_the_columns(
     assert found.value == pytest.approx(real.value(x, "D"), abs=2e-2)
 
 
-def test_complex_factors_gain_over_real_ones():
+def test_complex_factors_reach_the_optimum_over_complex_spectra():
     complex_ = Spectral(paper_experiment(), PolynomialBasis(2, 3, (0.0, 2.0), True))
     found = hill_climb(design(complex_, "T"), 2, starts=1, rng=np.random.default_rng(3))
     x, _ = complex_.solve("T")

@@ -34,7 +34,7 @@ def started():
 
 
 def violations(page):
-    """What axe-core finds wrong on a page: rules and places."""
+    """The violations that axe-core finds on a page: rules and places."""
     from axe_playwright_python.sync_playwright import Axe
 
     found = Axe().run(page).response["violations"]

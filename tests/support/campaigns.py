@@ -29,13 +29,13 @@ GAIN, POLE = 3.5, 0.72
 def answered(
     u: np.ndarray, seed: int = 5, gain: float = GAIN, poles: tuple[float, ...] = (POLE,)
 ) -> np.ndarray:
-    """(n,): what the true plant answers to u (n,) from rest, with white noise of variance one."""
+    """The output (n,) of the true plant for u (n,) from rest, with white noise of variance one."""
     e = np.random.default_rng(seed).standard_normal(2000)[: len(u)]
     return lfilter([0.0, gain], np.poly(poles), u) + e
 
 
 def planned(directory: Path) -> np.ndarray:
-    """(n, 2): times and samples of all plans so far, one after the other."""
+    """Times and samples (n, 2) of all plans so far, one after the other."""
     parts = sorted(directory.glob("plan_*.csv"))
     return np.concatenate([np.loadtxt(part, delimiter=",", skiprows=1, ndmin=2) for part in parts])
 
@@ -47,7 +47,7 @@ def written(path: Path, times: np.ndarray, u: np.ndarray, y: np.ndarray) -> Path
 
 
 def applied(directory: Path, path: Path, scale: float = 1.0, **plant: object) -> Path:
-    """What is recorded of the part that comes next."""
+    """Apply the next part of a campaign to the true plant, and write its record."""
     times, u = planned(directory).T
     n = len(np.loadtxt(directory / "signal.csv", delimiter=",", skiprows=1, ndmin=2))
     y = answered(scale * u, **plant)
@@ -55,18 +55,18 @@ def applied(directory: Path, path: Path, scale: float = 1.0, **plant: object) ->
 
 
 def planner(text: str = SPEC, *overrides: str) -> Planner:
-    """What plans the parts of a spec."""
+    """The planner of the parts of a spec."""
     return build_planner(parse_spec(text, overrides=overrides))
 
 
 def record(samples: int = 200, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 1), (n, 1): white noise, and what the true plant answers."""
+    """White noise (n, 1), and the output (n, 1) of the true plant."""
     u = np.random.default_rng(seed).standard_normal(samples)
     return u[:, None], answered(u)[:, None]
 
 
 def stands(at: Planner, theta: Sequence[float] = (), share: float = 1.0, samples: int = 40) -> Standing:
-    """What plans are built on at some parameters, with a share of the information of a record."""
+    """The knowledge for the next plan at some parameters, with a share of the information of a record."""
     (u, y), model = record(samples), at.nominal.model
     model = model.at(np.array(theta), np.array([[1.0]])) if theta else model
     known = standing(at, model, lambda m: share * information_of_data(m, u, y), at.nominal.model)

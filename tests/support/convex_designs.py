@@ -1,4 +1,4 @@
-"""Convex designs for tests, also for several plants, and what holds of every one of them."""
+"""Convex designs for tests, also for several plants, and checks that every design must pass."""
 
 import dataclasses
 
@@ -82,7 +82,7 @@ def random_spectra(rng, order, number):
 
 
 def meets(requirements, information, most=1.0):
-    """Whether all hold at every frequency of a dense grid."""
+    """Assert that all requirements hold at every frequency of a dense grid."""
     for requirement in requirements:
         low, high = getattr(requirement, "band", BAND)
         w = DENSE[(low <= DENSE) & (high >= DENSE)]
@@ -126,7 +126,7 @@ def pole_form(Z, C):
 
 
 def resonant():
-    """A lightly damped OE system, where cheap inputs and quiet outputs are different things."""
+    """A lightly damped OE system, for which cheap inputs and quiet outputs need different spectra."""
     model = PolynomialModel.single([0, 1.0, 0.3], F=[1, -1.4, 0.81], variance=0.2)
     return Experiment(model, 300)
 

@@ -1,4 +1,4 @@
-"""Curves of every kind, as runs leave them and as they may be at worst; by what they are."""
+"""Curves of every kind by name: typical ones of runs, and extreme ones."""
 
 from dataclasses import replace
 
@@ -134,6 +134,6 @@ CURVES = {
 
 
 def lines_by_label(axes):
-    """What is drawn on axes, by its label in the legend."""
+    """The artists on axes, by their labels in the legend."""
     handles, labels = axes.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))

@@ -1,4 +1,4 @@
-"""Specs of a first-order Box-Jenkins plant, and what a wrong one is told."""
+"""Specs of a first-order Box-Jenkins plant, and their results."""
 
 from inputdesign_cli import parse_spec, solve
 

@@ -1,4 +1,4 @@
-"""A heater with a dead time, its records, and what a summary says of them."""
+"""A heater with a dead time, its records, and summaries of results."""
 
 from pathlib import Path
 

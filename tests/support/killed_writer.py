@@ -1,4 +1,4 @@
-"""Replaces a run by another, killed before each of its calls of the file system; prints what is left.
+"""Replace a run by another, killed before each of its file operations, and print the state after each.
 
     python -m tests.support.killed_writer FOLDER plain|folder
 
@@ -27,7 +27,7 @@ def a_run(mark: str) -> Results:
 
 
 def kill_at(step: int) -> None:
-    """From now on count what Python tells its auditors of files, and end without a word at the given one."""
+    """Count the audit events of files from now on, and kill this process at the given one."""
     left = [step]
 
     def hear(event: str, _arguments: tuple) -> None:

@@ -1,4 +1,4 @@
-"""What a loop must agree with, whatever its channels: brute force in time."""
+"""Checks of a loop of any number of channels against brute force in the time domain."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from inputdesign_cli.spectrum import FirBasis
 
 
 def check_information(experiment, from_r, from_e):
-    """Sums over time of the gradients (t, k, p, ..) that impulses of r and e cause, whatever excites."""
+    """Check the information against sums over time of gradients (t, k, p, ..) for impulses in r and e."""
     covariance, samples = experiment.model.covariance, experiment.samples
     inverse = np.linalg.inv(covariance)
     noise = np.einsum("tkpm,mn,pq,tlqn->kl", from_e, covariance, inverse, from_e, optimize=True)
@@ -22,7 +22,7 @@ def check_information(experiment, from_r, from_e):
 
 
 def check_signals(loop, simulated):
-    """The recursion over many runs against `simulated(model, r, e)`, sample by sample."""
+    """Check the signals of several runs against `simulated(model, r, e)`, sample by sample."""
     rng = np.random.default_rng(0)
     r = rng.standard_normal((2, 150, loop.model.inputs))
     e = rng.standard_normal((2, 150, loop.model.outputs))

@@ -14,7 +14,7 @@ TOTAL = (PowerLimit("input", 2.0),)
 
 
 def column(*, limits=TOTAL, white_noise=False, variance=1e-10):
-    """Errata: exact G_d of the gains; H = 1e-5/(z-a), or without its pole."""
+    """The column of docs/errata.md: exact G_d of the gains; H = 1e-5/(z-a), or without its pole."""
     B = (1 - POLE) * GAINS
     plant = matrix_plant(
         A=[[1.0, -POLE]],
@@ -27,7 +27,7 @@ def column(*, limits=TOTAL, white_noise=False, variance=1e-10):
 
 
 def matrix_plant(*, B, covariance, A=((1.0,),), F=None, C=((1.0,),), D=((1.0,),)):
-    """From plain numbers; A, C and D hold one polynomial for all outputs or one an output."""
+    """A plant from plain numbers; A, C and D hold one polynomial for all outputs or one for each."""
     A, C, D = (tuple(np.asarray(p, dtype=float) for p in rows) for rows in (A, C, D))
     F = F or [[[1.0] for _ in row] for row in B]
     B, F = (tuple(tuple(np.asarray(p, dtype=float) for p in row) for row in rows) for rows in (B, F))

@@ -7,7 +7,7 @@ SAMPLES = 800
 
 
 def loop(seed, law, *, steps=0.3, reported=0.0):
-    """u, y of a lag three samples late with AR noise; `law` makes what answers an error."""
+    """u, y of a lag with three samples of delay and AR noise; `law` makes the controller of the error."""
     rng = np.random.default_rng(seed)
     v = scipy.signal.lfilter([1], [1, -0.9], 0.05 * rng.standard_normal(SAMPLES))
     r = np.repeat(steps * rng.uniform(-1, 1, SAMPLES // 100), 100)
@@ -20,7 +20,7 @@ def loop(seed, law, *, steps=0.3, reported=0.0):
 
 
 def pid(gain, integral=0.0, derivative=0.0):
-    """A controller as it stands in textbooks, a sample at a time."""
+    """The PID controller of textbooks, a sample at a time."""
 
     def law():
         state = {"sum": 0.0, "last": 0.0}

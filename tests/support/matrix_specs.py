@@ -36,7 +36,7 @@ def changed(text, *overrides):
     return parse_spec(text, overrides=list(overrides))
 
 
-# Every polynomial, one of them common, and an entry that is zero.
+# Every polynomial of a Box-Jenkins model, D common to the outputs, and an entry that is zero.
 JENKINS = """
 plant:
   B: [[[0, 1.0], [0, 0.5]], [[0, 0, 0.7], [0]]]

@@ -1,4 +1,4 @@
-"""Pages of reports: the spec that most are of, strict reading, and their words."""
+"""Pages of reports: the spec of most pages, a strict parser, and the words of a page."""
 
 import re
 
@@ -30,7 +30,7 @@ def recorded(path):
 
 
 def parse(text):
-    """The page, which must be valid HTML; whatever points out of it is an error."""
+    """The page, which must be valid HTML; a reference to anything outside of it is an error."""
     page = html5lib.HTMLParser(strict=True).parse(text)
     assert [one.text for one in page.findall(f".//{XHTML}script")] == [script("hover.js")]
     for element in page.iter():

@@ -52,7 +52,7 @@ def process() -> ContinuousModel:
 
 
 def in_words(model) -> Reparametrised:
-    """It in K and T."""
+    """The model of `process` in the parameters K and T."""
     terms = tuple(map(Expression.of, ("K/T", "1/T", "T/5")))
     at = Parametrisation(("K", "T"), ("K", "T"), np.array([2.0, 3.3]), np.ones(2, dtype=bool), terms)
     return Reparametrised(model, at)
@@ -85,7 +85,7 @@ def two_by_two() -> ContinuousModel:
 
 
 def paper_experiment(power: float = 1000.0) -> Experiment:
-    """It on the half band [0, 2], whitened."""
+    """The experiment of the spectral design paper on the half band [0, 2], whitened."""
     return Experiment(two_by_two(), 1, (0.0, 2.0)).whitened(power)
 
 

@@ -1,4 +1,4 @@
-"""Random plants, loops and admissible errors with fixed seeds: the field on which designs are tried."""
+"""Random plants, loops and admissible errors with fixed seeds, for which designs are tried."""
 
 from __future__ import annotations
 
@@ -78,11 +78,11 @@ class Case:
     band: tuple[float, float]
 
     def experiment(self, samples: int | None = None) -> Experiment:
-        """Its experiment, of another length if one is given."""
+        """Return its experiment, of another length if one is given."""
         return Experiment(self.model, samples or self.samples, loop=self.loop)
 
     def requirement(self, experiment: Experiment) -> ModelError:
-        """Its accuracy, in the coordinates of an experiment."""
+        """Return its accuracy in the coordinates of an experiment."""
         return ModelError(
             experiment=experiment, band=self.band, entry=(0, 0), admissible=self.admissible, alpha=self.alpha
         )

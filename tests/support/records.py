@@ -1,4 +1,4 @@
-"""Simulated records, and what estimates from them must be."""
+"""Simulated records, and checks of gradients and estimates from them."""
 
 import numpy as np
 import scipy.signal

@@ -1,4 +1,4 @@
-"""What is refused, and how."""
+"""Calls that must be refused, and their diagnostics."""
 
 from collections.abc import Callable
 

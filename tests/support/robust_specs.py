@@ -1,4 +1,4 @@
-"""Specs of plants that are not known, and what is made of them."""
+"""Specs of uncertain plants, and their results."""
 
 from inputdesign_cli import parse_spec, solve
 from tests.support.first_order_specs import PLANT

@@ -1,4 +1,4 @@
-"""Spectra of signals, and what periodograms say of records."""
+"""Spectra of signals, and periodograms of records."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
-"""The spectral design by a plain cvxpy program, and the paper-free certificate: an oracle for the tests.
+"""The spectral design by a plain cvxpy program, and an independent certificate: an oracle for the tests.
 
-The certificate needs no program: phi* <= phi(M) + max over S of <grad, S> - <grad, M>, and the maximum is
-the minimum over mu in [0, 1] of the largest generalised eigenvalue of
-(Q, mu P_I / K_u + (1 - mu) P_O / K_y), Q = sum of grad_lm A_lm (docs/errata.md).
+The certificate needs no program: phi* <= phi(M) + max over S of <grad, S> - <grad, M>. The maximum is the
+minimum over mu in [0, 1] of the largest generalised eigenvalue of (Q, mu P_I / K_u + (1 - mu) P_O / K_y).
+Here Q = sum of grad_lm A_lm (docs/errata.md).
 """
 
 import warnings
@@ -40,7 +40,7 @@ class Spectral:
         self.raw = np.array([experiment.to_raw(m) for m in self.maps])
 
     def information(self, x):
-        """In raw parameters."""
+        """The information (k, k) in raw parameters."""
         return np.tensordot(x, self.raw, axes=1)
 
     def solve(self, criterion):
@@ -85,7 +85,7 @@ class Spectral:
         return x, weight
 
     def _generators(self):
-        """(n, order): all of them, orthonormal in the metric of the limits."""
+        """All generators of spectra (n, order), orthonormal in the metric of the limits."""
         whole = np.eye(self.basis.gram_order)
         if self.basis.hermitian:
             whole = np.concatenate([whole, 1j * whole], axis=1)

@@ -1,4 +1,4 @@
-"""A spec that is solved in milliseconds, and what a sweep has written."""
+"""A spec that is solved in milliseconds, and readers of the files of a sweep."""
 
 import csv
 import json

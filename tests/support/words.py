@@ -1,4 +1,4 @@
-"""One plant in several words: what does not depend on them."""
+"""A property of a plant that does not depend on how a spec states the plant."""
 
 import numpy as np
 

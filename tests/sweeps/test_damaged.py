@@ -1,4 +1,4 @@
-"""What an earlier call left is looked at before it is relied on; another sweep does not take its place."""
+"""Results of an earlier call are checked before they are used; another sweep does not replace them."""
 
 import json
 import os
@@ -32,7 +32,7 @@ def designed(tmp_path_factory):
 
 @pytest.fixture
 def swept(spec, designed, tmp_path):
-    """A copy of it, and the files of its first point."""
+    """A copy of the sweep of real designs, and the folder of its first point."""
     out = shutil.copytree(designed, tmp_path / "out")
     return out, out / rows(out)[0]["run"]
 
@@ -59,7 +59,7 @@ DAMAGES = {
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
+def test_a_damaged_point_is_computed_again_and_reported(name, swept, spec):
     out, run = swept
     whole, table = timeless_files(out), timeless_rows(out)
     DAMAGES[name](run)
@@ -75,7 +75,7 @@ def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
     assert run_sweep(spec, SETTINGS, directory=out).damaged == []
 
 
-def test_the_run_of_another_point_is_not_taken_for_that_of_this(swept, spec):
+def test_the_run_of_another_point_is_not_accepted(swept, spec):
     out, run = swept
     whole = timeless_files(out)
     shutil.rmtree(run)
@@ -109,7 +109,7 @@ def test_a_damaged_point_that_is_not_reached_has_no_row(spec, stub, tmp_path):
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("change", ["spec", "title", "keys", "more keys", "verb"])
-def test_another_sweep_does_not_take_the_place_of_one(change, spec, stub, tmp_path):
+def test_another_sweep_replaces_a_sweep_only_with_overwrite(change, spec, stub, tmp_path):
     out = tmp_path / "out"
     run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     other = tmp_path / "other.yaml"
@@ -132,7 +132,7 @@ def test_another_sweep_does_not_take_the_place_of_one(change, spec, stub, tmp_pa
     assert (out / "sweep.csv").read_bytes() != before["sweep.csv"]
 
 
-def test_the_same_spec_goes_on_under_another_name_and_when_it_was_edited(spec, stub, tmp_path):
+def test_a_sweep_goes_on_from_a_copy_of_its_spec_and_an_edited_spec_replaces_it(spec, stub, tmp_path):
     out = tmp_path / "out"
     run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     copy = tmp_path / "copy.yaml"
@@ -155,7 +155,7 @@ def whole_points(out):
 
 
 def kill_at_random(spec, out, points, kills, seed):
-    """Start the sweep `kills` times and kill it each time; how many points stood at each kill."""
+    """Start the sweep `kills` times and kill it each time; return the number of points at each kill."""
     rng = random.Random(seed)
     stood = []
     for kill in range(kills):
@@ -173,7 +173,7 @@ def kill_at_random(spec, out, points, kills, seed):
             if kill % 2:
                 os.killpg(process.pid, signal.SIGKILL)
             else:
-                process.kill()  # its workers must find out by themselves
+                process.kill()  # its workers must notice that
         stood.append(len(whole_points(out)))
     return stood
 

@@ -1,4 +1,4 @@
-"""A sweep runs every point once, notes what fails, and never mixes with anything else; also from Python."""
+"""A sweep runs every point once, records failures, and never mixes with other files; also from Python."""
 
 import hashlib
 import itertools
@@ -53,8 +53,8 @@ def test_every_point_is_a_row_and_a_run(spec, stub, drawn, tmp_path):
     assert {path.name for path in out.iterdir()} == kept
 
 
-def test_what_is_known_is_not_computed_again(spec, stub, tmp_path):
-    """By a second call, by the spec that the sweep wrote, by values that say the same; a wider one adds."""
+def test_points_with_a_result_are_not_computed_again(spec, stub, tmp_path):
+    """A second call, the written spec and equal values compute nothing; a wider sweep adds points."""
     out = tmp_path / "out"
     run_sweep(spec, [*TWO, "noise.variance=2"], directory=out)
     before = timeless_files(out)
@@ -91,7 +91,7 @@ def test_a_failure_that_is_mended_leaves_no_trace(spec, stub, tmp_path, monkeypa
     assert list((out / "failures").iterdir()) == []
 
 
-def test_fail_fast_stops_and_keeps_what_is_done(spec, stub, tmp_path):
+def test_fail_fast_stops_and_keeps_the_finished_points(spec, stub, tmp_path):
     out = tmp_path / "out"
     for _ in range(2):
         with pytest.raises(InfeasibleError):
@@ -113,7 +113,7 @@ def test_an_interrupt_leaves_a_table(spec, stub, tmp_path):
 
 
 def test_an_edited_data_file_is_another_point(tmp_path, stub, monkeypatch):
-    """Of a file of a spec, and of a spec in memory, which names files from its folder."""
+    """This holds for a spec in a file and for one in memory, which names files from its folder."""
     text, table, out = SPEC.replace("{relative: 0.1}", "{table: r.csv}"), tmp_path / "r.csv", tmp_path / "out"
     (tmp_path / "t.yaml").write_text(text)
     stated = parse_spec(text, folder=tmp_path)
@@ -146,7 +146,7 @@ with opened(Path(sys.argv[1])):
 
 
 def test_a_directory_is_swept_by_one_process_at_a_time(spec, stub, tmp_path):
-    """What a process that was killed there has left half-written is removed."""
+    """Half-written files of a killed process are removed."""
     out = tmp_path / "out"
     with running([sys.executable, "-c", HOLD, str(out)], stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout.readline() == "held\n"
@@ -171,7 +171,7 @@ def test_the_table_holds_short_lists_and_the_fewest_digits():
 
 
 @pytest.mark.slow
-def test_processes_give_what_one_process_gives(spec, tmp_path):
+def test_two_processes_give_the_results_of_one(spec, tmp_path):
     settings = ["experiment.samples=50,100,-1", "spectrum.order=1,2"]
     run_sweep(spec, settings, directory=tmp_path / "one")
     run_sweep(spec, settings, directory=tmp_path / "two", executor=Processes(2))
@@ -202,7 +202,7 @@ def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):
     ],
 )
 def test_a_worker_writes_nothing_but_the_files_of_a_run(tmp_path, files):
-    """Nor where its name is an absolute path."""
+    """Parent folders, absolute paths, texts and incomplete runs are refused."""
     outside = {
         n.format(outside=tmp_path) if isinstance(n, str) else n: content for n, content in files.items()
     }
@@ -221,8 +221,8 @@ def test_a_layout_reads_results_before_failures(tmp_path):
     assert layout.read("k") == result
 
 
-def test_no_public_name_is_that_of_a_module():
-    """A module that is imported takes the place of the function of its name."""
+def test_no_public_function_has_the_name_of_a_module():
+    """An imported module would replace a function of the same name."""
     modules = {module.name for module in pkgutil.iter_modules(inputdesign_cli.__path__)}
     assert modules & {name for name in inputdesign_cli.__all__ if name != "__version__"} == set()
 
@@ -265,7 +265,7 @@ def test_a_file_and_a_spec_give_the_same_frame(spec, stub, tmp_path):
         ("a=it's,b", ("it's", "b")),
     ],
 )
-def test_values_of_a_setting(setting, values):
+def test_a_setting_is_split_into_its_values(setting, values):
     """A single value holds for all points."""
     single = ["b=1", "c=[1, 2]", "d=x = y"]
     assert parse_settings([*single, setting]) == (single, [SweepAxis("a", values)])
@@ -281,8 +281,8 @@ def test_values_of_a_setting(setting, values):
      ("title=0:1000:1 experiment.samples=1:1000:1", "sweep-too-large"), ("spectrum.ordr=1,2", "unknown-key"),
      ("verb=divine", "not-supported")],
 )  # fmt: skip
-def test_sweeps_that_are_refused(settings, code, spec, stub):
-    """Values are taken side by side where their numbers differ."""
+def test_invalid_sweeps_are_refused_before_anything_is_computed(settings, code, spec, stub):
+    """Lists of different lengths are refused in a zipped sweep only."""
     verb, zipped = ("divine" if "divine" in settings else "solve"), code == "sweep-lengths"
     found = refused(build_plan, spec, settings.split() if verb == "solve" else TWO, verb=verb, zipped=zipped)
     assert (found[0].code, stub) == (code, [])
@@ -294,13 +294,13 @@ def test_a_grid_is_the_product_of_its_axes(lengths):
     assert Grid(tuple(axes)).points == list(itertools.product(*(axis.values for axis in axes)))
 
 
-def test_a_zipped_grid_goes_side_by_side():
+def test_a_zipped_grid_takes_values_side_by_side():
     grid = build_grid(None, [SweepAxis("a", ("1", "2")), SweepAxis("b", ("3", "4"))], zipped=True)
     assert grid.points == [("1", "3"), ("2", "4")]
     assert grid.overrides(1) == ["a=2", "b=4"]
 
 
-def test_the_block_of_a_spec_and_the_command_line():
+def test_settings_of_the_command_line_replace_settings_of_the_sweep_block():
     block = Sweep.model_validate({"set": {"a": [1, "white", {"type": "fir"}], "b": "0:0.2:0.1"}})
     grid = build_grid(block, [], zipped=False)
     assert [axis.values for axis in grid.axes] == [("1", "white", '{"type": "fir"}'), ("0", "0.1", "0.2")]
@@ -314,7 +314,7 @@ def test_the_block_of_a_spec_and_the_command_line():
     assert plan.draft.spec(plan.grid.overrides(0)).spectrum.order == 3
 
 
-def test_a_trade_starts_from_the_changed_spec_and_pays_no_attention_to_its_sweep(tmp_path):
+def test_a_trade_starts_from_the_changed_spec_and_ignores_its_sweep_block(tmp_path):
     file, changes = tmp_path / "x.yaml", ["experiment.samples=8", "limits.input_power=1"]
     file.write_text(SPEC + "sweep: {set: {spectrum.order: [2, 4]}}\n")
     plan = trade_plan(file, load_spec(file, changes), ["samples"], changes, None)
@@ -335,6 +335,6 @@ def test_a_trade_starts_from_the_changed_spec_and_pays_no_attention_to_its_sweep
         ("sett: {a: [1]}", "unknown-key", "sweep.sett"),
     ],
 )
-def test_a_bad_block_is_a_complaint_of_the_spec(block, code, key):
+def test_errors_in_a_sweep_block_are_reported_with_key_and_line(block, code, key):
     diagnostic = refused(parse_spec, f"{SPEC}sweep: {{{block}}}\n", "x.yaml")[0]
     assert (diagnostic.code, diagnostic.key, diagnostic.location.line) == (code, key, 8)

@@ -1,4 +1,4 @@
-"""Goals against each other and plain programs, published examples, and proofs that nothing is feasible."""
+"""Design goals against each other, plain programs and published examples, and proofs of infeasibility."""
 
 import dataclasses
 
@@ -68,8 +68,8 @@ def test_enough_prior_information_needs_no_excitation(first_order):
     assert (solution.white_power, solution.result.objective) == (0.0, 0.0)
 
 
-def test_limits_cost_something_where_they_bind(first_order):
-    """A floor above what the optimum gives binds, and costs; one below, or a high cap, does not."""
+def test_a_power_limit_raises_the_cost_only_where_it_binds(first_order):
+    """A lower limit above the optimal power raises the cost; a lower one, or a high upper limit, does not."""
     plain = solve(first_order, requirements=relative())
     roomy = solve(first_order, requirements=relative(), limits=[PowerLimit("input", 10.0)])
     assert roomy.result.objective == plain.result.objective
@@ -86,7 +86,7 @@ def test_limits_cost_something_where_they_bind(first_order):
     assert high.problem.power("output").at(high.result.x) == pytest.approx(1.5 * power, rel=1e-6)
 
 
-def test_the_shadow_price_is_the_slope():
+def test_the_multiplier_of_a_limit_is_the_slope_of_the_cost():
     """The multiplier of a limit is minus the derivative of the cost with respect to it."""
     experiment, asked = resonant(), relative(0.1)
     quiet = optimum(experiment, requirements=asked, cost={"output": 1.0})
@@ -101,15 +101,15 @@ def test_the_shadow_price_is_the_slope():
     assert np.mean(prices) == pytest.approx(-slope, rel=1e-3)
 
 
-def test_ellipsoid_needs_more_than_the_linearisation(first_order):
-    """A third of |G| is far from linear: the exact region costs more; one per cent barely differs."""
+def test_the_exact_ellipsoid_costs_slightly_more_than_the_linearisation(first_order):
+    """With r_adm = 0.01 |G| the exact region costs more than the linear one, by less than 5 %."""
     exact = solve(first_order, requirements=relative(kind=EllipsoidError))
     check(exact)
     linear = optimum(first_order, requirements=relative(kind=ModelError))
     assert linear < exact.result.objective < 1.05 * linear
 
 
-def test_application_example_of_the_peer():
+def test_application_example_of_moose2():
     """y = 10 u(t-1) - 9 u(t-2) + e: chi2(0.95, 2) * 100 / 2 * 2 = N c_0 for b2, by hand 1.1982929."""
     experiment = Experiment(PolynomialModel.single([0, 10.0, -9.0]), 500)
     target = 5.991464547107979 * 100 / 2 * np.diag([0.0, 2.0])
@@ -120,7 +120,7 @@ def test_application_example_of_the_peer():
 
 
 @pytest.mark.parametrize(("letter", "value"), [("A", -1.0412035), ("E", 1.0), ("D", 4.6912898)])
-def test_criteria_of_the_peer(letter, value):
+def test_criteria_of_the_moose2_example(letter, value):
     experiment = Experiment(PolynomialModel.single([1.0], A=[1, 0.95]), 1)
     design = solve(experiment, "factor", criterion(letter), order=19, limits=[PowerLimit("input", 1.0)])
     check(design)
@@ -130,8 +130,8 @@ def test_criteria_of_the_peer(letter, value):
         assert ours.value(1 / design.any_spectrum.objective) == pytest.approx(4.7488407, rel=1e-5)
 
 
-def test_weighted_variance_example_of_the_peer():
-    """At every frequency 0.8726511; on the peer's grid of 100 points 0.5692322."""
+def test_weighted_variance_example_of_moose2():
+    """The cost is 0.8726511 at every frequency, and 0.5692322 on the grid of 100 points of MOOSE2."""
     A = [1, -1.99185, 2.20265, -1.84083, 0.89413]
     experiment = Experiment(PolynomialModel.single([0, 0, 0, 0.10276, 0.18123], A=A, variance=0.05), 500)
     asked = {"band": (0.0, np.pi), "entry": (0, 0), "limit": 0.01, "relative": True}
@@ -148,9 +148,9 @@ def test_weighted_variance_example_of_the_peer():
 
 
 @pytest.mark.parametrize("alone", [False, True])
-def test_what_is_out_of_reach_is_proved(first_order, alone):
-    """Half the least power: limits must be doubled. Of limits alone: input power times the peak of |G|^2 is
-    the most output power there is.
+def test_the_factor_by_which_limits_must_be_loosened_is_proved(first_order, alone):
+    """Half the least power must be doubled. Two limits contradict each other if the output power exceeds the
+    input power times the peak of |G|^2, 144.
     """
     limits = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
     more = {"basis": anywhere()} if alone else {}
@@ -200,7 +200,7 @@ def test_criteria_agree_with_a_plain_program(letter):
 
 @pytest.mark.slow
 def test_capped_least_cost_agrees_with_a_plain_program():
-    """A cost that pulls one way and a limit that pulls the other: input cost under a cap on the output."""
+    """The input power is least under an upper limit on the output power, which binds."""
     experiment, kind, order = resonant(), "output", 10
     free = solve(experiment, requirements=relative(0.1), order=order)
     quiet = solve(experiment, requirements=relative(0.1), order=order, cost={"output": 1.0})
@@ -225,7 +225,7 @@ def test_capped_least_cost_agrees_with_a_plain_program():
 
 
 def test_density_limits_agree_with_a_plain_program(first_order):
-    """Upper and lower bounds on Phi at every frequency against 400 rows of them."""
+    """Bounds on Phi from above and below at every frequency agree with bounds at 400 frequencies."""
     upper = DensityLimit(lambda w: 1.5 + 0.5 * np.cos(w), np.linspace(0.0, np.pi, 300))
     lower = DensityLimit(lambda w: np.full(np.shape(w), 0.02), np.linspace(0.0, np.pi, 300), upper=False)
     design = solve(first_order, requirements=relative(0.02), densities=[upper, lower])
@@ -261,13 +261,13 @@ spectrum: {type: fir, order: 2}
 
 
 def asked(gain, deviation):
-    """The input in a unit of its own; what is known of c1 and f1 hangs together."""
+    """The question with its input in another unit; the prior correlates c1 and f1."""
     text = COLOURED % (gain, 50.0 / gain**2, 50.0, deviation)
     return build_convex(parse_spec(text)).asked.question
 
 
 @pytest.mark.parametrize("gain", [1e-6, 1.0, 1e6])
-def test_what_only_the_noise_tells_is_out_of_reach_in_any_units(gain):
+def test_an_accuracy_that_no_input_power_reaches_is_refused_in_any_units(gain):
     """Where b1 and f1 are known, var c1 = 1 / (100 + N): the ratio that stays is 1 / (sqrt(500) 0.03)."""
     question = asked(gain, 0.03)
     complaints = refused(least_white_power, question.experiment, question.requirements, kind=InfeasibleError)

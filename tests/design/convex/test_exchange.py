@@ -40,7 +40,7 @@ QUICK = [1, 4, 6, 9]
 
 @pytest.mark.first(4)
 @pytest.mark.parametrize("seed", [*QUICK, *sorted({*range(240)} - {*QUICK})])
-def test_random_plants(seed):
+def test_designs_for_random_plants_meet_requirements_with_a_closed_gap(seed):
     case = random_case(seed)
     found = solve(case.experiment(), "cost", [case.requirement], case.order, cost=case.cost)
     check(found, 1e-5)
@@ -62,8 +62,8 @@ def test_grid_program_agrees_where_the_grid_holds_the_active_frequencies(first_o
     assert answer.certificate.bound == pytest.approx(solution.result.objective, rel=1e-4)
 
 
-def test_plain_grids_on_a_resonant_plant(flexible):
-    """With several active frequencies on it the grid program agrees; 1000 points alone are too few."""
+def test_a_grid_of_1000_points_underestimates_the_cost_of_a_resonant_plant(flexible):
+    """The grid program agrees if its grid holds the active frequencies; 1000 other points are too few."""
     factories = relative(0.25, 3.55, (1e-3, np.pi))
     solution = solve(flexible, "cost", factories, 10, cost={"input": 1.0, "output": 1.0})
     active = solution.result.active_frequencies
@@ -96,7 +96,7 @@ def test_certificate_holds_for_random_spectra(first_order, plants):
     anything = solution.any_spectrum.certificate
     ratio = anything.value.density(DENSE) / anything.price.density(DENSE)
     assert ratio.max() == pytest.approx(1.0, abs=1e-6)
-    if not plants:  # one at the sinusoid of the design
+    if not plants:  # the ratio is one at the best sinusoid
         assert DENSE[ratio.argmax()] == pytest.approx(0.1553, abs=1e-3)
         assert solution.any_spectrum.objective == pytest.approx(0.001925467, rel=1e-6)
 
@@ -113,7 +113,7 @@ def test_richer_spectra_cost_less(first_order):
     assert costs[-1] >= white.any_spectrum.certificate.bound
 
 
-def test_scaling_laws(first_order):
+def test_the_cost_scales_with_variance_samples_fraction_alpha_and_price(first_order):
     """Box-Jenkins without noise information on G: cost goes as variance / N and as (alpha / fraction)^2."""
     base = least(first_order, 6)
     louder = dataclasses.replace(first_order.model, covariance=np.array([[4.0]]))
@@ -128,8 +128,8 @@ def test_scaling_laws(first_order):
 
 
 @pytest.mark.slow
-def test_sixteen_parameters():
-    """An output-error plant of order 8; the face once shrank to what the last round used, and cycled."""
+def test_a_plant_with_sixteen_parameters_is_designed_to_a_closed_gap():
+    """An output-error plant of order 8, for which a face that shrank too much once made the method cycle."""
     rng = np.random.default_rng([1, 8])
     roots = rng.uniform(0.5, 0.9, 4) * np.exp(1j * rng.uniform(0.2, 2.9, 4))
     F = np.poly(np.concatenate([roots, roots.conj()])).real
@@ -142,12 +142,12 @@ def test_sixteen_parameters():
     assert design.result.gap <= 1e-6
     assert design.any_spectrum.gap <= 1e-3
     assert design.problem.demands.worst_ratio(design.result.informations).ratio <= 1.0 + 1e-9
-    # Any frequencies at all make a relaxation: a plain bound by the active ones holds.
+    # The design over every spectrum is a relaxation: its bound is at most the cost.
     assert design.any_spectrum.certificate.bound <= design.result.objective
 
 
 def random_plant(rng):
-    """2 x 2, entries of second order, poles within a decade of 1 rad/s."""
+    """A 2 x 2 plant of second-order entries with natural frequencies within half a decade of 1 rad/s."""
     size = (2, 2)
     numerator = [[[rng.uniform(0.5, 5.0)] for _ in range(2)] for _ in range(2)]
     denominator = np.empty((*size, 3))
@@ -158,7 +158,7 @@ def random_plant(rng):
 
 
 def case(seed):
-    """The plant of the paper, or a random one: its model, band, order, criterion, whether complex."""
+    """The plant of the paper, or a random one: model, band, order, criterion, and whether S is complex."""
     if seed is None:
         return two_by_two(), (0.0, 2.0), 40, "E", False
     rng = np.random.default_rng(seed)
@@ -169,7 +169,7 @@ def case(seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [None, *range(12)])
-def test_plants_bands_orders_and_criteria_of_two_inputs(seed):
+def test_criteria_of_two_inputs_have_a_closed_gap_and_a_positive_spectrum(seed):
     model, band, order, criterion, hermitian = case(seed)
     question = Question(
         Experiment(model, 1, band),

@@ -1,4 +1,4 @@
-"""Finite programs: the interior-point method against Clarabel, and linear ones of lines against cvxpy."""
+"""Finite programs: the interior-point method against Clarabel, and programs of lines against cvxpy."""
 
 import dataclasses
 
@@ -98,8 +98,8 @@ def random_program(rng, kind, cuts, goal):
 @pytest.mark.parametrize("goal", ["cost", "factor"])
 @pytest.mark.parametrize("kind", ["nonnegative", "psd"])
 @pytest.mark.parametrize("name", CUTS)
-def test_both_methods_agree(name, kind, goal):
-    """The optimum, the multipliers of cuts (as what they prove) and those of limits."""
+def test_the_interior_point_method_agrees_with_clarabel(name, kind, goal):
+    """The optimum, the inequalities that the cuts prove, and the multipliers of limits are compared."""
     rng = np.random.default_rng(3)
     program = random_program(rng, kind, CUTS[name](rng), goal)
     reference = by_cones(program, tolerance=1e-9)
@@ -128,8 +128,8 @@ def test_multipliers_prove_the_optimum(name):
     assert proved == pytest.approx(program.cost @ found.v, rel=1e-6)
 
 
-def test_information_in_blocks_is_the_same_program():
-    """Two plants side by side: entries of M between them are left out, and change nothing."""
+def test_both_methods_agree_on_block_diagonal_information():
+    """Two plants side by side: the entries of M between them are zero."""
     rng = np.random.default_rng(5)
     program = random_program(rng, "nonnegative", [MatrixCut(np.diag([1.0, 2.0, 1.0, 0.5, 1.0]))], "cost")
     apart = np.ones((K, K))
@@ -151,7 +151,7 @@ def random_problem(seed, *, floors):
     rows = rng.uniform(0.0, 2.0, (caps + floors, n))
     rows[:, rng.integers(n)] += 0.1
     used = rows @ needed
-    # Floors that proportional powers within the caps just miss or just meet.
+    # Proportional powers within the upper limits just miss or just meet the lower limits.
     bounds = [*(used[:caps] * rng.uniform(1.5, 4.0, caps)), *(used[caps:] * rng.uniform(0.5, 1.6, floors))]
     limits = [PowerLimit("output", float(b), i < caps, i) for i, b in enumerate(bounds)]
     return ResponseProblem(needed, price, tuple(limits), rows)
@@ -160,7 +160,7 @@ def random_problem(seed, *, floors):
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("floors", [0, 2])
 @pytest.mark.parametrize("design", [cheapest, most_accurate])
-def test_the_best_lines_are_those_of_a_plain_program(seed, floors, design):
+def test_the_best_lines_agree_with_a_plain_program(seed, floors, design):
     cheap = design is cheapest
     problem = random_problem(seed if cheap else 100 + seed, floors=floors)
     found = design(problem)
@@ -186,7 +186,7 @@ def test_without_limits_every_line_just_meets_its_bound():
     assert lines.ratios(lines.deviations(needed, 100)) == pytest.approx(1.0)
     problem = ResponseProblem(needed.ravel(), np.ones(3), (), np.zeros((0, 3)))
     assert cheapest(problem).powers == pytest.approx(needed.ravel())
-    # Of several outputs the worst sets the power of the lines of an input.
+    # The worst of several outputs sets the power of the lines of an input.
     admitted = np.array([[[0.1, 1.0], [0.2, 0.1]]])
     lines = ResponseLines(np.ones((1, 2, 2)) + 0j, np.array([[1.0, 4.0]]), admitted)
     needed = lines.needed(200)
@@ -194,7 +194,7 @@ def test_without_limits_every_line_just_meets_its_bound():
     assert lines.ratios(lines.deviations(needed, 200)) == pytest.approx(1.0)
 
 
-def test_limits_that_are_too_tight_say_by_how_much_and_contradictory_ones_by_no_end():
+def test_tight_limits_report_a_factor_and_contradictory_limits_an_infinite_one():
     limit = PowerLimit("input", 1.0)
     problem = ResponseProblem(np.array([1.0, 3.0]), np.ones(2), (limit,), np.ones((1, 2)))
     with pytest.raises(UnreachableError) as caught:

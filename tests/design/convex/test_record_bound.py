@@ -40,7 +40,7 @@ def designed(plant, samples, accuracy, objective="best_accuracy", **more) -> Des
 
 
 def worst_of(design: Design, samples: int) -> PlantGoal:
-    """Return what ranks records of this length."""
+    """Return the goal that ranks records of this length."""
     plant = FiniteRecord(replace(design.problem.experiment, samples=samples), samples)
     return PlantGoal(plant, design.problem.requirements)
 
@@ -63,7 +63,7 @@ PLANTS = [
 
 
 @pytest.mark.parametrize(("plant", "accuracy"), PLANTS)
-def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
+def test_the_bound_holds_for_all_records_and_the_search_finds_the_best(plant, accuracy):
     samples = 7
     design = designed(plant, samples, accuracy)
     bound = bound_over_records(design.problem, design.any_spectrum, samples, windows=6)
@@ -80,7 +80,7 @@ def test_no_record_is_better_and_the_search_finds_the_best(plant, accuracy):
     assert goal.worst(goal.plant.information(record)) == pytest.approx(ratio, rel=1e-9)
 
 
-def test_held_values_have_a_bound_of_their_own():
+def test_the_bound_for_held_values_holds_for_all_records():
     hold, values = 3, 8
     design = designed({"B": [0, 0.4], "F": [1, -0.9]}, hold * values, ERROR)
     bound = bound_over_records(design.problem, design.any_spectrum, hold * values, windows=8, hold=hold)
@@ -107,7 +107,7 @@ def test_fewer_samples_than_the_bound_do_not_suffice():
     assert best_of_all(worst_of(factor, fewer), fewer) > 1.0
 
 
-def test_two_inputs():
+def test_the_bound_holds_for_all_records_of_two_inputs():
     plant = {"B": [[[0, 1.0], [0, 0.5]]], "F": [[[1, -0.5], [1, 0.3]]]}
     design = designed(plant, 4, {"criterion": "D"})
     bound = bound_over_records(design.problem, design.any_spectrum, 4, windows=3)
@@ -135,7 +135,7 @@ def test_a_record_shorter_than_the_longest_run_is_searched():
     assert found == pytest.approx(best_of_all(goal, 5), rel=1e-9)
 
 
-def test_there_is_none_in_a_loop():
+def test_there_is_no_record_bound_in_closed_loop():
     more = {"experiment": {"samples": 50, "controller": {"numerator": [0.2]}}}
     design = designed({"B": [0, 0.63], "F": [1, -0.5]}, 50, ERROR, **more)
     assert bound_over_records(design.problem, design.any_spectrum, 50, windows=8) is None
@@ -159,7 +159,7 @@ def _random_form(length: int, inputs: int, seed: int) -> Array:
 @pytest.mark.parametrize(
     ("inputs", "length", "samples"), [(1, 2, 5), (1, 4, 11), (1, 9, 6), (1, 5, 1), (2, 3, 5)]
 )
-def test_largest_sum_is_that_of_all_records(inputs: int, length: int, samples: int) -> None:
+def test_the_largest_form_agrees_with_enumerated_records(inputs: int, length: int, samples: int) -> None:
     windows = Windows.within(np.array([1.5, 0.5])[:inputs], length)
     form = _random_form(length, inputs, length)
     largest, record = windows.largest_sum(form, samples)
@@ -212,8 +212,8 @@ def output_error_plant(rng):
     return {"B": [0.0, *rng.standard_normal(order).tolist()], "F": np.real(np.poly(poles)).tolist()}
 
 
-def test_no_pseudo_random_sequence_is_better_than_the_best_start():
-    """Whatever the register and the clock, also where the record holds a part of the sequence only."""
+def test_the_search_starts_from_the_best_pseudo_random_sequences():
+    """Registers of 2 to 9 bits at four clocks are ranked; a record may hold only a part of the sequence."""
     design = designed(PLANTS[0][0], 30, ERROR)
     goal = worst_of(design, 30)
     search = FlipSearch([goal, goal], np.array([[-1.0], [1.0]]), 30)
@@ -230,7 +230,7 @@ def test_no_pseudo_random_sequence_is_better_than_the_best_start():
 
 @pytest.mark.slow
 def test_the_search_finds_the_best_of_all_records_of_most_plants():
-    """Of 2^9 records of ten samples the best few on a grid are compared at every frequency."""
+    """All 2^9 records of ten samples are ranked on a grid, and the best 20 at every frequency."""
     samples, found = 10, 0
     every = np.array([(1.0, *rest) for rest in product((-1.0, 1.0), repeat=samples - 1)])
     for seed in range(50):

@@ -1,4 +1,4 @@
-"""Designs that serve several plants: copies change nothing, more cost no less, the certificate is a proof."""
+"""Designs for several plants against plain programs, with their certificates and the bounds on their risk."""
 
 import dataclasses
 from math import comb
@@ -34,7 +34,7 @@ def question(experiment, others=(), *, goal="cost", order=8, fraction=0.1, **mor
     ],
 )
 def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, paid):
-    """Paid for by the power of the output too, which is that of each plant."""
+    """The cost includes the output power, which each plant has of its own."""
     experiment = dataclasses.replace(first_order, samples=1) if goal == "samples" else first_order
     limits, goal = [] if goal == "cost" else [PowerLimit("output", 1.0)], goal.replace("capped", "cost")
     stated = question(experiment, cost={"input": 1.0, "output": 1.0}, goal=goal, limits=limits)
@@ -81,8 +81,8 @@ def test_the_design_agrees_with_a_plain_program(first_order, paid):
 LAG = "plant: {parameters: {theta: 1}, continuous: {numerator: [theta], denominator: [1, theta]}}\n"
 
 
-def test_one_constant_between_a_tenth_and_ten():
-    """Four lines for the worst relative variance 1 / (theta^2 M) of unit power; by hand 12.69."""
+def test_the_robust_input_for_a_time_constant_between_a_tenth_and_ten_has_four_lines():
+    """The worst relative variance 1 / (theta^2 M) at unit power is 12.69, computed by hand."""
 
     model = stated(LAG + "noise: {variance: 1}\n")
 
@@ -141,8 +141,8 @@ def test_the_certificate_of_the_worst_cost_holds_for_random_spectra():
         assert max(cost.at(x) for cost in problem.costs) >= worth * (1 - 1e-9)
 
 
-def test_what_was_seen_belongs_to_the_plants_that_it_was_seen_of(first_order):
-    """A problem at another plant, or with other requirements, starts to look anew."""
+def test_remembered_ratios_are_kept_only_for_the_same_plants_and_requirements(first_order):
+    """A problem with another plant, or with other requirements, starts without remembered ratios."""
     problem = solve_design(question(first_order), tolerance=1e-6).problem
     assert problem.on(LinesBasis.anywhere(0.0, np.pi, 1)).demands is problem.demands
     elsewhere = dataclasses.replace(problem, experiment=problem.experiment.whitened(1.0))
@@ -151,8 +151,8 @@ def test_what_was_seen_belongs_to_the_plants_that_it_was_seen_of(first_order):
 
 
 @pytest.mark.parametrize("above", [0.3, 1.0, -np.inf])
-def test_what_was_seen_before_hides_no_violation(first_order, above):
-    """Spectra one after the other, stronger and weaker: the violations of each scenario by itself."""
+def test_remembered_ratios_hide_no_violation(first_order, above):
+    """Violations for a sequence of stronger and weaker spectra are compared with each scenario alone."""
     others = alternatives(first_order, around(first_order, 12, 0.05, seed=1), 0.1)
     problem = solve_design(question(first_order, others), tolerance=1e-4).problem
     demands, rng = Demands(problem.scenarios), np.random.default_rng(2)
@@ -178,7 +178,7 @@ def test_what_was_seen_before_hides_no_violation(first_order, above):
 
 @pytest.mark.parametrize(("unknowns", "needed"), [(11, 476), (21, 752)])
 def test_the_number_of_scenarios_before_the_design(unknowns, needed):
-    """By the binomial sum itself: eps = 0.05 with confidence 0.999."""
+    """The binomial sum of Campi and Garatti (2008), Theorem 1, with eps = 0.05 and confidence 0.999."""
     assert samples_for(0.05, 1e-3, unknowns) == needed
 
     def tail(number):
@@ -191,7 +191,7 @@ def test_the_number_of_scenarios_before_the_design(unknowns, needed):
 
 @pytest.mark.parametrize(("support", "risk"), [(1, 0.0576), (3, 0.0786), (5, 0.0968)])
 def test_the_risk_once_the_support_is_known(support, risk):
-    """200 scenarios; and the root of the polynomial as the paper has it."""
+    """The risk of 200 scenarios is the root of the polynomial of Campi and Garatti (2018), Theorem 2."""
     found = risk_after(200, 1e-3, support)
     assert found == pytest.approx(risk, abs=5e-5)
     t = 1.0 - found
@@ -199,7 +199,7 @@ def test_the_risk_once_the_support_is_known(support, risk):
     assert left == pytest.approx(comb(200, support) * t ** (200 - support), rel=1e-6)
 
 
-def test_nothing_is_said_by_too_few():
+def test_too_few_scenarios_have_a_risk_of_one_and_the_risk_grows_with_the_support():
     assert risk_before(5, 1e-3, 7) == risk_after(3, 1e-3, 3) == 1.0
     risks = [risk_after(100, 1e-3, k) for k in range(8)]
     assert risks == sorted(risks)

@@ -56,12 +56,12 @@ def difference(function, G, step=1e-6):
 
 
 def closed(G, C):
-    """The loop of the plant G with a controller."""
+    """The complementary sensitivity of the plant G with a controller."""
     return np.linalg.solve(np.eye(G.shape[1]) + G @ C, G @ C)
 
 
 @pytest.mark.parametrize(("n", "name"), CASES)
-def test_the_loop_is_the_one_that_the_law_promises(n, name):
+def test_the_controller_gives_the_complementary_sensitivity_of_its_law(n, name):
     law = laws(n)[name]
     G = random_complex(np.random.default_rng(9), W.size, n, n)
     np.testing.assert_allclose(closed(G, law.controller(G, W)), law.complementary(W), atol=1e-11)
@@ -74,7 +74,7 @@ def expected_error(moved, entering, covariance):
 
 
 @pytest.mark.parametrize(("n", "name"), CASES)
-def test_z_is_what_the_covariance_of_the_estimate_costs(n, name):
+def test_the_weight_z_converts_the_covariance_of_the_estimate_to_the_loop_error(n, name):
     """tr(Z Phi^-T) against the differences of the true loop, with cov(vec dG) = Phi^-T (x) Phi_v."""
     law, rng = laws(n)[name], np.random.default_rng(8)
     G = random_complex(rng, W.size, n, n) + 2 * np.eye(n)
@@ -90,8 +90,8 @@ def test_z_is_what_the_covariance_of_the_estimate_costs(n, name):
 
 
 @pytest.mark.parametrize("n", [1, 2])
-def test_the_noise_part_is_what_the_covariance_of_the_noise_model_costs(n):
-    """cov(vec dH) = Lambda^-T (x) Phi_v, by differences of the loop with E held."""
+def test_the_noise_part_is_the_loop_error_due_to_the_estimated_noise_model(n):
+    """cov(vec dH) = Lambda^-T (x) Phi_v, by differences of the loop with E held fixed."""
     plant = random_plant(np.random.default_rng(3), n, delay=2)
     law = MinimumVariance(plant)
     w = np.pi * (np.arange(64) + 0.5) / 64
@@ -120,7 +120,7 @@ def test_minimum_variance_leaves_the_unavoidable_part_of_the_noise(n):
         np.testing.assert_allclose(taps[delay:], 0, atol=1e-10)
 
 
-def test_internal_model_keeps_zeros_outside_and_the_delay_in_the_loop():
+def test_internal_model_control_keeps_unstable_zeros_and_the_delay_in_the_loop():
     plant = matrix_plant(B=[[[0, 0, 1.0, -2.0]]], A=[[1, -0.5]], covariance=[[1.0]])
     law = InternalModel.build(plant, Rational.build([0.4], [1.0, -0.6]))
     w = np.linspace(0, np.pi, 50)
@@ -183,13 +183,13 @@ def test_the_gap_closes_and_the_certificate_holds(n, seed):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(2))
-def test_the_optimum_is_that_of_the_grid_program(seed):
+def test_the_optimum_agrees_with_the_grid_program(seed):
     A, metrics, limits, weights = case(2, 12, seed)
     design = design_within(A, metrics, limits, weights)
     assert design.value == pytest.approx(grid_program(A, metrics, limits, weights), rel=2e-6)
 
 
-def test_one_total_limit_is_the_closed_form():
+def test_one_limit_on_the_total_power_has_the_closed_form_solution():
     A, _, _, weights = case(3, 64, 3)
     even = np.broadcast_to(np.eye(3, dtype=complex), (1, 64, 3, 3))
     design = design_within(A, even, np.array([2.5]), weights)
@@ -199,7 +199,7 @@ def test_one_total_limit_is_the_closed_form():
     assert design.value == pytest.approx(total**2 / 2.5, rel=1e-12)
 
 
-def test_the_column_with_a_limit_for_each_input_and_output():
+def test_the_column_with_a_limit_on_every_channel_is_designed_to_a_closed_gap():
     limits = tuple(
         PowerLimit(kind, bound, channel=channel)
         for kind, bounds in (("input", (1.2, 0.6)), ("output", (1e-3, 1e-3)))

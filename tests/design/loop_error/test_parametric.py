@@ -45,7 +45,7 @@ KEPT = {
     "a pair and a delay": [[[0, 0, 1.0, -2.0, 3.0]]],
     "a double zero": [[[0, 1.0, 3.0, 2.25]]],
     "inside and outside": [[[0, 0.5, -1.0, 0.4]]],
-    "of two channels": [[[0, 1.0], [0, 0, 1.8]], [[0, 1.0], [0, 0.9, 0.3]]],
+    "two channels": [[[0, 1.0], [0, 0, 1.8]], [[0, 1.0], [0, 0.9, 0.3]]],
 }
 
 
@@ -63,8 +63,8 @@ def with_zeros(B):
 
 
 @pytest.mark.parametrize("name", [*KEPT, "model reference", *MINIMUM])
-def test_w_includes_what_the_law_has_from_the_model_as_a_whole(name):
-    """The controller designed on a model that is slightly off: its own zeros outside, its own first terms."""
+def test_the_weight_w_includes_the_dependence_of_the_control_law_on_the_model(name):
+    """W agrees with differences of the loop whose controller is designed on a slightly perturbed model."""
     if name in KEPT:
         plant = with_zeros(KEPT[name])
 
@@ -116,7 +116,7 @@ def test_the_figures_of_the_errata_and_the_theory_row_of_table_i():
     assert 0 <= best.gap < 1e-6
 
 
-def test_the_optimum_meets_its_limits_and_no_mixture_beats_its_bound():
+def test_the_optimum_meets_its_limits_and_no_random_spectrum_beats_its_bound():
     limits = (
         PowerLimit("input", 1.0, channel=0),
         PowerLimit("input", 0.5, channel=1),
@@ -138,7 +138,7 @@ def test_the_optimum_meets_its_limits_and_no_mixture_beats_its_bound():
         assert criterion.value(criterion.information(w, Phi / scale, np.ones(12))) > best.lower_bound
 
 
-def test_the_moments_of_the_loss():
+def test_the_moments_of_the_loss_agree_with_closed_forms_and_monte_carlo():
     mean, sd = root_moments(np.array([3.0]))
     assert mean == pytest.approx(np.sqrt(3.0 * 2 / np.pi), rel=1e-12)
     mean, sd = root_moments(np.array([2.0, 2.0]))

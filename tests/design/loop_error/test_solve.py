@@ -1,4 +1,4 @@
-"""From the spec to the result: figures, files, other laws and limits, and what is refused."""
+"""From the spec to the result: figures, files, other laws and limits, and refusals."""
 
 import csv
 import json
@@ -22,11 +22,11 @@ def spec(*overrides):
 
 @cache
 def solved(*overrides):
-    """What is found of a short experiment; no test may change it."""
+    """The outcome for a short experiment; no test may change it."""
     return solve(spec(*SHORT, *overrides))
 
 
-def test_the_design_of_the_column(tmp_path):
+def test_the_design_of_the_column_has_the_figures_of_the_errata(tmp_path):
     outcome = solved()
     result = outcome.result
     assert result["status"] == "optimal"
@@ -56,7 +56,7 @@ def test_the_design_of_the_column(tmp_path):
     assert saved["spectrum"]["peak"]["frequency"] == pytest.approx(0.02667 / 2, abs=1e-5)
 
 
-def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed():
+def test_the_signal_keeps_its_limits_and_nearly_reaches_the_designed_error():
     limits = "limits={input_power: [1.2, 0.5], output_power: [0.001, 0.001]}"
     outcome = solve(spec("experiment.samples=2000", "signal.candidates=2", limits))
     u = np.array([outcome.tables["signal"].columns[f"u{i}"] for i in (1, 2)])
@@ -112,15 +112,15 @@ WAYS = {
 @pytest.mark.parametrize(
     ("one", "other"), [("scalar", "matrix"), ("scalar", "internal model"), ("in s", None)]
 )
-def test_one_loop_in_other_words_is_one_design(one, other):
-    """Without zeros outside internal model control is model reference; the spec states the scalar in s."""
+def test_equivalent_descriptions_of_a_loop_give_one_design(one, other):
+    """Without zeros outside the circle, internal model control equals model reference control."""
     first, second = (solved(*([f"{CONTROL}={WAYS[way]}"] if way else [])).result for way in (one, other))
     assert first["objective"]["value"] == pytest.approx(second["objective"]["value"], rel=1e-10)
     if other == "internal model":
         assert second["closed_loop_error"]["law"] == "internal_model"
 
 
-def test_minimum_variance_reports_what_no_input_changes():
+def test_minimum_variance_reports_the_error_that_no_input_reduces():
     result = solved(f"{CONTROL}={{minimum_variance: true}}").result
     part = result["closed_loop_error"]["noise_model_part"]
     assert 0 < part < result["objective"]["value"]
@@ -140,7 +140,7 @@ def test_a_continuous_time_plant_is_sampled():
     np.testing.assert_allclose(loop["root_eigenvalues"], [0.50707707, 71.86905293], rtol=1e-7)
 
 
-def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm():
+def test_a_sensitivity_with_a_zero_on_the_circle_has_a_finite_criterion():
     """S = 1 - T vanishes at pi/2 rad/sample, where C is infinite: the criterion stays finite and settles."""
     T = [0, 0.2, -0.5, 0.2, 0.5]
     assert abs(1 - np.polynomial.polynomial.polyval(-1j, T)) < 1e-12
@@ -149,7 +149,7 @@ def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm():
     assert result["solver"]["settled"] < 1e-10
 
 
-def test_simulate_adds_the_study():
+def test_simulate_adds_a_study_that_agrees_with_theory():
     outcome = simulate(spec("experiment.samples=1000", "signal.candidates=1", "simulation.runs=40"))
     study = outcome.result["simulation"]
     assert study["runs"] == 40
@@ -162,7 +162,7 @@ def test_simulate_adds_the_study():
     assert "loss" in outcome.curves
 
 
-def test_simulate_on_a_true_system_of_its_own():
+def test_simulate_uses_a_stated_true_system():
     """The S1 design of the paper: H without its pole in the design, with it in the true system."""
     outcome = simulate(
         spec(
@@ -186,14 +186,14 @@ def test_simulate_on_a_true_system_of_its_own():
         ("relative_std", ["simulation.noise={relative_std: 0.1}"]),
     ],
 )
-def test_what_is_not_simulated_is_said(words, overrides):
+def test_unsupported_simulations_are_refused_with_a_reason(words, overrides):
     (told,) = refused(simulate, spec(*overrides))
     assert told.code == "not-supported"
     assert words in f"{told.message} {told.hint} {told.key}"
 
 
 @pytest.mark.slow
-def test_the_monte_carlo_row_of_table_i():
+def test_the_mean_losses_agree_with_the_monte_carlo_row_of_table_i():
     study = simulate(spec("signal.candidates=1")).result["simulation"]
     for name, mean in (("white", 0.002835), ("design", 0.002050)):
         loss = study["inputs"][name]["loss"]

@@ -36,13 +36,13 @@ FIGURE_1 = {
 
 
 @pytest.mark.parametrize("alpha", FIGURE_1)
-def test_figure_1_and_its_limits(alpha):
+def test_figure_1_and_its_limits_agree_with_theorem_2(alpha):
     R = least_energy(replace(ONE, neglected_norm=alpha), 1.0)
     np.testing.assert_allclose([R[0, 0], R[0, 1], R[1, 1]], FIGURE_1[alpha], rtol=1e-14, atol=1e-15)
 
 
 @pytest.mark.parametrize("second", [np.zeros(2), np.zeros(0)])
-def test_nothing_neglected_counts(second):
+def test_without_neglected_weights_the_least_energy_is_the_variance_term(second):
     R = least_energy(Regression(np.array([3.0, 4.0]), second, 2.0, 0.5), 2.0)
     assert np.trace(R) == pytest.approx(0.5 * 25 / 2.0, rel=1e-14)
 
@@ -71,7 +71,7 @@ def test_brute_force_finds_nothing_better(m, n):
         start = 0.05 * rng.standard_normal((n, n))
         start[:, 0] += np.concatenate([L1, L2])
         point = start.ravel()
-        for _ in range(4):  # anew from where it stops: the optimum is singular, and BFGS gets stuck
+        for _ in range(4):  # restarts where it stops: the optimum is singular, and BFGS gets stuck
             point = scipy.optimize.minimize(energy, point, method="BFGS", jac="3-point").x
         values.append(energy(point))
     assert min(values) >= exact * (1.0 - 1e-9)

@@ -43,7 +43,7 @@ def gap(found, value):
         (1, 2, 0.0, 1, 0.5),  # only the variance counts; the least biased of the optima is taken
     ],
 )
-def test_two_taps_in_closed_form(first, second, alpha, variance, target):
+def test_designs_of_two_taps_have_their_closed_form(first, second, alpha, variance, target):
     """Examples 3 and 4, Figure 2, and others."""
     found = design(regression([first], [second], alpha, variance), target=target)
     slack = target - alpha**2 * max(abs(second) - abs(first), 0.0) ** 2
@@ -72,7 +72,7 @@ REFERENCE = [
 
 
 @pytest.mark.parametrize(("case", "goal", "value"), REFERENCE)
-def test_reference_values(case, goal, value):
+def test_designs_have_their_reference_values(case, goal, value):
     found = of_four(**goal) if case is FOUR else design(regression(*case), **goal)
     reached = found.energy if "target" in goal else found.split.total
     assert reached == pytest.approx(value, rel=1e-6)
@@ -85,7 +85,7 @@ def test_reference_values(case, goal, value):
 
 @pytest.mark.first(3)
 @pytest.mark.parametrize("seed", range(6))
-def test_one_estimated_parameter_against_cvxpy(seed):
+def test_designs_for_one_estimated_parameter_agree_with_cvxpy(seed):
     rng = np.random.default_rng(seed)
     L1, L2 = rng.uniform(0.5, 2.0), rng.standard_normal(int(rng.integers(1, 5)))
     alpha, energy = rng.uniform(0.2, 1.5), rng.uniform(1.0, 20.0)
@@ -104,7 +104,7 @@ def test_one_estimated_parameter_against_cvxpy(seed):
     ],
 )
 def test_several_estimated_parameters_are_proved(m, n, seed):
-    """Those of two are; of more, that nothing beats the bound and no search the design."""
+    """The gap closes for two parameters; for more, the bound holds and no search beats the design."""
     rng = np.random.default_rng(seed if m == 2 else [n, seed])
     weights = rng.standard_normal(n)
     case = (weights[:m], weights[m:], rng.uniform(0.2, 1.0))
@@ -174,8 +174,8 @@ def test_all_units_scale_out():
     assert scaled.split.total == pytest.approx(9.0 * plain.split.total, rel=1e-8)
 
 
-def test_the_alternation_leaves_the_shape_of_its_start():
-    """For m = 2 it keeps rho_1 of white noise, and its gap says so; for m = 1 it is enough."""
+def test_the_alternation_keeps_the_first_autocorrelation_of_its_start():
+    """For m = 2 it keeps rho_1 of white noise, and its gap shows that; for m = 1 it finds the optimum."""
     found = design(regression(*FOUR), energy=8.0, alternating=True)
     assert found.rho[1] == pytest.approx(0.0, abs=1e-9)
     best = 1.072300
@@ -186,10 +186,10 @@ def test_the_alternation_leaves_the_shape_of_its_start():
 
 
 @pytest.mark.slow
-def test_infeasible_targets_of_two_parameters():
+def test_infeasible_targets_of_two_parameters_are_refused():
     with pytest.raises(OutOfReachError) as error:
         design(regression([1, -0.3], [1, 4], 1.0), target=1.0)
     assert error.value.proved >= 1e4
-    # What would be feasible is: a target above the least bias.
+    # A target above the least bias is feasible.
     least = error.value.bias**2 * 1.09
     assert np.isfinite(design(regression([1, -0.3], [1, 4], 1.0), target=1.5 * least).energy)

@@ -1,4 +1,4 @@
-"""Every count of a spec has a limit, which schema and page show, or is one that nothing is made of."""
+"""Every count of a spec has a limit, which schema and page show, or needs no memory in proportion."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_many_named_parameters_are_refused_at_once():
         ("simulation.runs", "simulation: {runs: 1.0e+9}"),
     ],
 )
-def test_what_is_too_large_is_refused_with_what_would_fit(key, extra):
+def test_a_count_that_is_too_large_is_refused_with_its_limit(key, extra):
     (found,) = refused(parse_spec, BASE + extra)
     assert (found.code, found.key) == ("too-large", key)
     assert re.search(r"write at most [0-9]+", found.hint)

@@ -1,4 +1,4 @@
-"""Numbers with units: what is proposed is the same quantity in the unit of the spec."""
+"""Numbers with units: the hint proposes the same quantity in the unit of the spec."""
 
 import math
 import re
@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli import parse_spec
 from tests.support.refusals import refused
 
-# Seconds, written out beside the package's own table.
+# The seconds in each unit, independent of the table of the package.
 LONG = {"ms": 0.001, "sec": 1, "min": 60, "minutes": 60, "h": 3600, "hours": 3600, "d": 86400, "us": 1e-6}
 TIMES = {
     "sample_time": "sample_time: {}",
@@ -54,7 +54,7 @@ def test_frequencies_are_converted(time_unit):
             assert proposed(hint) == pytest.approx(0.25 * radians * long), (key, unit)
 
 
-def test_other_units_are_left_out():
+def test_other_units_are_dropped_and_a_percentage_may_be_a_fraction():
     for unit in ("V", " degC", "m/s"):
         assert proposed(hint_of("signal.offset", "signal: {{offset: [{}, 2]}}", f"'40{unit}'")) == 40
     for key, template in (
@@ -68,8 +68,8 @@ def test_other_units_are_left_out():
     assert proposed(hint_of("solver.time_limit", "solver: {{time_limit: {}}}", "2 min", "h")) == 120
 
 
-def test_a_parameter_tells_by_its_unit_what_it_is():
-    """A parameter may be anything, and an expression is not told the unit of the spec."""
+def test_the_unit_of_a_parameter_shows_which_quantity_it_is():
+    """A parameter may be any quantity, and the unit of an expression is not known."""
     plant = "plant: {{parameters: {{T: %s}}, continuous: {{gain: 2, time_constant: %s}}, sample: zoh}}"
     named, stated = "plant.parameters.T", "plant.continuous.time_constant"
     assert proposed(hint_of(named, plant % ("{}", "T"), "1.5 h", "min")) == 90

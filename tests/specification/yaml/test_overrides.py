@@ -14,7 +14,7 @@ from tests.support.refusals import refused
 GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
 
 
-def test_values_replace_create_and_remove():
+def test_overrides_replace_create_and_remove_values():
     spec = parse_spec(
         GOOD,
         overrides=[
@@ -144,7 +144,7 @@ def test_unprintable_texts_are_refused(text):
 
 @pytest.mark.parametrize("value", [10**400, -(10**400), np.nan, np.inf], ids=["huge", "-huge", "nan", "inf"])
 def test_numbers_that_no_double_holds_are_refused(value):
-    """A count has a range; another number has none but that of a double."""
+    """A count has a range; any other number must be a finite double."""
     for key in ("sample_time", "experiment.samples"):
         (found,) = refused(parse_spec(TEXT).with_, **{key: value})
         counted = key != "sample_time" and isinstance(value, int)
@@ -166,7 +166,7 @@ def complaints(path, *overrides):
     return refused(load_spec, path, overrides)
 
 
-def test_blocks_stand_as_if_they_were_pasted(tmp_path):
+def test_included_blocks_count_as_if_they_were_pasted(tmp_path):
     path = written(tmp_path, "include: model.yaml\n" + ASKED, model=MODEL)
     pasted = written(tmp_path, MODEL + ASKED)
     spec = load_spec(pasted)
@@ -185,7 +185,7 @@ def test_several_files_are_joined_key_by_key(tmp_path):
     assert (spec.experiment.samples, spec.experiment.prior.information) == (200, ((4, 0), (0, 9)))
 
 
-def test_overrides_reach_what_is_included_and_name_the_file(tmp_path):
+def test_overrides_change_included_keys_and_may_name_the_file(tmp_path):
     path = written(tmp_path, ASKED, model=MODEL)
     spec = load_spec(path, ["plant.F=[1, -0.9]", "include=model.yaml"])
     assert spec.plant.F == (1, -0.9)
@@ -209,7 +209,7 @@ def test_complaints_point_into_the_included_file(tmp_path):
         ("include: other.yaml\n" + MODEL, "experiment: {samples: 3}\n", 5, "experiment.samples stands"),
     ],
 )
-def test_what_cannot_be_put_together(text, other, line, said, tmp_path):
+def test_missing_or_conflicting_includes_are_refused(text, other, line, said, tmp_path):
     (diagnostic,) = complaints(written(tmp_path, text + ASKED, model=MODEL, other=other))
     assert diagnostic.code == "bad-include"
     assert diagnostic.location.line == line

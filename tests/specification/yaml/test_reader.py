@@ -23,7 +23,7 @@ VALUES = {
 
 
 @pytest.mark.parametrize(("word", "value"), VALUES.items())
-def test_words_that_are_values(word, value):
+def test_scalars_without_quotes_become_values(word, value):
     assert resolve(word) == value
     assert type(resolve(word)) is type(value)
 
@@ -36,7 +36,7 @@ def test_words_that_are_values(word, value):
         "-", "١", "²",
     ],
 )  # fmt: skip
-def test_words_that_stay_text(word):
+def test_scalars_of_other_forms_stay_text(word):
     assert resolve(word) == word
 
 
@@ -91,13 +91,13 @@ def test_syntax_errors_have_a_place_and_plain_words(text, line, column, words):
     ],
     ids=range(15),
 )
-def test_what_is_no_spec_at_all(text, code):
+def test_texts_that_hold_no_spec_are_refused(text, code):
     found = refused(parse_spec, text)
     assert [c.code for c in found] == [code]
     assert found[0].location is not None
 
 
-def test_alias_bombs_are_defused_before_they_go_off(monkeypatch):
+def test_alias_bombs_are_refused_before_they_are_expanded(monkeypatch):
     """Twelve lines stand for 10^12 values; no more are made than a spec may hold."""
     made = []
     monkeypatch.setattr(reader, "resolve", lambda word: made.append(word))
@@ -137,7 +137,7 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
         (b"\xff", "0xFF", 1, 1),
     ],
 )
-def test_other_encodings(tmp_path, raw, words, line, column):
+def test_other_encodings_are_refused_at_their_first_wrong_byte(tmp_path, raw, words, line, column):
     file = tmp_path / "s.yaml"
     file.write_bytes(raw)
     (diagnostic,) = refused(load_spec, file)
@@ -146,7 +146,7 @@ def test_other_encodings(tmp_path, raw, words, line, column):
     assert (diagnostic.location.line, diagnostic.location.column) == (line, column)
 
 
-def test_files_that_cannot_be_read(tmp_path):
+def test_files_that_cannot_be_read_are_refused_with_a_hint(tmp_path):
     (tmp_path / "first_order.yaml").write_text(GOOD)
 
     def code_and_hint(path):
@@ -168,7 +168,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may read everything")
-def test_a_file_without_permission(tmp_path):
+def test_a_file_without_permission_is_refused(tmp_path):
     file = tmp_path / "s.yaml"
     file.write_text(GOOD)
     file.chmod(0)
