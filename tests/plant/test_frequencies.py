@@ -34,7 +34,7 @@ MAXIMA = {
         1e-2,
     ),
     "kink": (lambda w: -np.abs(w - 0.3333), np.linspace(0, 1, 11), [0.3333], 1e-6, 1e-6),
-    # Where r_adm is all but used up, the error in units of it has kinks as steep as this one.
+    # A ratio r_u over r_adm has kinks as steep as this one where r_adm nearly vanishes.
     "steep kink": (
         lambda w: 1.0 / (1.0 + 1e4 * np.abs(w - 0.245528)),
         graded_grid([], 0.0, np.pi),
