@@ -118,7 +118,7 @@ def test_the_bound_holds_for_all_records_of_two_inputs():
 
 
 def test_a_reference_figure_of_the_window_bound():
-    """Plant 6 of the eight output-error plants: 0.2834 by the power, 0.2977 by windows, here of eight values."""
+    """Plant 6 of eight output-error plants: 0.2834 by the power, 0.2977 by windows (here of eight values)."""
     plant = {"B": [0, -2.853291838457013], "F": [1, -0.5059625218880031]}
     design = designed(plant, 300, ERROR)
     bound = bound_over_records(design.problem, design.any_spectrum, 300, windows=8)
