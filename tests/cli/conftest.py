@@ -1,4 +1,4 @@
-"""Commands in an empty folder, with stand-ins for what they compute."""
+"""Commands in an empty folder, with stand-ins for their computations."""
 
 from importlib import import_module
 from unittest.mock import Mock
@@ -22,7 +22,7 @@ def run(monkeypatch, capsys, tmp_path):
 
 @pytest.fixture
 def verbs(monkeypatch):
-    """Stand-ins for the verbs of the package; `calls` keeps what they were called with."""
+    """Stand-ins for the verbs of the package; `calls` keeps their arguments."""
     calls = []
 
     class Stated:

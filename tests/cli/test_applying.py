@@ -1,4 +1,4 @@
-"""What a design says is to be applied and logged, and how the record is judged."""
+"""Instructions of a design: how to apply and log its signal, and how to judge the record."""
 
 import json
 import shlex
@@ -41,7 +41,7 @@ def words(applied, caused, point=None):
           "--operating-point u1=40,y1=REST")),
     ],
 )  # fmt: skip
-def test_what_is_applied_and_logged_is_said(said, parts):
+def test_instructions_state_the_columns_to_log_and_the_operating_point(said, parts):
     assert [one for one in parts if one not in said] == []
 
 
@@ -59,7 +59,7 @@ solver: {any_spectrum: false}
 
 
 def test_the_command_that_solve_names_judges_its_record(run, tmp_path):
-    """It has the level, and the spec of the run what --set changed. A lag too many refutes the model."""
+    """It has the operating point, and the run's spec the changes by --set. A second lag refutes the model."""
     (tmp_path / "spec.yaml").write_text(SPEC)
     _, out, _ = run("solve", "spec.yaml", "--set", "limits.amplitude=2", "--no-figures")
     *_, last = out.splitlines()
@@ -90,7 +90,7 @@ def test_the_command_that_solve_names_judges_its_record(run, tmp_path):
             Path("MORE.csv").unlink()
             shutil.rmtree("runs/log_and_1_more_assessed")
         assert ("Then: idesign assess" in out) == (expected == EXIT_MISSED)
-    # Records that are judged together do not stand in the way of the first alone.
+    # Records that are judged together have their own run next to the run of the first alone.
     record("log.csv", [1, -0.5])
     record("more.csv", [1, -0.5], 1.001)
     assert run(*command, "more.csv", "--no-figures")[0] != 2

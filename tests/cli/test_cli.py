@@ -1,4 +1,4 @@
-"""What commands print, and how they end: exit codes, and what goes to which stream."""
+"""Exit codes of commands, and the text that they print to each stream."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_with_json_errors_are_data_too(run, failing):
     assert "the plant is unstable" in err
 
 
-def test_an_interrupt(run, failing):
+def test_an_interrupt_ends_with_130(run, failing):
     failing(KeyboardInterrupt())
     assert run("solve", "a.yaml") == (130, "", "interrupted\n")
 
@@ -136,7 +136,7 @@ def interrupted(run, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_the_best_so_far_is_written(interrupted, tmp_path, number, code):
+def test_an_interrupted_run_writes_the_best_design_so_far_on_request(interrupted, tmp_path, number, code):
     ended, said = interrupted(number, options=["--keep-partial"])
     assert (ended, "what is known so far" in said) == (code, True)
     result = json.loads((tmp_path / "runs" / "spec" / "result.json").read_text())
@@ -145,7 +145,7 @@ def test_the_best_so_far_is_written(interrupted, tmp_path, number, code):
     assert (tmp_path / "runs" / "spec" / "spectrum.csv").exists()
 
 
-def test_a_second_one_ends_at_once_and_without_the_option_nothing_is_written(interrupted, tmp_path):
+def test_a_second_interrupt_ends_at_once_and_without_the_option_one_does(interrupted, tmp_path):
     code, _ = interrupted(signal.SIGINT, signal.SIGINT, options=["--keep-partial"])
     assert code == 130
     assert interrupted(signal.SIGINT) == (130, "interrupted\n")
@@ -199,12 +199,12 @@ def files(tmp_path):
     return str(tmp_path / "log.csv"), str(tmp_path / "s.yaml")
 
 
-# One reader serves all commands: each sees a quarter of the options, and one option that all see.
+# All commands share one reader: each is tested with a quarter of the options, and with one common option.
 EVERY = [*zip(WRONG, 7 * [*COMMANDS], strict=True), *((("--columns", "u1=nope"), one) for one in COMMANDS)]
 
 
 @pytest.mark.parametrize(("option", "command"), dict.fromkeys(EVERY))
-def test_what_is_wrong_is_said(option, command, files):
+def test_wrong_options_for_records_are_refused_with_the_reason(option, command, files):
     done = CliRunner().invoke(app, [*COMMANDS[command](*files), *option, "--no-output"])
     assert done.exit_code == 2, done.output
     assert WRONG[option] in " ".join(done.stderr.replace("│", "").split())
@@ -230,7 +230,7 @@ def test_a_sweep_reads_standard_input(monkeypatch, tmp_path):
         (["identify", "data.csv"], ["--spec", "idesign explore DATA"]),
     ],
 )
-def test_what_a_command_needs_instead_is_said(run, tmp_path, command, said):
+def test_a_refused_command_names_what_is_needed_instead(run, tmp_path, command, said):
     (tmp_path / "data.csv").write_text("u1,y1\n0,0\n1,1\n")
     code, out, err = run(*command)
     assert (code, out) == (2, "")

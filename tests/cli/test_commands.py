@@ -50,7 +50,7 @@ runs:
 """
 
 
-def test_check_passes(run, verbs, tmp_path):
+def test_check_passes_if_all_quantities_agree(run, verbs, tmp_path):
     (tmp_path / "golden").mkdir()
     (tmp_path / "golden" / "g.yaml").write_text(GOLDEN % "0.2585")
     code, out, err = run("check")
@@ -61,7 +61,7 @@ def test_check_passes(run, verbs, tmp_path):
     assert verbs == [(Path("golden/a.yaml"), [])]
 
 
-def test_check_fails_with_1(run, verbs, tmp_path):
+def test_check_ends_with_1_if_a_quantity_disagrees(run, verbs, tmp_path):
     (tmp_path / "g.yaml").write_text(GOLDEN % "0.3")
     code, out, _ = run("check", "g.yaml", "--junit", "report.xml")
     assert code == 1
@@ -103,7 +103,7 @@ def test_check_takes_golden_files_of_the_package_by_name(name, run, verbs, monke
     assert "the package has own" in err
 
 
-def test_check_without_golden_files(run, monkeypatch, tmp_path):
+def test_check_without_golden_files_is_an_error(run, monkeypatch, tmp_path):
     monkeypatch.setattr(sys.modules["inputdesign_cli.cli.reference"], "shipped", lambda: tmp_path / "nowhere")
     code, _, err = run("check", "--junit", "report.xml")
     assert code == 2
@@ -176,7 +176,7 @@ def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
     assert (tmp_path / "a.yaml").read_text().count("#") > 8
 
 
-def test_explain(run):
+def test_explain_lists_and_explains_every_code(run):
     code, out, _ = run("explain")
     assert code == 0
     names = [line.split()[0] for line in out.splitlines() if not line.startswith(" ")]
@@ -192,7 +192,7 @@ def test_explain(run):
     assert "no-such-code" in err
 
 
-def test_schema_and_version(run):
+def test_schema_and_version_are_printed(run):
     code, out, err = run("schema")
     assert (code, err) == (0, "")
     assert set(json.loads(out)["properties"]) >= {"plant", "experiment", "accuracy", "spectrum"}
@@ -222,7 +222,7 @@ DESIGN = f"from inputdesign_cli import load_spec, solve; solve({SMALL})"
     ],
     ids=["help", "specification", "a small design"],
 )
-def test_nothing_waits_for_what_it_does_not_need(code, heavy):
+def test_commands_import_no_package_that_they_do_not_need(code, heavy):
     code = f"import sys\n{code}\nprint(*sorted(sys.modules), file=sys.stderr)\n"
     command = [sys.executable, "-c", code]
     ended = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
@@ -232,7 +232,7 @@ def test_nothing_waits_for_what_it_does_not_need(code, heavy):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_everything_is_documented(name, run):
+def test_every_command_and_option_is_documented(name, run):
     command = COMMANDS[name]
     assert len(command.help) > 20
     for parameter in command.params:

@@ -1,4 +1,4 @@
-"""Where runs go: none is lost to one of another spec, and a spec that is worked on is not overwritten."""
+"""Folders of runs: no run is lost to a run of another spec, and an edited spec is not overwritten."""
 
 import hashlib
 import io
@@ -56,7 +56,7 @@ def test_two_specs_of_one_name_do_not_share_a_directory(analyse, tmp_path):
     assert analyse(one) == (2, "output-other-run")
 
 
-def test_a_spec_is_run_again_as_it_changes(analyse, tmp_path, monkeypatch):
+def test_a_changed_or_moved_spec_replaces_its_own_run(analyse, tmp_path, monkeypatch):
     spec = write(tmp_path / "p" / "a.yaml", "one")
     assert analyse(spec) == (0, "")
     write(spec, "edited")
@@ -134,7 +134,7 @@ COMMANDS = {
 
 @pytest.fixture
 def computing(monkeypatch):
-    """The commands that have begun to compute something; they do not get to its end."""
+    """A list that gets an entry when a command begins to compute, which then ends it."""
     begun = []
 
     def computed(*_, **__):
@@ -148,7 +148,7 @@ def computing(monkeypatch):
 
 @pytest.mark.first(4)
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_place_that_cannot_be_is_refused_before_anything_is_computed(
+def test_an_unusable_folder_is_refused_before_anything_is_computed(
     run, computing, monkeypatch, tmp_path, command
 ):
     def refused(place, *options):
@@ -177,7 +177,7 @@ def test_a_place_that_cannot_be_is_refused_before_anything_is_computed(
     assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
 
 
-def test_a_run_of_the_same_file_that_is_replaced_is_told(run, tmp_path):
+def test_the_replacement_of_a_run_with_other_values_is_reported(run, tmp_path):
     write(tmp_path / "a.yaml", "one")
 
     def told(*options):
@@ -188,7 +188,7 @@ def test_a_run_of_the_same_file_that_is_replaced_is_told(run, tmp_path):
     assert [told(), told(), told("--set", "experiment.samples=50"), told()] == [False, False, True, True]
 
 
-def test_a_run_that_came_in_the_meantime_is_not_replaced(analyse, monkeypatch, tmp_path):
+def test_a_run_written_during_the_computation_is_not_replaced(analyse, monkeypatch, tmp_path):
     spec = write(tmp_path / "a.yaml", "one")
     true = questions.analyse
 
@@ -202,8 +202,8 @@ def test_a_run_that_came_in_the_meantime_is_not_replaced(analyse, monkeypatch, t
     assert (tmp_path / "r" / "spec.yaml").read_text() == "title: x\n"
 
 
-def test_a_spec_that_was_replaced_by_a_top_up_is_known_again(tmp_path):
-    """The spec.yaml of a run may say something else than was asked."""
+def test_a_run_whose_spec_is_a_top_up_is_known_by_the_spec_asked_for(tmp_path):
+    """The spec.yaml of a run may differ from the spec that was asked for."""
     place, top_up = tmp_path / "r", Results(typed({"format": 1, "title": "x"}), "title: top-up\n")
     one, copy, other = (tmp_path / name for name in ("a.yaml", "copy.yaml", "d.csv"))
     write_run(top_up, place, origin=Origin([one, other], "title: x\n"))
@@ -213,7 +213,7 @@ def test_a_spec_that_was_replaced_by_a_top_up_is_known_again(tmp_path):
         assert code_of(check_place, place, origin, origin.asked, kind=OutputError) == "output-other-run"
 
 
-def test_a_spec_from_standard_input(analyse, tmp_path, monkeypatch):
+def test_a_spec_from_standard_input_has_its_own_run(analyse, tmp_path, monkeypatch):
     def piped(text):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
         return analyse("-")
@@ -238,7 +238,7 @@ def test_a_spec_from_standard_input(analyse, tmp_path, monkeypatch):
     ],
     ids=["key", "build"],
 )
-def test_errors_of_standard_input_are_those_of_a_file_by_its_name(text, run, tmp_path, monkeypatch):
+def test_errors_of_standard_input_equal_errors_of_a_file_but_for_its_name(text, run, tmp_path, monkeypatch):
     (tmp_path / "s.yaml").write_text(text)
     code, _, told = run("analyse", "s.yaml")
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
@@ -258,7 +258,7 @@ def test_errors_of_standard_input_are_those_of_a_file_by_its_name(text, run, tmp
         (["--confine", "a.yaml"], "is a file"),
     ],
 )
-def test_places_that_cannot_be_are_refused_before_anything_is_computed(run, verbs, options, told):
+def test_impossible_options_for_folders_are_refused_before_the_computation(run, verbs, options, told):
     Path("a.yaml").write_text("x", encoding="utf-8")
     code, _, err = run("solve", "a.yaml", *options)
     assert code == 2
@@ -276,7 +276,7 @@ def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
     check_place(tmp_path / "run", Origin(files, overwrite=True), spec)
 
 
-def test_runs_of_the_same_data_by_other_specs_stand_side_by_side(tmp_path, monkeypatch):
+def test_runs_of_the_same_data_by_other_specs_get_numbered_folders(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log = tmp_path / "log.csv"
 
@@ -293,7 +293,7 @@ def test_runs_of_the_same_data_by_other_specs_stand_side_by_side(tmp_path, monke
     one, two = (write(tmp_path / "specs" / f"{name}.yaml", name) for name in "ab")
     usual = "runs/log_assessed"
     assert [written(file) for file in (one, two, one, two)] == [usual, f"{usual}_2", usual, f"{usual}_2"]
-    # A spec that lies in such a place stays where its run would write another one.
+    # A spec in such a folder is kept if its run would write another one there.
     other = Path(f"{usual}_2/spec.yaml")
     unlike = Place(Into(), "log_assessed", [other, log], numbered=True).checked(None)
     assert str(unlike.directory) == f"{usual}_3"
@@ -320,8 +320,8 @@ def test_a_report_replaces_its_own_pages_only_or_goes_to_standard_output(run, an
     assert set(tmp_path.rglob("*")) == before
 
 
-def test_a_spec_has_the_form_of_its_figures(run, tmp_path, monkeypatch):
-    """A column is 3.5 inches wide, of 72 points each; the option comes before the spec."""
+def test_the_spec_determines_width_and_format_of_its_figures(run, tmp_path, monkeypatch):
+    """A column is 3.5 inches wide, of 72 points each; the option overrides the spec."""
     every = plots.draw_all
 
     def one_figure(results, *form):

@@ -44,7 +44,7 @@ def test_equal_commands_make_equal_files(tmp_path):
         assert (tmp_path / f"a.{ending}").read_bytes() == (tmp_path / f"b.{ending}").read_bytes()
 
 
-def test_what_it_excites_is_told():
+def test_the_order_of_excitation_is_reported():
     found = json.loads(run("--multisine", 8, "--samples", 200, "--json").stdout)["signal"]
     assert found["channels"]["u1"]["order_of_excitation"] == 16
     assert "order 16" in run("--multisine", 8, "--samples", 200).stdout
@@ -85,7 +85,7 @@ def test_pictures_are_drawn(tmp_path):
         (["--chirp", "0.1:1", "--band", "0:3"], "does nothing to"),
     ],
 )
-def test_what_cannot_be_made_is_refused(words, said, tmp_path):
+def test_signals_that_cannot_be_made_are_refused_with_the_reason(words, said, tmp_path):
     result = run(*words, *([] if "-o" in words else ["-o", tmp_path / "u.csv"]))
     assert result.exit_code == 2
     assert said in result.output

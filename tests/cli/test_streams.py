@@ -21,7 +21,7 @@ IDESIGN = f"{sys.executable} -m inputdesign_cli"
 
 
 def shell(command, folder, **environment):
-    """What `bash` makes of it: exit code and standard error."""
+    """The exit code and standard error of a command in `bash`."""
     ended = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command}"],
         cwd=folder,
@@ -52,7 +52,7 @@ FAILS = [
         *((f"validate --json {SPEC}", *fails) for fails in FAILS[1:3]),
     ],
 )
-def test_streams_that_fail(tmp_path, command, stream, code, said):
+def test_failing_streams_end_a_command_with_a_code_and_one_line(tmp_path, command, stream, code, said):
     ended, told = shell(f"{IDESIGN} {command} {stream}", tmp_path)
     assert ended == code
     assert told.startswith(said)
@@ -68,13 +68,13 @@ def test_a_closed_stream_never_becomes_a_file_of_the_run(tmp_path, streams, code
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("verb", "ended"), [("analyse", 2), ("validate", 0)])
-def test_a_current_folder_that_is_gone(tmp_path, verb, ended):
+def test_a_removed_current_folder_stops_commands_that_write(tmp_path, verb, ended):
     code, told = shell(f"mkdir gone; cd gone; rmdir ../gone; {IDESIGN} {verb} {SPEC}", tmp_path)
     assert (code, "the current folder has been removed" in told) == (ended, ended == 2)
 
 
 @pytest.mark.slow
-def test_a_home_that_cannot_be_written(tmp_path):
+def test_a_command_works_without_a_writable_home(tmp_path):
     assert shell(f"{IDESIGN} analyse {SPEC} -q", tmp_path, HOME="/proc/nowhere", MPLCONFIGDIR="") == (0, "")
 
 
@@ -86,7 +86,7 @@ START = "from inputdesign_cli.__main__ import main; print(flush=True); main()"
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 )
 def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
-    """Also while modules are imported; Python itself needs some hundredths of a second before that."""
+    """They may come during imports; Python itself needs some hundredths of a second before that."""
     codes = set()
     for delay in (0.05, 0.4):
         command = [sys.executable, "-c", START, "simulate", SPEC, "-o", "r"]
@@ -154,8 +154,8 @@ def test_a_signal_is_neither_lost_nor_a_fault_whatever_python_does_meanwhile(
     assert done.stdout == "tidied up\n"
 
 
-def test_names_that_are_no_text_end_in_no_fault(tmp_path, run):
-    """A file name need not be UTF-8: what is written tells it with escapes."""
+def test_file_names_that_are_not_utf_8_cause_no_internal_error(tmp_path, run):
+    """Escapes stand for the bytes of such a name in files that are written."""
     name = os.fsdecode(b"\xff\xfe.yaml")
     (tmp_path / name).write_text((ROOT / "specs" / "first_order_given.yaml").read_text())
     assert run("analyse", name, "-q", "--no-figures", "-o", "run") == (0, "", "")
@@ -185,7 +185,7 @@ def shown_by(monkeypatch):
     return shown
 
 
-def test_a_long_computation_tells_how_far_it_is(monkeypatch):
+def test_a_long_computation_shows_its_progress(monkeypatch):
     terminal = shown_by(monkeypatch)
     with computing("log.csv", quiet=False):
         report_progress(Counted("starting points tried", 3, 30))
@@ -207,7 +207,7 @@ def test_a_long_computation_tells_how_far_it_is(monkeypatch):
     ("variables", "expected"),
     [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
 )
-def test_no_color(monkeypatch, variables, expected):
+def test_no_color_and_dumb_terminals_switch_colours_off(monkeypatch, variables, expected):
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
     for name, value in variables.items():

@@ -1,4 +1,4 @@
-"""`idesign sweep` and `idesign report`: what is printed, where, and how they end."""
+"""`idesign sweep` and `idesign report`: their output, files and exit codes."""
 
 import json
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ def run(run, monkeypatch, tmp_path):
     return run
 
 
-def test_a_sweep_and_its_report(run, tmp_path):
+def test_a_sweep_is_run_resumed_and_reported(run, tmp_path):
     settings = ["--set", "experiment.samples=50,60", "--set", "spectrum.order=-1,1"]
     code, out, err = run("sweep", "small.yaml", *settings, "--dry-run")
     assert (code, err) == (0, "")
@@ -43,7 +43,7 @@ def test_a_sweep_and_its_report(run, tmp_path):
     assert (tmp_path / "page.html").exists()
 
 
-def test_a_sweep_none_of_whose_points_has_a_result_ends_as_its_first_failure(run):
+def test_a_sweep_without_any_result_ends_as_its_first_failure(run):
     setting = "accuracy.model_error={table: a.csv},{table: b.csv}"
     code, out, err = run("sweep", "small.yaml", "--set", setting)
     assert code == 2
@@ -67,14 +67,14 @@ def test_fail_fast_ends_with_the_code_of_the_failure(run):
         (["--set", "spectrum.order=1,2", "-o", "."], "output-not-a-sweep"),
     ],
 )
-def test_what_is_wrong_is_said_before_anything_is_written(run, tmp_path, arguments, code):
+def test_errors_of_a_sweep_are_reported_before_anything_is_written(run, tmp_path, arguments, code):
     ended, out, err = run("sweep", "small.yaml", *arguments)
     assert (ended, out) == (2, "")
     assert code in err
     assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
 
 
-def test_the_pace_of_a_sweep_counts_what_was_computed_now():
+def test_the_pace_of_a_sweep_counts_only_points_that_were_computed_now():
     progress = lambda *counts: SimpleNamespace(  # noqa: E731
         **dict(zip(("total", "passed", "computed", "failed"), counts, strict=True))
     )

@@ -26,7 +26,7 @@ ANSWERS = [
 ]
 
 
-# What somebody types, by a part of the question: bad answers first. Control-U takes the default away.
+# Typed answers, by a part of the question: bad ones first. Control-U deletes the default.
 TYPED = [
     ("know of the plant", "a kettle"),
     ("know of the plant", "gain 2, time constant 180 s, dead time 25 s"),
@@ -51,7 +51,7 @@ TYPED = [
 
 
 class Terminal:
-    """A command in a pseudo-terminal, and what it has shown there."""
+    """A command in a pseudo-terminal, and the text that it has shown there."""
 
     def __init__(self, folder, *command):
         ours, theirs = pty.openpty()
@@ -69,7 +69,7 @@ class Terminal:
         os.close(self.end)
 
     def wait_for(self, part, patience=60.0):
-        """Read until the part is shown, behind what was waited for before."""
+        """Read until the part is shown, after the part that was waited for before."""
         latest = time.monotonic() + patience
         while part not in self.shown[self.seen :]:
             assert select.select([self.end], [], [], latest - time.monotonic())[0], f"{part}: {self.shown}"
@@ -110,8 +110,8 @@ def test_control_c_and_d_end_the_questions(key, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_without_a_terminal_it_says_what_is_needed(run, tmp_path, monkeypatch):
-    """Also where lines end too early."""
+def test_without_a_terminal_missing_answers_are_an_error(run, tmp_path, monkeypatch):
+    """Lines of standard input that end too early are an error, too."""
     code, out, err = run("wizard")
     assert (code, out) == (2, "")
     assert "no-terminal" in err
@@ -150,7 +150,7 @@ def test_a_missing_folder_is_refused_before_any_question(run, tmp_path, monkeypa
     assert sys.stdin.readline() == "no\n"
 
 
-def test_specs_of_one_name_in_two_folders_have_runs_of_their_own(run, tmp_path, monkeypatch):
+def test_specs_of_one_name_in_two_folders_have_separate_runs(run, tmp_path, monkeypatch):
     monkeypatch.setattr("inputdesign_cli.wizard.composing.with_spectrum", lambda draft, solve: draft)
     monkeypatch.setattr("inputdesign_cli.wizard.solving.verdict", lambda *_: [])
     for folder in ("tank", "room"):
@@ -164,7 +164,7 @@ def test_specs_of_one_name_in_two_folders_have_runs_of_their_own(run, tmp_path, 
 
 
 def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
-    """A line that is not understood ends it, as later lines answer other questions; defaults fill the end."""
+    """A wrong line ends the wizard, as later lines answer other questions; defaults fill missing lines."""
     monkeypatch.setattr("inputdesign_cli.wizard.composing.with_spectrum", lambda draft, solve: draft)
     monkeypatch.setattr("sys.stdin", io.StringIO("soon\n1 min\n"))
     code, out, err = run("wizard", SENTENCE, "-o", "mine.yaml")
@@ -182,7 +182,7 @@ def test_a_pipe_answers_as_a_terminal_does(run, tmp_path, monkeypatch):
     assert run("validate", "mine.yaml")[0] == 0
 
 
-def test_a_trade_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):
+def test_a_trade_off_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})  # no other processes
     spec = (
         "plant: {B: [0, 1], F: [1, -0.8]}\nnoise: {variance: 1}\nexperiment: {samples: 40}\n"
@@ -212,7 +212,7 @@ def test_a_trade_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):
     assert not any(name.endswith((".png", ".pdf")) for name in drawn)
 
 
-def test_answers_are_not_lost_to_the_spec(run, tmp_path):
+def test_the_spec_does_not_overwrite_the_file_of_answers(run, tmp_path):
     answers = tmp_path / "a.yaml"
     text = "".join(f"{key}: {told}\n" for key, told in (one.split("=", 1) for one in ANSWERS))
     answers.write_text(text)
@@ -223,7 +223,7 @@ def test_answers_are_not_lost_to_the_spec(run, tmp_path):
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_a_wrong_answer_is_told_with_its_line(run, tmp_path, key):
+def test_a_wrong_answer_in_a_file_is_reported_with_its_line(run, tmp_path, key):
     file = tmp_path / "a.yaml"
     said = {name: text for name, text in GOOD.items() if name != key} | {key: "a kettle"}
     file.write_text("".join(f'{name}: "{text}"\n' for name, text in said.items()))
@@ -242,7 +242,7 @@ def test_a_wrong_answer_is_told_with_its_line(run, tmp_path, key):
         ("plant: heater\nplnat: heater\n", 2, "plnat"),
     ],
 )  # fmt: skip
-def test_what_is_no_file_of_answers_is_refused_with_its_place(tmp_path, text, line, told):
+def test_malformed_files_of_answers_are_refused_with_the_line(tmp_path, text, line, told):
     file = tmp_path / "a.yaml"
     file.write_text(text)
     with pytest.raises(SpecError, match=told) as error:
@@ -251,7 +251,7 @@ def test_what_is_no_file_of_answers_is_refused_with_its_place(tmp_path, text, li
     assert (place.file, place.line) == (str(file), line)
 
 
-def test_what_a_file_leaves_open_is_told_of_the_file_and_an_option_has_no_line(run, tmp_path):
+def test_missing_answers_are_reported_for_the_file_and_options_without_a_line(run, tmp_path):
     file = tmp_path / "a.yaml"
     command = ("wizard", "--answers", file, "-o", tmp_path / "s.yaml", "--no-solve")
     file.write_text("plant: heater\n")

@@ -10,7 +10,7 @@ def held(rng, samples, hold=6, levels=(-1.0, 1.0)):
 
 
 def with_noise(rng, x, ratio=10.0, pole=0.0):
-    """Return signals (n,) with noise of that share of their power, which fades by the pole."""
+    """Return signals (n,) with first-order noise at this ratio of powers, signal to noise."""
     v = scipy.signal.lfilter([1.0], [1.0, -pole], rng.standard_normal(x.shape), axis=0)
     return x + np.std(x) / np.sqrt(ratio) * v / np.std(v)
 

@@ -40,7 +40,7 @@ def test_gain_time_constant_and_dead_time_are_found(found):
 
 
 def test_delays_lie_within_their_ranges(found):
-    """The first sample that the input moves is the fourth."""
+    """A dead time of 3.4 samples lets the input act from lag 4 on."""
     (chosen,) = found.outputs
     for candidate in chosen.candidates:
         ((low, high),) = candidate.ranges
@@ -68,15 +68,15 @@ def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
 @pytest.mark.parametrize(
     "pole", [0.0, 0.9, pytest.param(0.95, marks=pytest.mark.xfail(strict=True, reason="four of six"))]
 )
-def test_a_lag_with_dead_time_wins_where_it_explains_as_well(pole):
-    """Of six records in noise of another colour each, five at least; no more than one would be chance."""
+def test_a_lag_with_dead_time_is_preferred_where_it_explains_as_well(pole):
+    """At least five of six records lead to it, in noise of this pole."""
     families = [
         explore_records([first_order(seed, pole=pole)], step=STEP).taken[0].orders.family for seed in range(6)
     ]
     assert families.count("FOPDT") >= 5
 
 
-def test_a_second_order_is_not_taken_for_a_first():
+def test_a_second_order_plant_is_not_taken_for_a_first_order_one():
     rng = np.random.default_rng(4)
     u = held(rng, 600, 12)
     x = scipy.signal.lfilter([0, 0, 0.05, 0.04], [1, -1.7, 0.8], u)
@@ -111,13 +111,13 @@ def test_a_static_gain_has_no_pole(delay, hold):
         ("armax", ("a", "b", "c")),
     ],
 )
-def test_a_structure_that_is_asked_for_is_taken(only, names):
+def test_a_structure_that_is_asked_for_is_used(only, names):
     found = explore_records([first_order(3, 300)], step=STEP, only=only)
     letters = {name if names[0] == "K" else name.rstrip("0123456789") for name in found.model.names}
     assert set(names) <= letters <= {*names, "c1", "d1", "c2", "d2"}
 
 
-def test_an_integrator_is_taken_where_no_time_constant_follows():
+def test_an_integrator_is_chosen_where_the_record_shows_no_time_constant():
     rng = np.random.default_rng(1)
     u = held(rng, 400, 8)
     y = np.cumsum(np.concatenate([[0.0], 0.02 * u[:-1]])) + 0.05 * rng.standard_normal(400)
@@ -127,7 +127,7 @@ def test_an_integrator_is_taken_where_no_time_constant_follows():
 
 
 def lagging_tank(rng, samples):
-    """A tank, 0.02 a second, behind a valve: a lag of 20 s, 8 s of dead time; by steps of 0.1 s."""
+    """u, y (samples, 1): a tank of slope 0.02/s behind a lag of 20 s and a dead time of 8 s, by Euler."""
     u = held(rng, samples, 8)
     valve = scipy.signal.lfilter([0.0, 0.005], [1.0, -0.995], np.repeat(u, 50))
     level = np.cumsum(np.concatenate([np.zeros(80), 0.1 * 0.02 * valve]))[: 50 * samples : 50]
@@ -144,7 +144,7 @@ def test_an_integrator_behind_a_lag_is_found(only):
 
 
 @pytest.mark.slow
-def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
+def test_a_lag_with_a_drift_is_found_in_two_records_with_a_gap():
     """Gain 1.7, pole 0.98, dead time of six samples, one line, noise that fades in twelve samples."""
     found = explore_records(drifting(2, 1e-3))
     K, T, L = found.estimate.theta[:3]
@@ -155,7 +155,7 @@ def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
     assert found.slopes == pytest.approx([1e-3], rel=0.15)
 
 
-def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion(found):
+def test_steady_and_certain_candidates_rank_first_and_then_the_criterion(found):
     one = found.outputs[0].best
     plain = replace(one, validation=89.5, criterion=-1.0)
     rich = replace(one, validation=90.0, criterion=-0.9)
@@ -165,13 +165,13 @@ def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion(fo
     every, good = ranked([weak, edge, vague, rich, plain])
     assert every == (plain, rich, vague, edge, weak)
     assert good == every[:4]
-    # In a loop prediction errors alone rank what is steady and certain.
+    # In a loop prediction errors alone rank steady and certain candidates.
     looped = ranked([weak, plain, rich], by_prediction=True)
     assert [c.criterion for c in looped[0]] == [-3.0, -1.0, -0.9]
 
 
 def looped(rng, samples, noise):
-    """Return u = r - y without delay, about 0.3 q^-1 / (1 - 0.8 q^-1): u (n, 1), y (n, 1)."""
+    """Return u (n, 1), y (n, 1) of 0.3 q^-1 / (1 - 0.8 q^-1) under u = r - y, which has no delay."""
     e, r = 0.2 * rng.standard_normal(samples), held(rng, samples, 5)
     v = scipy.signal.lfilter([1.0], [1.0, -0.8], e) if noise == "arx" else e
     u, y, x = np.zeros(samples), np.zeros(samples), np.zeros(samples)
@@ -184,7 +184,7 @@ def looped(rng, samples, noise):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", ["arx", "oe"])
-def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
+def test_a_controller_without_delay_is_not_taken_for_the_plant(noise):
     found = explore_records([looped(np.random.default_rng(1), 1000, noise)], feedback=True)
     assert found.taken[0].orders.delays == (1,)
     w = np.array([1e-4, 0.2])
@@ -193,7 +193,7 @@ def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
 
 
 @pytest.mark.slow
-def test_two_inputs_and_outputs_are_one_model():
+def test_one_model_of_two_inputs_and_two_outputs_is_found():
     rng = np.random.default_rng(8)
     u = np.stack([held(rng, 600, 8), held(rng, 600, 13)], axis=1)
     G = [[([0, 0.2], 0.8), ([0, 0, -0.1], 0.9)], [([0, 0, 0, 0.3], 0.7), ([0, 0.1], 0.85)]]
@@ -208,7 +208,7 @@ def test_two_inputs_and_outputs_are_one_model():
             np.testing.assert_allclose(found.model.plant_at(w)[:, i, j], truth, atol=0.06)
 
 
-def test_an_input_that_never_moves_has_no_part_of_the_model():
+def test_a_constant_input_has_no_effect_in_the_model():
     u, y = first_order(11, 300)
     found = explore_records([(np.column_stack([np.full(300, 3.0), u]), y)], step=STEP)
     assert (found.still, found.moving) == ((0,), [1])
@@ -227,8 +227,8 @@ def test_too_short_a_record_is_refused():
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), (110, 0.02)])
-def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
-    """A lag of ten samples, gain one; a part of it says nothing, also where u flickers."""
+def test_the_whole_record_of_a_single_step_estimates_and_validates(at, flicker):
+    """A lag of ten samples, gain one; a part without the step shows nothing, also where u flickers."""
     rng = np.random.default_rng(1)
     u = (np.arange(200) >= at)[:, None].astype(float)
     y = scipy.signal.lfilter([0, 0.1], [1, -0.9], u, axis=0) + 0.02 * rng.standard_normal((200, 1))
@@ -250,7 +250,7 @@ def test_a_dead_time_of_a_quarter_of_the_record_is_found(seed):
     assert abs(found.taken[0].orders.delays[0] - late) <= 1
 
 
-def test_an_interrupted_search_gives_the_best_so_far(monkeypatch):
+def test_an_interrupted_search_gives_the_candidates_tried_so_far(monkeypatch):
     from inputdesign_cli.explore import search
 
     tried = []
@@ -278,7 +278,7 @@ def pulse(samples, up, down):
 
 
 @pytest.mark.parametrize(("up", "down"), [(50, 110), (20, 200), (100, 260), (130, 170), (30, 120)])
-def test_the_steps_of_a_single_pulse_are_parted_with_what_comes_after_them(up, down):
+def test_a_single_pulse_is_divided_into_one_step_for_each_part(up, down):
     first, second, split = divided([record(pulse(300, up, down))])
     assert split.endswith("and the rest")
     assert len(first) == len(second) == 1
@@ -289,8 +289,8 @@ def test_the_steps_of_a_single_pulse_are_parted_with_what_comes_after_them(up, d
     np.testing.assert_array_equal(np.concatenate([first[0][1], second[0][1]])[:, 0], np.arange(300))
 
 
-def test_other_records_keep_three_fifths_or_are_judged_in_blocks_or_at_once():
-    """Inputs that move all along, one after the other, and in a single step."""
+def test_other_records_are_divided_at_60_percent_or_in_blocks_or_not():
+    """The inputs move throughout, one after the other, or in a single step."""
     moves = np.tile([1.0, -1.0], 75)
     first, _, split = divided([record(np.random.default_rng(1).choice([-1.0, 1.0], 200))])
     assert (len(first[0][0]), split) == (120, "the first 60 % and the rest")
@@ -301,8 +301,8 @@ def test_other_records_keep_three_fifths_or_are_judged_in_blocks_or_at_once():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_a_bump_up_and_down_tells_gain_and_time_constant(seed):
-    """A lag of 45 samples behind six, one pulse: parted in blocks, two poles were invented beside it."""
+def test_a_single_pulse_determines_gain_and_time_constant(seed):
+    """A lag of 45 samples with a dead time of six; a division in blocks gave two additional poles."""
     rng, pole = np.random.default_rng(seed), np.exp(-1.0 / 45.0)
     u = 30.0 + 10.0 * pulse(300, 50, 110)
     y = scipy.signal.lfilter(np.append(np.zeros(7), 0.8 * (1.0 - pole)), [1.0, -pole], u - 30.0)

@@ -1,4 +1,4 @@
-"""Loops are seen, open loops are not called loops, and inputs that were logged late are found."""
+"""Feedback is found in loops, and neither in open loops nor in inputs that somebody sets."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from inputdesign_cli.explore.relation import answers_output, like_answers, only_
 from tests.explore.plants import column
 from tests.support.loops import LAWS, SAMPLES, loop
 
-# B from lag zero, A, and a PI controller that holds it: gain and integral.
+# B from lag zero on, A, and a stabilising PI controller: gain and integral gain.
 PLANTS = {
     "lag": ([0, 0, 0.2], [1, -0.8], (0.8, 0.1)),
     "slow": ([0, 0.1], [1, -0.9], (3.0, 0.0)),
@@ -35,7 +35,7 @@ def noise(rng, samples, name, size):
 
 
 def looped(rng, plant, colour, hold):
-    """u (n, 1) and y (n, 1) of a loop that answers y(t) by u(t), its reference held."""
+    """u (n, 1) and y (n, 1) of a loop in which u(t) depends on y(t), with a held reference."""
     b, a, (gain, integral) = PLANTS[plant]
     r, v = steps(rng, 800, hold), noise(rng, 800, colour, 0.3)
     u, y, x, total = np.zeros(800), np.zeros(800), np.zeros(800), 0.0
@@ -49,7 +49,7 @@ def looped(rng, plant, colour, hold):
 
 
 def moved(rng, kind, samples):
-    """An input of an open loop."""
+    """An input (samples,) of an open loop."""
     smooth = scipy.signal.lfilter([0.2], [1, -0.8], steps(rng, samples, 15))
     return {
         "held": lambda: steps(rng, samples, 5),
@@ -79,15 +79,15 @@ KINDS = ("held", "levels", "prbs", "sines", "walk", "step", "white", "smooth", "
 
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize(("colour", "hold"), [("ar", 10), ("walk", 20)])
-def test_a_loop_whose_reference_is_held_is_seen(plant, colour, hold):
-    """Between steps u tells all of y that past outputs could; what it does at once is left."""
+def test_feedback_is_found_in_a_loop_with_a_held_reference(plant, colour, hold):
+    """Between steps past inputs predict as much as past outputs; only simultaneous changes are left."""
     record = looped(np.random.default_rng(1), plant, colour, hold)
     assert [j for j, _ in answers_output([record])] == [0]
 
 
 @pytest.mark.parametrize("plant", ["at once", "at once, inverse", "gain"])
-def test_a_plant_that_answers_at_once_is_no_controller(plant):
-    """What is new in u and y goes together, at the jumps of u as well."""
+def test_direct_feedthrough_is_not_taken_for_feedback(plant):
+    """The innovations of u and y are correlated, at the jumps of u as well."""
     rng = np.random.default_rng(2)
     b, a, _ = OPEN[plant]
     u = moved(rng, "dither", 800)
@@ -105,8 +105,8 @@ def test_an_open_loop_is_not_called_a_loop(kind):
 @pytest.mark.first(3)
 @pytest.mark.parametrize("hold", [5, 20, 60])
 @pytest.mark.parametrize("pole", [0.7, 0.99])
-def test_an_input_that_is_held_is_no_answer(hold, pole):
-    """Its own past predicts it badly where that is cut off, and a plant that remembers it adds to that."""
+def test_a_held_input_is_not_taken_for_feedback(hold, pole):
+    """Its truncated past predicts it badly, and the output of a slow plant seems to help."""
     rng = np.random.default_rng(hold)
     u = np.sign(rng.standard_normal(20000 // hold)).repeat(hold)
     e = scipy.signal.lfilter([1.0], [1.0, -0.8], 0.3 * rng.standard_normal(u.size))
@@ -115,7 +115,7 @@ def test_an_input_that_is_held_is_no_answer(hold, pole):
 
 
 @pytest.mark.parametrize("dither", [0.0, 0.1])
-def test_an_input_that_only_answers_is_noticed(dither):
+def test_an_input_that_is_an_exact_function_of_the_output_is_found(dither):
     rng = np.random.default_rng(14)
     e, d = rng.standard_normal((2, 800))
     y, u = np.zeros(800), np.zeros(800)
@@ -125,7 +125,7 @@ def test_an_input_that_only_answers_is_noticed(dither):
     assert only_answers([column(u, y)]) == ([] if dither else [0])
 
 
-def test_a_sinusoid_is_no_answer():
+def test_a_sinusoid_is_not_taken_for_a_function_of_the_output():
     u = np.sin(0.3 * np.arange(500.0))[:, None]
     assert only_answers([(u, u + 0.1 * np.random.default_rng(1).standard_normal(u.shape))]) == []
 
@@ -138,8 +138,8 @@ SET = {
 
 
 @pytest.mark.parametrize("make", SET.values(), ids=SET)
-def test_inputs_that_somebody_sets_are_no_answers(make):
-    """Though the plant answers them at once."""
+def test_inputs_that_somebody_sets_do_not_look_like_feedback(make):
+    """The plant has direct feedthrough."""
     for seed in (1, 2):
         rng = np.random.default_rng(seed)
         u = make(rng)
@@ -148,6 +148,6 @@ def test_inputs_that_somebody_sets_are_no_answers(make):
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_the_answers_of_a_controller_look_like_answers(law):
+def test_inputs_from_a_controller_look_like_feedback(law):
     for steps, reported in ((0.0, 0.02), (0.3, 0.02), (0.3, 0.0)):
         assert like_answers([loop(3, law, steps=steps, reported=reported)], 0, 0)

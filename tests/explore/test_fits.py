@@ -1,4 +1,4 @@
-"""Fits are those of their definition, in s and in q^-1."""
+"""Fits of simulation and prediction follow their definition, in s and in q^-1."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from tests.support.plants import lag_of
 STEP = 0.5
 
 
-def test_a_level_and_a_start_cost_no_fit():
+def test_an_unknown_level_and_start_do_not_lower_the_fit():
     """A simulation from any state about any level, without noise, explains everything."""
     u, F = np.random.default_rng(5).standard_normal(300), [1.0, -1.5, 0.7]
     y = 7.0 + scipy.signal.lfilter([0.0, 1.0, 0.5], F, u)
@@ -22,7 +22,7 @@ def test_a_level_and_a_start_cost_no_fit():
     assert found.prediction[0] > 100.0 - 1e-6
 
 
-def test_the_fit_is_that_of_its_definition():
+def test_the_fit_agrees_with_its_definition():
     u, e = np.random.default_rng(6).standard_normal((2, 2000))
     y = scipy.signal.lfilter([0.0, 1.0], [1.0, -0.5], u) + e
     found = fits(PolynomialModel.single([0.0, 1.0], F=[1.0, -0.5]), [column(u, y)])
@@ -31,7 +31,7 @@ def test_the_fit_is_that_of_its_definition():
 
 
 @pytest.mark.slow
-def test_noise_explains_itself_by_chance_as_seldom_as_stated():
+def test_random_signals_exceed_the_limit_of_chance_in_5_percent():
     """The best of 10 sets of three random signals explains that much in 5 % at most."""
     rng = np.random.default_rng(4)
     limit, above = by_chance(60, 3, 10), 0
@@ -63,8 +63,8 @@ def test_a_dead_time_explains_nothing_of_white_noise(late, in_s):
 
 
 @pytest.mark.parametrize("in_s", [True, False])
-def test_a_true_model_is_judged_alike_in_s_and_in_q(in_s):
-    """A record that begins while 14 unknown inputs are still on their way: only its noise is left."""
+def test_the_true_model_has_the_same_fit_in_s_and_in_q(in_s):
+    """The first 14 samples respond to unknown inputs and do not count; in the others noise is left."""
     rng = np.random.default_rng(4)
     u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)[:, None]
     truth, pole = SampledModel(lag_of([2.0], [6.0, 1.0], 7.0), STEP), np.exp(-STEP / 6.0)
@@ -88,7 +88,7 @@ def test_a_true_model_is_judged_alike_in_s_and_in_q(in_s):
         (Process((3,), 2, STEP, zero=True), [2.0, 3.0, 1.5, 0.7, 1.2], [9.0, 9.0, 1.0]),
     ],
 )
-def test_a_response_is_that_of_its_formula(process, theta, below):
+def test_process_models_have_the_frequency_response_of_their_formula(process, theta, below):
     plant = process_models([process], [np.array(theta)], np.eye(1)).coefficients.continuous_plant
     w = np.array([0.01, 0.3, 2.0])
     s = 1j * w

@@ -1,4 +1,4 @@
-"""Signals that agree though neither moves the other, unstable plants, and inputs that excite too little."""
+"""Spurious relations between signals, unstable plants, and inputs that excite too little."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def cycles(rng, period=90.0, samples=700, noise=0.1):
 
 
 def switched(rng, samples, low, high):
-    """Return an input of two levels that is switched after any time."""
+    """Return an input (samples,) of +-1 that switches after random times."""
     signs = np.concatenate([np.full(rng.integers(low, high), (-1.0) ** i) for i in range(samples)])
     return signs[:samples]
 
@@ -44,8 +44,8 @@ def rising(rng):
 
 
 @pytest.mark.parametrize(("make", "least"), [(wandering, 19), (rising, 19)])
-def test_signals_that_agree_by_chance_help_nothing(make, least):
-    """Of 20 pairs one may help at the level of the test; a model that is scaled to them simulates a part."""
+def test_inputs_that_agree_by_chance_do_not_improve_the_prediction(make, least):
+    """One of 20 pairs may help at the level of the test; the gain of the model is fitted to each pair."""
     told = 0
     for seed in range(RECORDS):
         u, y = make(np.random.default_rng(seed))
@@ -68,8 +68,8 @@ def smooth(rng):
 
 @pytest.mark.parametrize("make", [prbs, two_steps, smooth, cycles])
 @pytest.mark.parametrize("colour", [0.0, 0.9, 1.0])
-def test_a_plant_that_answers_is_helped(make, colour):
-    """Noise white, coloured, and a random walk."""
+def test_an_input_with_an_effect_improves_the_prediction(make, colour):
+    """The noise is white, coloured, or a random walk."""
     for seed in range(RECORDS):
         rng = np.random.default_rng(seed)
         u = make(rng)
@@ -78,15 +78,15 @@ def test_a_plant_that_answers_is_helped(make, colour):
         assert unhelpful(lag(2.0), [(u[:, None], y[:, None])]) == []
 
 
-def test_what_cannot_be_compared_is_not_told():
-    """Records shorter than what a comparison needs, and a model whose simulation is infinite."""
+def test_inputs_of_short_records_and_infinite_simulations_are_not_judged():
+    """The records are too short for a comparison, or the model is one whose simulation is infinite."""
     short = np.random.default_rng(1).standard_normal((10, 1))
     assert unhelpful(lag(1.0), [(short, short)]) == []
     long = np.random.default_rng(1).standard_normal((600, 1))
     assert unhelpful(lag(1.0, pole=1e3), [(long, long)]) == []
 
 
-def test_sinusoids_excite_twice_their_number():
+def test_n_sinusoids_are_persistently_exciting_of_order_2n():
     t = np.arange(400.0)
     u = sum(np.sin(2.0 * np.pi * k / 400.0 * t + k) for k in (25, 70, 130))
     assert order_of_excitation([(u[:, None], u[:, None])]) == 6
@@ -95,15 +95,15 @@ def test_sinusoids_excite_twice_their_number():
 
 
 @pytest.mark.parametrize("digits", [5, 8, 15])
-def test_a_part_of_a_period_tells_no_more_than_whole_ones(digits):
-    """The mean of a sinusoid that ends within a period is no excitation, nor is what rounding adds."""
+def test_an_incomplete_period_does_not_raise_the_order_of_excitation(digits):
+    """Neither the mean of a sinusoid that ends within a period nor rounding errors are excitation."""
     u = np.round(np.sin(0.3 * np.arange(790.0) + 1.0) + 5.0, digits)[:, None]
     assert order_of_excitation([(u, u)]) == 2
 
 
 @pytest.mark.parametrize("at", [12, 60, 150])
-def test_a_step_excites_as_many_delays_as_stand_before_it(at):
-    """And, behind it, as many as there are samples."""
+def test_the_order_of_excitation_of_a_step_is_the_samples_before_it(at):
+    """It is also limited by the samples after the step."""
     u = (np.arange(200) >= at)[:, None].astype(float)
     assert order_of_excitation([(u, u)]) == min(at, 50)
 
@@ -118,7 +118,7 @@ def test_a_step_excites_as_many_delays_as_stand_before_it(at):
         ([1, -1.4, 0.6], [1.0, 0.0]),
     ],
 )
-def test_a_pole_outside_the_circle_is_told_where_it_is(A, controller):
+def test_a_pole_outside_the_unit_circle_is_located(A, controller):
     """A x = 0.2 u(t - 1) under u = r - C y; the last two plants are stable."""
     rng = np.random.default_rng(4)
     r, y, u, x = switched(rng, 500, 1, 6), np.zeros(500), np.zeros(500), np.zeros(500)
@@ -137,7 +137,7 @@ def test_a_pole_outside_the_circle_is_told_where_it_is(A, controller):
 
 
 @pytest.mark.parametrize("deviation", [0.02, 0.3, 1.0])
-def test_an_input_that_follows_another_is_left_its_own_part(deviation):
+def test_the_share_of_an_input_that_another_does_not_explain_is_found(deviation):
     """u2(t) = u1(t - 3) + s e(t), both white: s^2 / (1 + s^2) of its power is its own."""
     rng = np.random.default_rng(1)
     one = rng.standard_normal(20_000)
@@ -146,7 +146,7 @@ def test_an_input_that_follows_another_is_left_its_own_part(deviation):
     assert left == pytest.approx(deviation**2 / (1.0 + deviation**2), rel=0.05)
 
 
-def test_inputs_that_move_by_themselves_are_left_whole():
+def test_no_part_of_independent_inputs_is_explained_by_others():
     u = np.random.default_rng(2).standard_normal((20_000, 3))
     assert left_of_inputs([(u, u)]) == pytest.approx([1.0] * 3, abs=0.01)
     assert left_of_inputs([(u[:, :1], u)]) == [1.0]

@@ -1,4 +1,4 @@
-"""The regressions of the sweep are those of least squares, and give delays, poles, noise and slopes."""
+"""Regressions over delays and orders find delays, poles, noise and drifts of simulated plants."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_the_delay_of_a_lag_is_found_at_ten_decibels(delay):
         assert abs(swept.by_order[1].delays[0] - delay) <= 1
 
 
-def test_the_best_delay_is_that_of_a_search_over_all():
+def test_the_best_delay_has_the_loss_of_an_exhaustive_search():
     one = record(np.random.default_rng(9), 7)
     losses = [Regressed([one], 1).output_error((d,)).loss for d in range(30)]
     assert sweep([one], 1).by_order[1].loss <= min(losses) * 1.001
@@ -48,7 +48,7 @@ def test_poles_of_a_second_order_are_found_in_several_records():
     assert left == pytest.approx(swept.by_order[2].loss)
 
 
-def test_records_through_an_autoregression_are_white():
+def test_an_autoregression_makes_records_white():
     e = np.random.default_rng(5).standard_normal(4000)
     v = scipy.signal.lfilter([1.0], [1.0, -1.2, 0.5], e)
     np.testing.assert_allclose(whitening([v[:2000], v[2000:]])[:3], [1.0, -1.2, 0.5], atol=0.06)
@@ -66,7 +66,7 @@ def test_orders_of_the_noise_are_found(C, D):
 
 
 @pytest.mark.parametrize("seeds", [5, pytest.param(10, marks=pytest.mark.slow)])
-def test_the_range_of_a_delay_holds_it(seeds):
+def test_the_confidence_range_of_a_delay_contains_it(seeds):
     inside = 0
     for seed in range(seeds):
         one = record(np.random.default_rng(seed), 5, ratio=2.0)
@@ -76,7 +76,7 @@ def test_the_range_of_a_delay_holds_it(seeds):
 
 
 def drifting(seed, slope, samples=1600, pole=0.92):
-    """Return two records of steps of a slow lag; the drift has gone on through the gap between them."""
+    """Return two records of steps of a slow lag; the drift continues through the gap between them."""
     rng = np.random.default_rng(seed)
     u = held(rng, samples, 100, (-3.0, -1.0, 2.0, 4.0))
     x = scipy.signal.lfilter([0.0] * 7 + [0.034], [1.0, -0.98], u)
@@ -87,7 +87,7 @@ def drifting(seed, slope, samples=1600, pole=0.92):
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("slope", [1e-3, 0.0, -1e-3])
-def test_one_line_through_all_records_is_found_and_none_invented(slope):
+def test_the_slope_of_one_line_through_all_records_is_found(slope):
     """Noise of a power of 0.25 at low frequencies gives the slope a deviation of 6.4e-5."""
     parts = drifting(1, slope)
     found = slopes_of(parts)
@@ -98,23 +98,23 @@ def test_one_line_through_all_records_is_found_and_none_invented(slope):
 
 
 def short(records, samples):
-    """Records of which whitening leaves nothing."""
+    """Records that are too short to be whitened."""
     rng = np.random.default_rng(3)
     noise = scipy.signal.lfilter([1.0], [1.0, -1.6, 0.8], rng.standard_normal((records, samples)), axis=1)
     return [column(rng.choice([-1.0, 1.0], samples), 0.1 * e) for e in noise]
 
 
-def test_records_shorter_than_their_noise_lasts_have_finite_slopes():
+def test_slopes_of_records_shorter_than_the_memory_of_noise_are_finite():
     assert np.all(np.isfinite(slopes_of(short(4, 12))))
 
 
 @pytest.mark.slow
-def test_records_shorter_than_their_noise_lasts_have_a_model():
+def test_records_shorter_than_the_memory_of_noise_have_a_model():
     assert np.all(np.isfinite(explore_records(short(50, 19)).estimate.theta))
 
 
-def test_random_walks_seldom_have_a_line():
-    """A walk of unit steps rises by many times what whitened noise would allow."""
+def test_random_walks_are_seldom_taken_for_a_line():
+    """A random walk rises by many times as much as stationary noise would allow."""
     lines = 0
     for seed in range(5):
         rng = np.random.default_rng(seed)

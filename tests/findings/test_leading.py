@@ -1,4 +1,4 @@
-"""One finding explains the others, and the command that it names ends the matter."""
+"""One finding explains the others, and the command that it names leads to a verdict."""
 
 import json
 import shlex
@@ -59,7 +59,7 @@ def record(path, fault, seed, samples=480):
 
 
 def followed(spec, data, command):
-    """What comes of the command that a verdict names."""
+    """The outcome of the command that a verdict names."""
     if command.startswith("idesign explore"):
         assert shlex.split(command) == ["idesign", "explore", str(data)]
         found = explore([data]).results.resolved_spec
@@ -73,7 +73,7 @@ def followed(spec, data, command):
 
 
 def ended(fault, plant, seed, path):
-    """Whether a verdict is reached, with the first command that is named if need be."""
+    """Whether a verdict is reached, if necessary by the command that the first one names."""
     spec, data = parse_spec(f"plant: {plant}{SPEC}"), record(path / f"{fault}.csv", fault, seed)
     found = assess(spec, data)
     command = found.results.outcome.assessment.next
@@ -86,7 +86,7 @@ def ended(fault, plant, seed, path):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("fault", "seed"), [("noise", 0), ("drift", 0)])
-def test_the_command_ends_the_matter(fault, seed, tmp_path):
+def test_the_named_command_leads_to_a_verdict(fault, seed, tmp_path):
     assert ended(fault, IN_Q, seed, tmp_path)
 
 
@@ -116,7 +116,7 @@ def test_a_structure_that_explore_chose_by_the_same_data_is_not_explored_again(
 @pytest.mark.first(1)
 @pytest.mark.parametrize("fault", ["drift", "delay"])
 def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys):
-    """In the folder of the user, with names that have blanks, and with the options that were typed."""
+    """It runs in the folder of the user, with blanks in file names and with the options that were typed."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("inputdesign_cli.figures.plots.draw_all", lambda *_: {})
     folder, idesign = Path("of today"), caller(monkeypatch, capsys)
@@ -148,12 +148,12 @@ def test_the_command_runs_as_it_is_printed(fault, tmp_path, monkeypatch, capsys)
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", [IN_S, IN_Q], ids=["s", "q"])
 @pytest.mark.parametrize("fault", ["noise", "drift", "lag", "inverse", "delay"])
-def test_the_command_ends_nearly_every_matter(fault, plant, tmp_path):
+def test_the_named_command_leads_to_a_verdict_in_nine_of_ten_records(fault, plant, tmp_path):
     assert sum(ended(fault, plant, seed, tmp_path) for seed in range(10)) >= 9
 
 
-def test_what_may_follow_from_the_first_objection_says_so():
-    """Nothing but its message changes. Notes on what was done to a record follow from nothing."""
+def test_findings_that_may_follow_from_the_first_one_say_so():
+    """Only the message changes. Notes on the preparation of a record do not follow from a finding."""
     first = Finding("plant-structure", REFUTED, "a lag is missing")
     drift = Finding("drift", REFUTED, "it drifts", "y1", {"probability": 1e-9})
     note = Finding("segments", NOTE, "two segments")
@@ -162,8 +162,8 @@ def test_what_may_follow_from_the_first_objection_says_so():
 
 
 @pytest.mark.parametrize("seed", [0, 10])
-def test_noise_that_fades_beside_white_noise_needs_no_command(seed, tmp_path):
-    """A room whose sensor adds white noise: the first larger noise that was tried left residuals coloured."""
+def test_the_sum_of_coloured_and_white_noise_is_modelled_without_a_command(seed, tmp_path):
+    """The sensor of a room adds white noise; the first larger noise model left coloured residuals."""
     rng, n, pole, fades = np.random.default_rng(seed), 864, np.exp(-100 / 2700), np.exp(-100 / 600)
     u = 10.0 * np.repeat(rng.choice([-1.0, 1.0], n // 6), 6)
     y = scipy.signal.lfilter([0, 0, 0.14 * (1 - pole)], [1, -pole], u)
@@ -197,8 +197,8 @@ def test_spikes_that_follow_the_moves_of_inputs_are_no_faults_of_measurement(of_
 DATA = Record(np.zeros((40, 1)), np.zeros((40, 1)), None, np.arange(40.0), (40,), (("a.csv", 40),))
 
 
-def test_every_kind_that_leaves_a_verdict_open_names_a_command():
-    """The end of a campaign has its own in the message."""
+def test_every_finding_that_leaves_a_verdict_open_names_a_command():
+    """The message of a refuted campaign has its own command."""
     open_ = {code for code, kind in kinds().items() if kind.severity in (REFUTED, UNDECIDED)}
     for code in open_ - {"campaign-refuted"}:
         first = leading([Finding(code, REFUTED, "x", "", {"rows": []})], None, DATA)
@@ -210,11 +210,11 @@ def test_every_kind_that_leaves_a_verdict_open_names_a_command():
 
 @pytest.mark.parametrize(("pole", "explores"), [(0.7, True), (1.2, False)])
 def test_an_unstable_plant_is_not_explored(pole, explores, tmp_path, monkeypatch):
-    """Its spec lacks a lag. Beside the integrator of the spec no frequency is named that means zero."""
+    """The spec lacks a lag, and has an integrator: messages say "lowest frequencies", not 1e-13 rad/s."""
     monkeypatch.chdir(tmp_path)
     rng, N = np.random.default_rng(0), 400
     r, e = rng.choice([-2.0, 2.0], N), 0.3 * rng.standard_normal(N)
-    loop = np.polyadd(np.polymul([1, -pole], [1, -0.6]), [0, 0.4, 0])  # of y = 0.4 q^-1 u / A, u = r - y
+    loop = np.polyadd(np.polymul([1, -pole], [1, -0.6]), [0, 0.4, 0])  # y = 0.4 q^-1 u / A, u = r - y
     y = scipy.signal.lfilter([0, 0.4], loop, r) + scipy.signal.lfilter([1], loop, e)
     table = np.column_stack([r, r - y, y])
     np.savetxt("log.csv", table, delimiter=",", header="r1,u1,y1", comments="", fmt="%.9g")
@@ -246,14 +246,14 @@ spectrum: {type: fir, order: 4}
         (["input-without-effect", "records-differ"], "records-differ"),
     ],
 )
-def test_what_explains_the_others_comes_first(codes, first):
+def test_the_finding_that_explains_the_others_comes_first(codes, first):
     found = leading([Finding(code, REFUTED, code) for code in codes], None, DATA)
     assert [one.code for one in found.findings] == [first]
     assert leading([], None, DATA) is None
 
 
 def led(plant, noise, *codes):
-    """The command after a drift and findings with these codes, of a model with this plant and noise."""
+    """The command after findings of these codes (none: a drift), for a model of this plant and noise."""
     text = f"sample_time: 10\nplant: {plant}\nnoise: {noise}\n"
     model = build_model(parse_spec(text, design=False))
     estimate = SimpleNamespace(
@@ -272,8 +272,8 @@ TANK = "{continuous: {numerator: [0.02], denominator: [1, 0], delay: 10}, sample
 NAMED_TANK = TANK.replace("{cont", "{parameters: {slope: 0.02}, cont").replace("[0.02]", "[slope]")
 
 
-def test_a_lag_that_is_missing_is_no_leak():
-    """Past inputs explain the residuals, and a leak does less so (its test: 0.4, 3e-4), or better (1e-9)."""
+def test_a_missing_lag_is_not_taken_for_a_leak():
+    """Past inputs explain the residuals (p = 1e-7); a leak does less well (0.4, 3e-4), or better (1e-9)."""
     for probability, leaks in ((0.4, False), (3e-4, False), (1e-9, True)):
         tests = SimpleNamespace(
             scores=(SimpleNamespace(name="leak", probability=probability),),
@@ -282,8 +282,8 @@ def test_a_lag_that_is_missing_is_no_leak():
         assert _no_leak(SimpleNamespace(tests=tests)) is not leaks
 
 
-def test_no_command_asks_for_what_the_model_has_already():
-    """A line in the output of a tank is its answer to the input, or its leak; noise drifts once only."""
+def test_no_command_adds_a_drift_or_a_leak_that_the_model_has():
+    """A line in the output of a tank is its response to the input, or a leak; noise drifts once only."""
     assert "--detrend linear" in led(LAG, "{variance: 1}")
     noise = "{standard_deviation: 1, correlation_time: 60}"
     assert "noise.drift=true" in led(TANK, noise)
@@ -312,7 +312,7 @@ spectrum: {type: multisine, lines: 100}
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_tank_behind_a_lagging_valve_is_led_to_its_model(seed, tmp_path):
-    """0.02 a second, 20 s, 8 s: the spec knows no lag. `explore` finds it, and the data meet its spec."""
+    """Slope 0.02/s, lag 20 s, dead time 8 s: the spec has no lag; `explore` finds it, and its spec is met."""
     spec, log, (u, y) = (
         tmp_path / "s.yaml",
         tmp_path / "log.csv",

@@ -1,4 +1,4 @@
-"""Faults of measurement are told; what a plant answers to white, few-level or rare inputs is none."""
+"""Outlying values are reported; responses to white, few-level or rare inputs are not outlying."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ INPUTS = {
 
 @pytest.mark.parametrize("make", INPUTS.values(), ids=INPUTS)
 @pytest.mark.parametrize(("pole", "delay"), [(0.0, 0), (0.1, 7), (0.5, 1), (0.9, 20)])
-def test_what_the_input_explains_is_no_fault(make, pole, delay):
+def test_responses_that_the_input_explains_are_not_outlying(make, pole, delay):
     rng = np.random.default_rng(4)
     for noise in (1e-4, 1e-2, 0.3):
         u = make(rng)
@@ -37,7 +37,7 @@ def test_what_the_input_explains_is_no_fault(make, pole, delay):
 
 
 @pytest.mark.parametrize("make", [white, INPUTS["two levels"]], ids=["white", "two levels"])
-def test_faults_are_told_beside_a_white_input_too(make):
+def test_outlying_outputs_are_found_with_a_white_input_too(make):
     rng = np.random.default_rng(5)
     u = np.column_stack([make(rng), make(rng)])
     y = scipy.signal.lfilter([0.0, 1.0], [1.0, -0.8], u @ [1.0, 0.5]) + 0.05 * rng.standard_normal(N)
@@ -49,7 +49,7 @@ def test_faults_are_told_beside_a_white_input_too(make):
     assert (told.code, told.figures["rows"]) == ("outlying-values", [12, 24, 36])
 
 
-def test_an_input_is_judged_by_itself():
+def test_an_input_is_compared_with_its_own_values_alone():
     u = np.sign(np.random.default_rng(6).standard_normal(N))
     assert outlying("u", u, None, LINES) == []
     u[40] = -9999.0
@@ -57,8 +57,8 @@ def test_an_input_is_judged_by_itself():
     assert (told.where, told.figures["rows"]) == ("u", [42])
 
 
-def test_an_input_without_numbers_beside_the_output_explains_nothing():
-    """As where a logger writes inputs and outputs in turn."""
+def test_inputs_without_numbers_do_not_hide_an_outlying_output():
+    """A logger may write inputs and outputs in turn."""
     y = np.random.default_rng(7).standard_normal(N)
     y[10] = 90.0
     (told,) = outlying("y", y, np.full((N, 2), np.nan), LINES)

@@ -8,7 +8,7 @@ from inputdesign_cli.findings.faults import rounding_error
 
 
 def largest_mean_error(step, noise):
-    """Over levels within a step, by the probabilities of the cells."""
+    """The largest mean error over levels within a step, by the normal probabilities of the cells."""
     level, cell = np.linspace(0.0, step, 401), step * np.arange(-40, 42)
     edges = np.append(cell - 0.5 * step, cell[-1] + 0.5 * step)
     mass = np.diff(scipy.stats.norm.cdf((edges[None] - level[:, None]) / noise), axis=1)
@@ -16,7 +16,7 @@ def largest_mean_error(step, noise):
 
 
 @pytest.mark.parametrize("noise", [0.01, 0.1, 0.2, 0.35, 0.5, 1.0])
-def test_the_error_of_a_rounded_level_is_bounded_and_hardly_exceeded(noise):
+def test_the_bound_of_rounding_errors_holds_and_is_at_most_60_percent_larger(noise):
     exact = largest_mean_error(2.0, 2.0 * noise)
     stated = rounding_error(2.0, 2.0 * noise)
     assert exact <= stated * (1 + 1e-9) + 1e-12

@@ -123,7 +123,7 @@ def test_a_finding_has_its_code_and_short_sentences(code):
     assert not any(".png" in one.message for one in FOUND[code])  # figures may be left out
 
 
-def test_what_is_in_order_is_not_noted():
+def test_cases_that_are_in_order_have_no_findings():
     good = replace(MADE, met=True, extra_power=0.1)
     assert planned() == planned(share=0.95) == followed() == campaigns.estimate_not_used(1.0, "") == []
     assert campaigns.shorter("r.csv", "plan_01.csv", 60, 60) == []
@@ -160,7 +160,7 @@ def test_figures_are_the_numbers_of_the_case():
         (Severity.REFUTED, False, False),
     ],
 )
-def test_severities_decide(severity, decides, trusts):
+def test_the_severity_determines_whether_a_verdict_is_decided_and_trusted(severity, decides, trusts):
     found = [Finding("a", Severity.NOTE, "x"), Finding("b", severity, "y")]
     assert undecided(found) != decides
     assert trusted(found) == trusts

@@ -1,7 +1,7 @@
-"""`make fuzz`: specs for FUZZ_SECONDS (default 60), each in a process of its own; exit 1 on a fault.
+"""`make fuzz` judges specs for FUZZ_SECONDS (default 60), each in its own process; exit 1 on a fault.
 
-Every second one is a mutation of a shipped one, the others are made from nothing. FUZZ_SEED (default 0) is
-that of the first spec; each spec has its own, which repeats it alone.
+Every second spec is a mutation of a shipped one; the others are random. FUZZ_SEED (default 0) is the seed
+of the first spec; each spec has its own seed, which repeats it alone.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tests.fuzzing.generation import generated
 from tests.fuzzing.judge import judged
 from tests.fuzzing.mutations import ROOT, mutated
 
-_HANGS = 90.0  # seconds: more than time limits leave
+_HANGS = 90.0  # seconds, beyond all time limits
 _MEMORY = 8 * 2**30
 
 

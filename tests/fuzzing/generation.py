@@ -1,4 +1,4 @@
-"""Specs made from nothing, at random: plants from their poles, loops, questions, spectra, signals."""
+"""Random specs: plants from their poles, loops, questions, spectra, signals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Draw(random.Random):
     """Numbers as a person writes them."""
 
     def weighted(self, *choices):
-        """One of the choices, each as often as its number says; called, if it can be."""
+        """One of the choices (weight, value), by their weights; a function is called."""
         (found,) = self.choices([one for _, one in choices], [many for many, _ in choices])
         return found() if callable(found) else found
 
@@ -36,7 +36,7 @@ class Draw(random.Random):
         )
 
     def real_pole(self):
-        """Distances to the unit circle: comfortable, slow, none, on the edge of what digits tell, outside."""
+        """Poles well inside the unit circle, slow ones, on it, within rounding errors of it, and outside."""
         return self.weighted(
             (20, lambda: self.between(-0.9, 0.95)),
             (4, lambda: 1.0 - self.logarithmic(1e-6, 0.05)),
@@ -52,7 +52,7 @@ class Draw(random.Random):
 
 
 def generated(number: int) -> dict:
-    """The spec of a number: with all its sections, well posed or not."""
+    """The spec of this seed, with all its sections; it may be ill posed."""
     draw = Draw(number)
     size = draw.weighted((6, (1, 1)), (2, (2, 2)), (0.5, (1, 2)), (0.5, (2, 1)))
     spec = _system(draw, *size)
@@ -81,7 +81,7 @@ def generated(number: int) -> dict:
 
 
 def _polynomial(draw, most, pole, radius):
-    """1 + c1 q^-1 + .. with so many real roots at the most, and perhaps a pair."""
+    """1 + c1 q^-1 + .. with `most` real roots or fewer, and perhaps a complex pair."""
     c = np.ones(1)
     for _ in range(draw.randint(0, most)):
         c = np.convolve(c, [1.0, -pole()])
@@ -133,7 +133,7 @@ def _system(draw, outputs, inputs):
 
 
 def _controller(draw, spec, outputs, inputs):
-    """Feedback with or without an integrator; that of one input and output is stable where possible."""
+    """Feedback with or without an integrator; with one input and output the loop is stable if possible."""
     if outputs * inputs > 1:
         gain, (above, below) = draw.choice(_GAINS), draw.choice(_FORMS)
         own = [gain * c for c in above]
@@ -176,7 +176,7 @@ def _model_error(draw):
 
 
 def _question(draw):
-    """What is asked, within which limits."""
+    """The accuracy or objective that is asked for, and the limits."""
     power = {"input_power": draw.magnitude()}
     asked = draw.choice(["cost"] * 3 + ["limited", "best", "shortest", "criterion", "variance"])
     spec: dict = {"accuracy": {"model_error": _model_error(draw)}}

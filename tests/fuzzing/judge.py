@@ -1,4 +1,4 @@
-"""What is wrong with the answer to a spec: an exception that is not ours, a warning, or nonsense.
+"""Faults of the answer to a spec: an exception that is not ours, a warning, or a false statement.
 
 All figures of an answer are drawn, too.
 """
@@ -25,7 +25,7 @@ _OURS_TO_MEND = ("internal-disagreement",)
 
 
 def judged(text: str, folder: Path) -> tuple[str, str]:
-    """How a spec of this text ends, with a status or the code of an error, and what is wrong with that."""
+    """The end of a spec of this text, a status or the code of an error, and the fault in that, if any."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -58,7 +58,7 @@ def written(results: Results) -> dict:
 
 
 def nonsense(spec: dict, result: dict) -> str:
-    """What a result says that is not so; nothing when all is well or cannot be told."""
+    """The false statements of a result; empty if there are none, or if it cannot be judged."""
     objective = result.get("objective", {})
     if result.get("status") in ("optimal", "almost_optimal") and "value" in objective:
         value, gap = objective["value"], 1e-4 * abs(objective["value"]) + 1e-4

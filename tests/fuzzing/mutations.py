@@ -24,7 +24,7 @@ NUMBERS = (
 )
 FACTORS = (-1.0, 1e-6, 1e-3, 1e3, 1e6, 1e-20, 1e20, 1.0 + 1e-9, 0.9)
 OTHERS = ("", "x", "free", "white", "D", "multisine", "zoh", None, True, [], {}, [1], [[1]], {"type": "fir"})
-# Alone these are words; with what a spec holds they are other questions.
+# Parts that change the question of a spec into which they are put.
 GRAFTS = (
     {"objective": "best_accuracy", "limits": {"input_power": 1.0}},
     {"objective": "shortest_experiment", "limits": {"output_power": 1.0}},
@@ -54,7 +54,7 @@ def mutated(draw: random.Random) -> dict:
         data |= copy.deepcopy(draw.choice(GRAFTS))
     for _ in range(draw.choice((0, 1, 1, 1, 2, 3))):
         _change(data, draw)
-    # What takes long is not what is looked for.
+    # Long computations are not looked for.
     solver = data.setdefault("solver", {})
     if isinstance(solver, dict):
         solver.setdefault("time_limit", 20)

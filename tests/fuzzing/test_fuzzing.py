@@ -1,4 +1,4 @@
-"""A few specs of `make fuzz` in this process, and what the judge must see."""
+"""A few specs of `make fuzz` in this process, and faults that the judge must find."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def of_shipped(seed):
 @pytest.mark.parametrize(
     ("make", "seed"), [*((of_shipped, seed) for seed in SEEDS), *((generated, seed) for seed in (3, 7, 11))]
 )
-def test_specs_end_well(make, seed):
+def test_specs_have_answers_without_a_fault(make, seed):
     text = yaml.safe_dump(make(seed), default_flow_style=None, sort_keys=False)
     assert judged(text, ROOT / "specs")[1] == ""
 
 
 @pytest.mark.slow
-def test_most_specs_made_from_nothing_are_well_posed():
-    """Else nothing is tried; and the same number is the same spec."""
+def test_enough_random_specs_are_well_posed():
+    """Otherwise nothing would be tested. The same number gives the same spec."""
     assert generated(5) == generated(5)
     posed = 0
     for number in range(24):
@@ -78,7 +78,7 @@ TEXTS = {
         ("two_by_two_loop", "{type: fir, order: 4}"),
     ],
 )
-def test_the_textbook_agrees_and_sees_a_weaker_spectrum(name, spectrum):
+def test_textbook_formulas_agree_and_detect_a_weaker_spectrum(name, spectrum):
     spec = parse_spec(
         TEXTS[name],
         overrides=[f"spectrum={spectrum}", "signal.samples=64", "solver.any_spectrum_tolerance=0.009"],
@@ -94,7 +94,7 @@ def test_the_textbook_agrees_and_sees_a_weaker_spectrum(name, spectrum):
     assert any("times what is admitted" in told for told in findings(content, result))
 
 
-def test_the_judge_sees_nonsense():
+def test_the_judge_finds_false_statements():
     spec = load_spec(ROOT / "specs" / "first_order.yaml")
     result, content = written(solve(spec)), dict(spec.content)
     assert nonsense(content, result) == ""
@@ -104,7 +104,7 @@ def test_the_judge_sees_nonsense():
     assert "bound" in nonsense(content, {**result, "objective": beyond})
 
 
-def test_the_judge_sees_exceptions_and_warnings(monkeypatch):
+def test_the_judge_finds_exceptions_and_warnings(monkeypatch):
     text = (ROOT / "specs" / "first_order.yaml").read_text()
     monkeypatch.setattr("tests.fuzzing.judge.solve", Mock(side_effect=RuntimeError("a mistake")))
     assert "a mistake" in judged(text, ROOT / "specs")[1]

@@ -1,6 +1,6 @@
-"""What a result must say, by the formulas of a textbook on a plain grid: numpy, the spec and the result.
+"""Checks of a result by textbook formulas on a plain grid, from the spec and the result with numpy alone.
 
-For plants in q^-1 of any size, in open loop and under u = r - C y. Nothing of the package takes part.
+Plants are in q^-1, of any size, in open loop or under u = r - C y. No code of the package takes part.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 _POINTS, _MOST_POINTS = 2**11, 2**16
 _AGREES = 1e-9
-_TELLS = 1e-10  # reciprocal condition below which rounding takes part in a ratio
+_TELLS = 1e-10  # reciprocal condition below which rounding affects a ratio
 _NAME = re.compile(r"([abcdf])(\d+)(?:\[(\d+)(?:,(\d+))?\])?$")
 _KEYS = {"relative", "absolute", "confidence", "alpha", "band", "norm"}
 
@@ -64,7 +64,7 @@ def excitation_of(spec, result, inputs):
 
 @np.errstate(all="ignore")
 def findings(spec: dict, result: dict, *, slack: float = 1e-6) -> list[str]:
-    """What a result says that is not so, one sentence each.
+    """The false statements of a result, one sentence each.
 
     Args:
         spec: its content, as YAML gives it.
@@ -109,7 +109,7 @@ def findings(spec: dict, result: dict, *, slack: float = 1e-6) -> list[str]:
 
 @np.errstate(all="ignore")
 def worst_ratio(spec: dict, result: dict) -> float:
-    """The largest ratio of an error to what is admitted.
+    """The largest ratio of an error to the admitted one.
 
     Raises:
         NotJudgedError: nothing can be said.
@@ -130,7 +130,7 @@ def _exceeded(spec, powers, slack):
 
 
 def _criterion(letter, M):
-    """Of the matrix in units of its own diagonal, where it is well scaled."""
+    """The criterion of M, by way of the well-scaled matrix in units of its own diagonal."""
     if letter == "T":
         return float(np.trace(M))
     root = np.sqrt(np.diag(M))
@@ -246,7 +246,7 @@ class System:
         return C, np.linalg.inv(identity + C @ G)
 
     def information(self, excitation):
-        """(k, k) of one sample: the excitation's and the noise's, on a grid that is doubled until it does."""
+        """Information (k, k) per sample of excitation and noise, on a grid doubled until it suffices."""
         before, points = None, _POINTS
         while points <= _MOST_POINTS:
             M = self._information(excitation, 2.0 * np.pi * (np.arange(points) + 0.5) / points)
@@ -273,7 +273,7 @@ class System:
         return M
 
     def powers(self, excitation):
-        """Of input, output and excitation, an array a channel."""
+        """Powers of input, output and excitation, one array (channels,) each."""
         grid = 2.0 * np.pi * (np.arange(2**14) + 0.5) / 2**14
         w, powers = excitation.nodes(grid)
         G = self.responses(w)[0]
@@ -286,7 +286,7 @@ class System:
         return {name: np.einsum("naa->a", P).real for name, P in found.items()}
 
     def ratios(self, spec, M):
-        """Each requirement with the largest ratio of its error to what it admits."""
+        """Each requirement with the largest ratio of its error to the admitted one."""
         accuracy = spec["accuracy"]
         unit = np.sqrt(np.diag(M))
         if np.any(unit <= 0.0):
@@ -347,7 +347,7 @@ class System:
 
 
 def _shares(found, admitted, G):
-    """The ratios; of entries that are zero there are none, and on a pole both are infinite."""
+    """The ratios; NaN for entries of G that are zero, and on a pole, where both are infinite."""
     identically_zero = np.all(np.nan_to_num(G) == 0.0, axis=0)
     with np.errstate(all="ignore"):
         ratios = found / admitted

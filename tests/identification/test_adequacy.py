@@ -1,4 +1,4 @@
-"""Tests of the structure: their level, their power, their regression; noise that the model does not have."""
+"""Score tests of the structure: their statistics, level and power; the search for larger noise models."""
 
 from types import SimpleNamespace
 
@@ -21,8 +21,8 @@ def by_name(found):
     return {test.name: test for test in found.tests.scores}
 
 
-def test_of_arx_it_is_the_auxiliary_regression():
-    """N times the share of the residuals' squares that a regression with the further lags explains."""
+def test_score_statistics_of_arx_equal_n_r2_of_an_auxiliary_regression():
+    """The statistic is N times the share of the residual sum of squares that the further lags explain."""
     u, y = (x[0, :, 0] for x in data("arx", 300, np.random.default_rng(1)))
     found = identify(SYSTEMS["arx"], u[:, None], y[:, None], rest=True)
 
@@ -43,8 +43,8 @@ def test_of_arx_it_is_the_auxiliary_regression():
         assert test.probability == pytest.approx(scipy.stats.chi2.sf(test.statistic, test.freedom))
 
 
-def test_a_leak_is_tested_by_what_it_would_take_away():
-    """The derivative of a simulated tank by its leak, in a plain regression of the residuals."""
+def test_the_leak_of_a_tank_is_tested_by_the_derivative_of_its_level():
+    """The residuals are regressed on the derivative of the simulated level by the leak."""
     rng, step, n = np.random.default_rng(5), 2.0, 400
     tank = known(SampledModel(lag_of([0.4], [1, 0]), step), "a0")
     u = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10)
@@ -69,7 +69,7 @@ def filled(u, slope, leak, step):
     return scipy.signal.lfilter([0.0, gain], [1.0, -pole], u)
 
 
-def test_the_level_is_shared_by_all_tests():
+def test_all_tests_share_one_significance_level():
     five = [ScoreTest(str(i), "plant", 1.0, 1, p, 1) for i, p in enumerate((0.21, 0.19, 1.0, 0.5, 0.3))]
     assert failed(five) == ()
     one = ScoreTest("x", "noise", 1.0, 1, 0.19 * level("many signals"), 1)
@@ -78,8 +78,8 @@ def test_the_level_is_shared_by_all_tests():
 
 
 @pytest.mark.parametrize("w", [0.02, 0.2, 1.5])
-def test_noise_is_known_no_better_than_its_zero(w):
-    """log |1 - c exp(-jw)|^2 has the variance of c times its derivative squared: F with 2 over that."""
+def test_an_uncertain_zero_of_the_noise_makes_a_score_f_distributed(w):
+    """If v = var c (d log |1 - c exp(-jw)|^2 / dc)^2, F has 1 and 2 / v degrees of freedom."""
     c, n = 0.9, 2000
     psi = scipy.signal.lfilter([0, 1.0], [1.0, -c], np.random.default_rng(8).standard_normal(n))[:, None]
     white = White(
@@ -99,7 +99,7 @@ def test_noise_is_known_no_better_than_its_zero(w):
     assert white.probability(11.0, along / np.linalg.norm(along)) == pytest.approx(expected, rel=0.02)
 
 
-def test_the_lag_is_where_the_missing_coefficient_stands():
+def test_the_reported_lag_is_the_lag_of_the_missing_coefficient():
     rng = np.random.default_rng(4)
     u = rng.standard_normal((800, 1))
     y = scipy.signal.lfilter([0, 1.0, 0, 0, 0.3], [1.0], u, axis=0) + rng.standard_normal((800, 1))
@@ -107,7 +107,7 @@ def test_the_lag_is_where_the_missing_coefficient_stands():
     assert by_name(found)["recent_inputs"].lag == 4
 
 
-def test_of_several_channels_it_names_those_that_fail():
+def test_score_tests_name_the_channels_and_the_lag_that_fail():
     rng = np.random.default_rng(4)
     u, e = rng.standard_normal((600, 2)), rng.standard_normal((600, 2))
     one, gain = np.ones(1), np.array([0, 1.0])
@@ -130,10 +130,10 @@ def test_a_drift_is_found():
 
 
 @pytest.mark.slow
-def test_a_dead_time_at_zero_hides_nothing():
-    """The samples would have it negative, and the tests are those of the plant without a dead time.
+def test_a_dead_time_estimated_as_zero_does_not_weaken_the_tests():
+    """The likeliest dead time is negative; the tests equal the tests without a dead time.
 
-    Of a lag behind a hold a dead time makes q^-1 to q^-1 + b q^-2 with b > 0; here b is negative.
+    A dead time turns q^-1 of a lag behind a hold into q^-1 + b q^-2 with b > 0; here b is negative.
     """
     rng = np.random.default_rng(3)
     u = rng.standard_normal((400, 1))
@@ -149,8 +149,8 @@ def test_a_dead_time_at_zero_hides_nothing():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("pole", [1.0, 1.05, 1.2])
-def test_the_right_model_of_a_plant_that_only_its_loop_holds_is_not_refuted(pole):
-    """A proportional controller without noise: the tests err seldom, and see a lag that lacks."""
+def test_in_a_stabilising_loop_the_right_model_passes_and_a_missing_lag_is_seen(pole):
+    """The controller is proportional and adds no noise; the wrong model lacks a lag of the actuator."""
     model = PolynomialModel.single([0, 0.1], A=[1, -pole], C=[1, -0.1], variance=0.02)
     refuted = []
     for seed in range(4):
@@ -177,7 +177,7 @@ FIR = one_channel([0, 1.0, 0.5])
 
 
 def record(seed, *, distorted=lambda u: u, samples=400):
-    """Slow inputs, a plant of two coefficients, and noise that fades in ten samples."""
+    """u, y (samples, 1): slow inputs, an FIR plant, and noise with a pole at 0.9."""
     rng = np.random.default_rng(seed)
     u = scipy.signal.lfilter([0.4], [1.0, -0.9], rng.standard_normal(samples))
     noise = scipy.signal.lfilter([0.1], [1.0, -0.9], rng.standard_normal(samples))
@@ -189,8 +189,8 @@ def blamed(found):
 
 
 @pytest.mark.slow
-def test_no_plant_is_blamed_for_slow_noise():
-    """White residuals are a wrong model in all records; a right plant fails no more often than the rate."""
+def test_slow_noise_is_not_mistaken_for_a_fault_of_the_plant():
+    """The white-noise model is wrong in all records; the right plant fails no more often than the rate."""
     found = [identify(FIR, *record(seed), rest=True) for seed in range(25)]
     assert all(one.tests.coloured for one in found)
     assert sum(bool(blamed(one)) for one in found) <= scipy.stats.binom.ppf(0.999, len(found), RATE)
@@ -206,12 +206,12 @@ def test_no_plant_is_blamed_for_slow_noise():
         ("feedback", lambda u: u + 0.5 * np.append(u[3:], np.zeros(3))),
     ],
 )
-def test_slow_noise_hides_no_fault(fault, distorted):
+def test_faults_are_found_in_spite_of_slow_noise(fault, distorted):
     found = [blamed(identify(FIR, *record(seed, distorted=distorted), rest=True)) for seed in range(4)]
     assert sum(fault in one for one in found) >= 3
 
 
-def test_residuals_become_white_record_by_record():
+def test_an_autoregression_whitens_residuals_of_each_record_on_its_own():
     rng = np.random.default_rng(5)
     parts = [scipy.signal.lfilter([1.0], [1.0, -1.2, 0.5], rng.standard_normal(n)) for n in LENGTHS]
     v = np.concatenate(parts)[:, None]
@@ -224,7 +224,7 @@ def test_residuals_become_white_record_by_record():
     assert whitening.through(v)[:, 0] == pytest.approx(np.concatenate(apart))
 
 
-def test_slopes_of_filtered_residuals_are_differences():
+def test_slopes_of_filtered_residuals_are_difference_quotients():
     v = np.random.default_rng(6).standard_normal((400, 1))
     whitening, step = Whitening((np.array([1.0, -0.4, 0.2]),), LENGTHS), 1e-6
     for k, slope in enumerate(whitening.slopes(v), start=1):
@@ -234,7 +234,7 @@ def test_slopes_of_filtered_residuals_are_differences():
         assert slope[inside] == pytest.approx(((below - above) / (2.0 * step))[inside], abs=1e-6)
 
 
-def test_the_noise_of_residuals_is_found():
+def test_the_arma_model_of_residuals_is_found():
     e = np.random.default_rng(7).standard_normal(4000)
     v = scipy.signal.lfilter([1.0, 0.5], [1.0, -0.8], e)[:, None]
     found = [one for (one,) in noises_of_residuals(v, (4000,))]
@@ -247,8 +247,8 @@ def test_the_noise_of_residuals_is_found():
 
 @pytest.mark.first(4)
 @pytest.mark.parametrize("seed", [4, 5, 6, 8, 10, 16, 21, 24, 29])
-def test_the_future_of_a_periodic_input_says_nothing(seed):
-    """Its past predicts it: what is left is too small for a correction to first order."""
+def test_future_values_of_a_periodic_input_do_not_refute_the_model(seed):
+    """The past of the input predicts its future; the rest is too small for a first-order correction."""
     rng = np.random.default_rng(seed)
     u = np.tile(np.repeat([1.0, -1.0], 6), 36)
     noise = scipy.signal.lfilter([0.045], [1.0, -0.85], rng.standard_normal(u.size))
@@ -262,7 +262,7 @@ def test_the_future_of_a_periodic_input_says_nothing(seed):
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_record_in_many_short_pieces_does_not_refute_its_model(seed):
-    """Noise parameters explain past residuals up to so little that a mean to first order says nothing."""
+    """Noise parameters explain nearly all of past residuals; a first-order mean of the rest is useless."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 8)
     noise = scipy.signal.lfilter([0.3], [1.0, -0.8], rng.standard_normal(u.size))
@@ -277,15 +277,15 @@ def test_a_record_in_many_short_pieces_does_not_refute_its_model(seed):
     ("coloured", "powers", "refuted", "taken"),
     [
         (False, [1.0, 1.0], [], None),
-        (True, [2.0, 1.0], [], 1),  # as many coefficients: the likelier
+        (True, [2.0, 1.0], [], 1),  # equal numbers of coefficients: the likelier
         (True, [1.0, 2.0], [], 0),
-        (True, [1.0, 2.0, 0.1], [], 0),  # a smaller noise is enough
+        (True, [1.0, 2.0, 0.1], [], 0),  # a smaller model is enough
         (True, [1.0, 2.0, 3.0], [0, 1], 2),
         (True, [2.0, 1.0], [0, 1, 2, 3, 4], 0),
     ],
 )
-def test_the_smallest_noise_is_taken_and_of_equal_ones_the_likeliest(coloured, powers, refuted, taken):
-    """Two noises of one coefficient come first, then those of two and of four."""
+def test_the_smallest_then_likeliest_noise_model_is_taken(coloured, powers, refuted, taken):
+    """The first two noise models have one coefficient each; models with two and with four follow."""
     errors, tried = np.random.default_rng(1).standard_normal((400, 1)), []
     first = SimpleNamespace(errors=errors, lengths=(400,), tests=SimpleNamespace(coloured=coloured))
 
@@ -304,7 +304,7 @@ def test_the_smallest_noise_is_taken_and_of_equal_ones_the_likeliest(coloured, p
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [9, 2, 3, 4, 7])
 def test_short_records_that_begin_anywhere_do_not_refute_their_model(seed):
-    """An F test of all starts keeps them at rest, as many unknowns explain little each."""
+    """An F test of all starts does not refute rest, since each of the many unknowns explains little."""
     rng, parts = np.random.default_rng(seed), []
     for _ in range(12):
         u, e = np.repeat(rng.choice([-1.0, 1.0], 87), 4), 0.2 * rng.standard_normal(348)

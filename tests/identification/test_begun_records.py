@@ -1,4 +1,4 @@
-"""Records that begin in the middle of things: inputs before them that come late, and starts that are many."""
+"""Records that begin during operation: inputs applied before them, and many unknown starts."""
 
 import numpy as np
 import pytest
@@ -22,10 +22,10 @@ def model_of(words, delay):
 
 
 def cut_out(delay, seed, *, before=BEFORE, samples=N):
-    """u, y of a running experiment; the plant by its closed form behind a hold.
+    """u, y (samples, 1) of a running experiment; the plant is a lag behind a hold, in closed form.
 
     Args:
-        before: samples that nobody recorded; 0: from rest.
+        before: the number of samples before the record; 0: it begins at rest.
     """
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], (samples + before) // 5), 5)
@@ -46,8 +46,8 @@ def cut_out(delay, seed, *, before=BEFORE, samples=N):
         ),
     ],
 )
-def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay, records, samples):
-    """The first dead time of the record holds what nobody recorded."""
+def test_inputs_before_the_record_that_act_after_a_dead_time_are_no_faults(words, delay, records, samples):
+    """During the first dead time the output responds to inputs before the record."""
     model, failed, deviations, variances = model_of(words, delay), 0, [], []
     for seed in range(records):
         signals = cut_out(delay, seed, samples=samples)
@@ -61,7 +61,7 @@ def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, d
 
 
 def _short_records(seed, *, at_rest):
-    """Twenty of 16 samples behind a dead time of 4.3: unknown starts are a third of what is measured."""
+    """Twenty records of 16 samples behind a dead time of 4.3: a third as many unknowns as samples."""
     length, cut = 16, []
     for part in range(20):
         u, y = cut_out(4.3, 1000 * seed + part, before=0 if at_rest else BEFORE)
@@ -71,8 +71,8 @@ def _short_records(seed, *, at_rest):
 
 
 @pytest.mark.slow
-def test_many_short_records_are_believed_to_be_at_rest_only_if_they_are():
-    """Unknown starts explain half of the samples, and shrink what is left of the noise."""
+def test_rest_is_refuted_for_many_short_records_if_it_does_not_hold():
+    """Unknown starts explain half of the samples, and shrink the residuals."""
     model, deviations = model_of(IN_S, 4.3), []
     rested = (_short_records(seed, at_rest=True) for seed in range(2))
     refuted = [
@@ -91,8 +91,8 @@ def test_many_short_records_are_believed_to_be_at_rest_only_if_they_are():
 
 
 @pytest.mark.slow
-def test_residuals_that_unknown_inputs_make_zero_are_not_tested():
-    """The statistic of [ljung-box-1978] over the rest; with them it was a third too large, and more."""
+def test_residuals_that_unknown_inputs_make_zero_are_left_out_of_ljung_box():
+    """The statistic of [ljung-box-1978] uses the others; with all it was a third too large, and more."""
     model = model_of(IN_S, 60.3)
     u, y = (signal[:200] for signal in cut_out(60.3, 0))
     found = identify(model, u, y, start=model.theta)
@@ -105,7 +105,7 @@ def test_residuals_that_unknown_inputs_make_zero_are_not_tested():
 
 
 def segmented(length, seed, *, colour=0.0):
-    """Many short records of one system, each begun in the middle of things."""
+    """Many short records of one system, each cut out of a longer run."""
     rng = np.random.default_rng([seed, 77])
     u = rng.choice([-1.0, 1.0], 650)
     noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(650))
@@ -123,8 +123,8 @@ def segmented(length, seed, *, colour=0.0):
         (20, [1], 0.6, (4, 5)),
     ],
 )
-def test_models_of_records_with_gaps_are_refuted_if_they_are_wrong(length, D, colour, limits):
-    """Unknown starts take their share of residuals away, which alone correlates them."""
+def test_only_wrong_models_of_records_with_gaps_are_refuted(length, D, colour, limits):
+    """Unknown starts explain a part of the residuals, and so correlate the rest."""
     model, failed = PolynomialModel.single([0, 1.0], F=[1, -0.7], D=D, variance=0.01), 0
     for seed in range(5):
         u, y, lengths = segmented(length, seed, colour=colour)
@@ -134,8 +134,8 @@ def test_models_of_records_with_gaps_are_refuted_if_they_are_wrong(length, D, co
 
 @pytest.mark.slow
 @pytest.mark.parametrize("zero", [0.97, 0.5])
-def test_noise_from_before_needs_no_free_start(zero):
-    """A plant at rest; of noise that was there before, 0.97^20 = 0.54 is left after a tenth of the record."""
+def test_noise_before_the_record_does_not_refute_rest_of_the_plant(zero):
+    """The plant is at rest; earlier noise has decayed to 0.97^20 = 0.54 after a tenth of the record."""
     model, found = PolynomialModel.single([0, 0.6], F=[1, -0.7], C=[1, -zero]), []
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -178,7 +178,7 @@ def test_an_integrating_plant_may_be_measured_about_any_level(plant):
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
-def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
+def test_a_dead_time_estimated_near_zero_does_not_stop_other_parameters(seed):
     rng = np.random.default_rng(seed)
     pole = np.exp(-0.1)
     u = np.repeat(rng.choice([-1.0, 1.0], 50), 4)
@@ -194,10 +194,10 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
-def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
-    """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.
+def test_a_spike_does_not_lead_to_a_long_dead_time(seed):
+    """If rest is assumed, the spike and the level of 20 give a dead time of 26 to 89 samples.
 
-    So many unknown inputs before each of five stretches would fit whatever the outputs do.
+    As many unknown inputs before each of five stretches would fit any outputs.
     """
     model, rng = model_of(IN_STATES, 3.0), np.random.default_rng(seed)
     u, pole = np.repeat(rng.choice([-1.0, 1.0], 40), 15), np.exp(-1.0 / LAG)
@@ -206,5 +206,5 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     y[int(rng.integers(50, 550))] += 100.0
     found = identify(model, u[:, None], y[:, None], start=model.theta, lengths=(100, 150, 90, 140, 120))
     assert found.start.free
-    # One spike in 600 samples is noise of 4.1, forty times that of the plant.
+    # One spike in 600 samples has an rms of 4.1, forty times the rms of the noise.
     assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))

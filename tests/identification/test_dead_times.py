@@ -1,4 +1,4 @@
-"""Estimates of dead times: minima on kinks, beyond instants and far away, their covariance and its bound."""
+"""Estimates of dead times: minima at kinks and beyond sampling instants, their covariance and its bound."""
 
 from functools import cache
 
@@ -21,7 +21,7 @@ SAMPLES, VARIANCE = 400, 0.05
 
 
 def heater(dead_time, gain=2.0, time_constant=12.0) -> SampledModel:
-    """K e^(-Ls) / (T s + 1), a sample a time unit."""
+    """K e^(-Ls) / (T s + 1), sampled once per unit of time."""
     return SampledModel(lag_of([gain], [time_constant, 1.0], dead_time, variance=VARIANCE), 1.0)
 
 
@@ -33,8 +33,8 @@ def records(model, runs):
         yield u, sum(model.simulate(u, e, 1.0))
 
 
-def test_a_minimum_on_a_kink_is_a_minimum_and_is_told_to_be_one():
-    """The profile of the cost over the dead time, the rest fitted by other means, is lowest there."""
+def test_a_minimum_at_a_kink_of_the_cost_counts_as_converged():
+    """The cost, minimised by SciPy over the other parameters at fixed dead times, is lowest at the kink."""
     model = heater(3.0)
     *_, (u, y) = records(model, 6)
     found = search(
@@ -55,10 +55,10 @@ def test_a_minimum_on_a_kink_is_a_minimum_and_is_told_to_be_one():
 
 
 @pytest.mark.slow
-def test_the_cramer_rao_bound_is_reached_by_a_dead_time_within_a_sample():
-    """At L = 3.37 samples, within 5 % of the bound: 1200 runs tell that to 2 %.
+def test_a_dead_time_between_samples_reaches_the_cramer_rao_bound():
+    """At L = 3.37 samples the deviation is within 5 % of the bound; 1200 runs determine it to 2 %.
 
-    Each is followed from the true plant. Of 50 the minima are those of `identify` from a plant far away.
+    Searches begin at the true plant. For 50 runs `identify` finds the same minima from a plant far away.
     """
     model, runs = heater(3.37), list(records(heater(3.37), 1200))
     u, far = runs[0][0], heater(1.0, 1.0, 5.0).theta
@@ -73,7 +73,7 @@ def test_the_cramer_rao_bound_is_reached_by_a_dead_time_within_a_sample():
 
 
 def answer(u, lag, late):
-    """Samples of the answer of exp(-late s) / (lag s + 1) to an input that is held for a unit of time."""
+    """Samples of the response of exp(-late s) / (lag s + 1) to an input that is held for a unit of time."""
     whole = int(np.floor(late))
     pole, left = np.exp(-1.0 / lag), np.exp(-(1.0 - (late - whole)) / lag)
     return scipy.signal.lfilter(np.r_[np.zeros(whole + 1), 1.0 - left, left - pole], [1.0, -pole], u)
@@ -86,9 +86,9 @@ def estimated(truth, u, y, *, noise=0, rest=None):
 
 @cache
 def moved(seed):
-    """Seven moves of the input of a lag, and white noise: the record, and its log likelihood on a grid.
+    """A record of a lag, with seven moves of the input and white noise, and its log likelihood on a grid.
 
-    The gain is integrated out exactly, and the variance of the noise is that of what is left.
+    The gain is integrated out exactly, and the variance of the noise is estimated from the residuals.
     """
     rng = np.random.default_rng(seed)
     u = np.repeat([0.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, -1.0], 15)
@@ -104,8 +104,8 @@ def moved(seed):
 
 
 @pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (7, 14, 37))])
-def test_deviations_are_those_of_the_likelihood_beyond_instants(seed):
-    """The curvature at the best minimum alone has dead times by a third to a half too sure here."""
+def test_deviations_agree_with_the_likelihood_beyond_sampling_instants(seed):
+    """The curvature at the best minimum alone makes deviations a third to a half too small here."""
     u, y, lags, lates, log = moved(seed)
     estimate = estimated(np.array([2.0, 4.0, 2.5]), u, y, rest=True)
     weights = np.exp(log - log.max())
@@ -116,8 +116,8 @@ def test_deviations_are_those_of_the_likelihood_beyond_instants(seed):
     np.testing.assert_allclose(told, integrated, rtol=0.15)
 
 
-def test_the_best_minimum_is_found_from_any_sample_beside():
-    """There is another one, hardly less likely, at 2.75."""
+def test_the_best_minimum_is_found_from_starts_a_few_samples_away():
+    """Another minimum, at 2.75, is hardly less likely."""
     u, y, _, lates, log = moved(20)
     best = lates[np.argmax(log.max(axis=0))]
     for start in (0.4, 2.5, 4.4):
@@ -135,7 +135,7 @@ noise: {{variance: 0.0144, D: [1, -0.6]}}
 
 
 def controlled(seed, samples=240):
-    """A tank with a dead time of 9 s under a PI, as r alternates at nearly every sample; by plain sums."""
+    """u, y (samples, 1): a tank with a dead time of 9 s under PI control; r alternates fast."""
     rng, late, level, integral, noise = np.random.default_rng(seed), [0.0] * 9, 0.0, 0.0, 0.0
     t, u, y = np.arange(samples), np.zeros(samples), np.zeros(samples)
     r = 8.0 * np.sign(np.sin(np.pi * (0.93 + 0.02 * seed) * t)) + 35.0 * np.sin(2.0 * np.pi * t / 480)
@@ -152,16 +152,16 @@ def controlled(seed, samples=240):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("seed", "start"), [(0, 12.0), (2, 10.0), (0, 10.0), (2, 12.0)])
-def test_the_best_minimum_is_found_twenty_deviations_beside(seed, start):
-    """Each sample of dead time has a minimum: 9 was estimated as 10.9 +- 0.1, and the plant refuted."""
+def test_the_best_minimum_is_found_from_starts_twenty_deviations_away(seed, start):
+    """Each sample of dead time has a minimum; a search once ended at 10.9 +- 0.1, and refuted the plant."""
     found = identify(stated(TANK.format(start)), *controlled(seed), 5.0, feedback=True, rest=True)
     deviation = np.sqrt(found.covariance[1, 1])
     assert abs(found.theta[1] - 9.0) < 4.0 * deviation < 1.0
 
 
 @pytest.mark.slow
-def test_the_covariance_of_dead_times_is_that_of_their_errors():
-    """Bumps in noise with a memory: 95 % of estimates within 1.96 deviations; binomial scatter is 2 %."""
+def test_the_covariance_of_dead_times_agrees_with_their_errors():
+    """Pulses in coloured noise: 95 % of estimates are within 1.96 deviations; binomial scatter is 2 %."""
     u = np.repeat([0.0, 5.0, -5.0, 0.0, 5.0, 0.0, -5.0, -5.0], 30)
     away = []
     for seed in range(120):
@@ -177,7 +177,7 @@ def test_the_covariance_of_dead_times_is_that_of_their_errors():
 
 LONG = 2000
 T = np.arange(LONG)
-# The fast sine is the same after 2 pi / 0.9 = 7 samples, and the slow one hardly tells a delay of 7.
+# The fast sine repeats after 2 pi / 0.9 = 7 samples, and the slow one hardly shows a delay of 7.
 TWO_SINES = 0.1 * np.sin(0.01 * T) + np.sin(0.9 * T)
 BINARY = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], LONG // 5), 5)
 SIGNALS = {"sines": TWO_SINES, "binary": BINARY}
@@ -192,7 +192,7 @@ def sought(kind, seed):
 
 
 def of_s(theta):
-    """(K, T, L) of K / T over s + 1 / T, late by L."""
+    """(K, T, L) of the lag (K / T) / (s + 1 / T) with dead time L."""
     b, a, dead_time = theta
     return b / a, 1.0 / a, dead_time
 
@@ -210,7 +210,7 @@ def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
     periods = abs(left[1].x[2] - left[0].x[2]) / (2.0 * np.pi / 0.9)
     assert round(periods) >= 1
     assert periods == pytest.approx(round(periods), abs=0.1)
-    # Both are minima of the plain sum of squares, and so far apart in -2 log likelihood.
+    # Both are minima of the plain sum of squares; their -2 log likelihoods differ by the excess.
     assert found.search.rivals[0].excess == pytest.approx(
         LONG * np.log(left[1].cost / left[0].cost), abs=0.02
     )
@@ -218,12 +218,12 @@ def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
 
 @pytest.mark.slow
 @SEEDS
-def test_a_rich_record_leaves_no_rival(seed):
+def test_a_binary_input_leaves_no_rival_minimum(seed):
     assert sought("binary", seed)[0].search.rivals == ()
 
 
 @pytest.mark.slow
-def test_the_search_tells_how_far_it_is():
+def test_the_search_reports_its_progress():
     told = []
     with watching(told.append):
         found, _ = sought.__wrapped__("binary", 0)

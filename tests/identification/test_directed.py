@@ -1,4 +1,4 @@
-"""Tests of one parameter more, or of a gain that varies: regressions, and plants that have it."""
+"""Tests of one additional parameter, or of a varying gain, against regressions and on such plants."""
 
 import runpy
 from pathlib import Path
@@ -25,8 +25,8 @@ def by_name(found):
     return {one.test.name: one for one in found.tests.directed if one.test.fault in ("plant", "noise")}
 
 
-def test_of_arx_it_is_the_comparison_of_two_regressions():
-    """A model one lag of u too short: the likelihood ratio, and the move of G to the larger regression."""
+def test_the_test_of_one_arx_parameter_is_a_likelihood_ratio_of_regressions():
+    """The model lacks one lag of u; the change of G is that between the two regressions."""
     rng = np.random.default_rng(1)
     u = rng.standard_normal(400)
     y = scipy.signal.lfilter([0, 1.0, 0.5, 0.3], [1, -1.5, 0.7], u)
@@ -62,8 +62,8 @@ def test_of_arx_it_is_the_comparison_of_two_regressions():
 
 
 @pytest.mark.parametrize("name", ["oe", "bj", "ararmax", "full"])
-def test_gradients_are_those_of_the_larger_model(name):
-    """Against differences of its prediction errors; B, F (or A), C and D have each one coefficient more."""
+def test_gradients_by_one_additional_coefficient_are_difference_quotients(name):
+    """B, F (or A), C and D each have one additional coefficient."""
     model = SYSTEMS[name]
     u, y = (x[0] for x in data(name, 60, np.random.default_rng(2)))
     found = estimator(model, 1.0).extensions(model.theta, feedback=False)
@@ -79,7 +79,7 @@ def test_gradients_are_those_of_the_larger_model(name):
         assert column == pytest.approx((below - above) / 2e-6, rel=1e-5, abs=1e-6)
 
 
-def test_an_input_that_answers_the_output_does_not_act_at_once():
+def test_under_feedback_no_direct_feedthrough_is_proposed():
     model = SYSTEMS["bj"]
     kind = estimator(model, 1.0)
     names = [{e.name for e in kind.extensions(model.theta, feedback=loop)} for loop in (False, True)]
@@ -100,7 +100,7 @@ def test_an_input_that_answers_the_output_does_not_act_at_once():
     ],
     ids=["pole", "zero", "delay"],
 )
-def test_it_names_what_is_missing(B, F, first):
+def test_the_strongest_alternative_names_the_missing_parameter(B, F, first):
     rng = np.random.default_rng(5)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 4)
     y = scipy.signal.lfilter(B, F, u) + scipy.signal.lfilter([1], [1, -0.7], 0.05 * rng.standard_normal(800))
@@ -112,7 +112,7 @@ def test_it_names_what_is_missing(B, F, first):
 
 
 @pytest.mark.parametrize("hold", [True, False])
-def test_a_dead_time_in_s_is_found(hold):
+def test_a_missing_dead_time_in_s_is_found(hold):
     rng = np.random.default_rng(6)
     u = rng.standard_normal((400, 1))
     truth, model = lag_of([1.0], [1.0, 0.5], 0.3), lag_of([1.0], [1.0, 0.5])
@@ -129,7 +129,7 @@ BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 
 
 def integrated(estimate, deviation, known):
-    """Odds of a parameter of standard deviation one a priori, and of |error| > 1, by a plain sum."""
+    """The odds that a parameter of prior deviation one exists and |error| > 1, by a plain sum."""
     size = np.linspace(-12.0, 12.0, 40001)
     weight = scipy.stats.norm.pdf(size) * scipy.stats.norm.pdf(estimate, size, deviation)
     beyond = scipy.stats.norm.sf(1.0, size, known) + scipy.stats.norm.cdf(-1.0, size, known)
@@ -139,13 +139,13 @@ def integrated(estimate, deviation, known):
 @pytest.mark.parametrize("estimate", [0.0, 0.3, 0.8, 1.6])
 @pytest.mark.parametrize("deviation", [0.1, 0.4, 3.0])
 @pytest.mark.parametrize("known", [0.05, 0.35])
-def test_odds_are_those_of_an_integral_over_the_parameter(estimate, deviation, known):
+def test_odds_are_the_integral_over_the_prior_of_the_parameter(estimate, deviation, known):
     moves = Moves(*(np.array([0.0, x]) for x in (estimate, deviation, known)))
     probability = 2.0 * scipy.stats.norm.sf(estimate / deviation)
     assert moves.odds(probability) == pytest.approx(integrated(estimate, deviation, known), rel=1e-6)
 
 
-def test_what_moves_nothing_or_is_not_told_by_the_data_does_not_matter():
+def test_odds_are_low_for_parameters_without_effect_or_not_determined():
     none = np.zeros(3)
     assert Moves(none, none, none + 0.2).odds(1e-9) == 0.0
     assert Moves(none + 500.0, none + 1000.0, none + 0.4).odds(0.617) < 0.7
@@ -154,7 +154,7 @@ def test_what_moves_nothing_or_is_not_told_by_the_data_does_not_matter():
 
 @pytest.mark.parametrize("of_structure", [True, False])
 @pytest.mark.parametrize("place", range(3))
-def test_what_is_not_a_number_is_no_promise(of_structure, place):
+def test_a_move_that_is_not_a_number_speaks_against_a_verdict(of_structure, place):
     parts = [np.full(2, 1e-3), np.full(2, 1e-3), np.full(2, 0.1)]
     tried = [SimpleNamespace(of_structure=of_structure, lag=False, test=SimpleNamespace(probability=1e-4))]
     assert that_matter(tried, [Moves(*parts)]) == []
@@ -165,7 +165,7 @@ def test_what_is_not_a_number_is_no_promise(of_structure, place):
 
 @pytest.mark.slow
 def test_right_models_are_seldom_undecided_and_wrong_ones_seldom_met():
-    """5 % and 1 % of records, with three standard deviations of chance, and 5 % and 4 % of designed ones."""
+    """At most 5 % and 1 % of records, plus three standard deviations, and 5 % and 4 % of designed ones."""
     run = runpy.run_path(str(BENCHMARK))
     assert run["study"](None, range(100))["undecided"] <= 5 + 3 * np.sqrt(5)
     wrong = [run["study"](fault, range(25)) for fault in run["FAULTS"]]
@@ -182,7 +182,7 @@ def varying(found):
 
 
 def through(u, *, samples=800, noise=0.05, seed=2):
-    """A first-order plant of gain one on which `u` acts, and its record about a level."""
+    """The output (samples,) of a first-order plant of gain one driven by `u`, with noise and a level."""
     rng = np.random.default_rng(seed)
     y = scipy.signal.lfilter([0, 0.2], [1, -0.8], u)
     return 7.0 + y + scipy.signal.lfilter([1], [1, -0.7], noise * rng.standard_normal(samples))
@@ -202,8 +202,8 @@ SHAPES = {
 }
 
 
-def test_of_arx_it_is_the_score_test_of_a_regression():
-    """A y = B (u + x f) + e: to first order x b_k f(t - k) joins, with x alone unknown."""
+def test_the_test_of_a_varying_gain_of_arx_is_the_score_test_of_regression():
+    """A y = B (u + x f) + e: to first order the regressor of x is the sum of b_k f(t - k)."""
     rng = np.random.default_rng(1)
     u = rng.standard_normal(400)
     u = (u - u.mean()) / u.std()
@@ -261,15 +261,15 @@ def backlash(u, width):
     ],
     ids=["saturation", "dead zone", "two gains", "backlash"],
 )
-def test_actuators_that_are_not_linear_are_found(names, distort):
+def test_nonlinear_actuators_are_found(names, distort):
     u = scipy.signal.lfilter([0.6], [1, -0.8], np.random.default_rng(1).standard_normal(800))
     found = estimated(u, through(distort(u)))
     failing = {one.test.name for one in varying(found).values() if one.test in found.tests.failed}
     assert names <= failing
 
 
-def test_nothing_follows_through_a_parameter_at_its_limit():
-    """Its column is zero: divided by its norm, rounding errors became steps of 1e283."""
+def test_parameters_at_a_limit_do_not_enter_the_regression():
+    """Such a parameter has a zero column; division by its norm gave steps of 1e283."""
     rng = np.random.default_rng(0)
     columns = rng.standard_normal((60, 12))
     columns[:, 7] = 0.0
@@ -295,7 +295,7 @@ def test_nothing_follows_through_a_parameter_at_its_limit():
 )
 @pytest.mark.parametrize("seeds", [3, pytest.param(8, marks=pytest.mark.slow)])
 def test_a_linear_plant_of_another_structure_is_not_called_nonlinear(true, model, drift, seeds):
-    """A tank that fills and leaks, modelled as an integrator, had a gain that depended on its level."""
+    """A leaking tank, modelled as an integrator, was once said to have a gain that depends on its level."""
     named, refuted = [], 0
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
@@ -308,8 +308,8 @@ def test_a_linear_plant_of_another_structure_is_not_called_nonlinear(true, model
     assert not named
 
 
-def test_an_input_of_two_values_has_no_powers():
-    """Joined records have levels of their own, which make four values of two."""
+def test_powers_of_an_input_with_two_values_are_not_tested():
+    """Joined records have different levels, which turn two values into four."""
     rng = np.random.default_rng(1)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 4)
     y = through(u)
@@ -323,7 +323,7 @@ def test_an_input_of_two_values_has_no_powers():
 
 
 def one_way(u, x, *, delay=1, pole=0.8):
-    """A lag of gain one whose output approaches what u asks for more slowly where it rises, by a share x."""
+    """A lag of gain one whose output rises more slowly by a share x, and falls faster by as much."""
     y, speeds = np.zeros(u.size), (1.0 - pole) * np.array([1.0 + x, 1.0, 1.0 - x])
     for k in range(delay, u.size):
         missing = u[k - delay] - y[k - 1]
@@ -333,7 +333,7 @@ def one_way(u, x, *, delay=1, pole=0.8):
 
 @pytest.fixture(scope="module")
 def alike_both_ways():
-    """An input, the model of a plant as fast both ways, and what it would be if one way were slower."""
+    """An input, the model of a plant equally fast both ways, and the alternative that is slower one way."""
     u = np.repeat(np.random.default_rng(6).choice([-1.0, 0.3, 1.0], 80), 5)
     y = one_way(u, 0.0) + 1e-3 * np.random.default_rng(7).standard_normal(u.size)
     model = one_channel([0, 0.2], F=[1, -0.8])
@@ -341,8 +341,8 @@ def alike_both_ways():
     return u, model, way
 
 
-def test_of_a_plant_slower_one_way_it_is_the_finite_difference(alike_both_ways):
-    """Up to what a level and another gain explain: these are taken off."""
+def test_the_regressor_of_a_plant_slower_one_way_is_a_difference_quotient(alike_both_ways):
+    """They agree up to a level and a change of the gain, which are projected out."""
     u, _, way = alike_both_ways
     column = way.column[:, 0]
     difference = (one_way(u, 1e-4) - one_way(u, -1e-4)) / 2e-4
@@ -366,20 +366,20 @@ def test_a_plant_that_is_slower_one_way_is_found(levels, delay):
     assert not alike.tests.failed
 
 
-def test_how_such_a_plant_moves_g_is_told_of_both_ways(alike_both_ways):
-    """In each way G is a lag with its own pole: the derivative of it, a line in G apart."""
+def test_a_plant_slower_one_way_has_a_change_of_g_for_each_way(alike_both_ways):
+    """Each way G is a lag with its own pole; the change is its derivative, up to a multiple of G."""
     _, model, way = alike_both_ways
     w = np.linspace(0.01, 3.0, 40)
     falls, rises = way.slopes(model, w)[:, :, 0, 0]
     z, step = np.exp(-1j * w), 1e-6
     lag = [a * z / (1.0 - (1.0 - a) * z) for a in (0.2 - step, 0.2 + step)]
     expected = (lag[1] - lag[0]) / (2 * step)
-    # A line in u, of the same slope both ways, was taken off.
+    # A straight line in u, of equal slope both ways, was projected out.
     assert np.std((rises - falls) / expected) < 1e-6 * np.abs(np.mean((rises - falls) / expected))
     assert np.std((rises + falls) / lag[0]) < 1e-4 * max(np.abs(np.mean((rises + falls) / lag[0])), 1e-12)
 
 
-def test_what_matters_shares_a_level_among_its_like():
+def test_alternatives_of_a_varying_gain_share_a_significance_level():
     u = np.random.default_rng(5).standard_normal(800)
     found = estimated(u, through(np.clip(u, -1.0, 1.0)))
     tried = list(found.tests.directed)

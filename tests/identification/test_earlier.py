@@ -16,7 +16,7 @@ ARX = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.2, 0.5], variance=0.3)
 JENKINS = PolynomialModel.single([0, 1.0], F=[1, -0.8], C=[1, 0.4], D=[1, -0.6], variance=0.2)
 
 
-def of(found):
+def as_earlier(found):
     return Earlier(found.theta, found.information)
 
 
@@ -50,10 +50,10 @@ def in_s(rng):
 @pytest.mark.parametrize(
     "made", [in_s, lambda rng: (JENKINS, *simulated(JENKINS, 1500, rng, runs=2))], ids=["s", "q"]
 )
-def test_one_record_after_the_other_is_both_at_once_in_the_limit(made):
+def test_sequential_estimates_approach_the_joint_estimate_of_two_records(made):
     model, u, y = made(np.random.default_rng(3))
     first = identify(model, u[0], y[0], 0.4, rest=True)
-    then = identify(model, u[1], y[1], 0.4, rest=True, earlier=of(first))
+    then = identify(model, u[1], y[1], 0.4, rest=True, earlier=as_earlier(first))
     both = np.concatenate(u), np.concatenate(y)
     joint = identify(model, *both, 0.4, rest=True, lengths=[len(u[0])] * 2)
     deviation = np.sqrt(np.diag(joint.covariance))
@@ -61,7 +61,7 @@ def test_one_record_after_the_other_is_both_at_once_in_the_limit(made):
     np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)
 
 
-def test_knowing_nothing_changes_nothing():
+def test_an_earlier_estimate_without_information_changes_nothing():
     u, y = (x[0] for x in simulated(JENKINS, 400, np.random.default_rng(5)))
     plain = identify(JENKINS, u, y, rest=True)
     nothing = identify(JENKINS, u, y, rest=True, earlier=Earlier(JENKINS.theta, np.zeros((4, 4))))
@@ -71,7 +71,7 @@ def test_knowing_nothing_changes_nothing():
     assert plain.prior is None
 
 
-def test_what_is_known_of_some_parameters_makes_up_for_excitation():
+def test_knowledge_of_one_parameter_makes_up_for_missing_excitation():
     u = np.sin(0.7 * np.arange(300))[:, None]
     model = PolynomialModel.single([0, 1, 1, 1])
     y = np.array([shifted(u[:, 0], lag) * b for lag, b in ((1, 1.0), (2, 0.5), (3, 0.2))]).sum(axis=0)
@@ -84,12 +84,12 @@ def test_what_is_known_of_some_parameters_makes_up_for_excitation():
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("model", [ARX, JENKINS], ids=["arx", "bj"])
-def test_only_the_data_themselves_are_those_of_their_estimate(model):
-    """Not those of the same input, of the same length, or a part of them."""
+def test_an_earlier_estimate_from_the_same_data_is_recognised(model):
+    """Another record, another output for the same input, and a part of the data are not."""
     rng = np.random.default_rng(7)
     u, y = simulated(model, 200, rng, runs=2)
     other = y[0] + 0.1 * rng.standard_normal(y[0].shape)
-    first = of(identify(model, u[0], y[0], rest=True))
+    first = as_earlier(identify(model, u[0], y[0], rest=True))
     same = []
     for ours, theirs in ((u[0], y[0]), (u[1], y[1]), (u[0], other), (u[0][:150], y[0][:150])):
         found = identify(model, ours, theirs, rest=True, earlier=first)

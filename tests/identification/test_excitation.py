@@ -1,4 +1,4 @@
-"""Good data are never refused for rounding, poor ones always are, and units change no answer."""
+"""Good data are never refused for rounding, poor data always are, and units change no estimate."""
 
 from types import SimpleNamespace
 
@@ -22,14 +22,14 @@ SLOW = PolynomialModel.single(
 DECADES = st.integers(-6, 6)
 
 
-def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
+def test_the_covariance_of_collinear_gradients_agrees_with_a_qr_factorisation():
     u, y = simulated(SLOW, 400, np.random.default_rng(0))
     found = identify(SLOW, u[0], y[0], rest=True)
     theta = [float(x) for x in found.theta]
     B, C, F = [0.0, 0.0, 0.0, *theta[:3]], [1.0, theta[3]], [1.0, *theta[4:]]
     filtered = scipy.signal.lfilter([1], np.convolve(C, F), u[0, :, 0])
     second = -scipy.signal.lfilter(np.convolve(B, [1]), F, filtered)
-    # The noise before the record, w, is an unknown of its own, an error as large as the others.
+    # The noise before the record, w, is an additional unknown and an additional error.
     impulse = np.eye(1, 400)[0]
     of_w = np.append(-theta[3] * scipy.signal.lfilter([1], C, impulse), 1.0)
     errors = np.append(scipy.signal.lfilter([1], C, y[0, :, 0] - scipy.signal.lfilter(B, F, u[0, :, 0])), 0.0)
@@ -51,8 +51,8 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
 @settings(max_examples=2, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_units_of_signals_change_no_answer(rest, of_u, of_y):
-    # With a level to be estimated a root of C at 0.98 runs to the circle in 400 samples: no minimum there.
+def test_units_of_signals_change_no_estimate(rest, of_u, of_y):
+    # If a level is estimated, the root 0.98 of C runs to the circle in 400 samples, without a minimum.
     of_noise = np.array([name == "c1" for name in SLOW.names])
     model = SLOW if rest else SLOW.at(np.where(of_noise, -0.5, SLOW.theta))
     u, y = simulated(model, 400, np.random.default_rng(4))
@@ -70,7 +70,7 @@ def test_units_of_signals_change_no_answer(rest, of_u, of_y):
 @given(of_time=st.integers(-4, 4), of_y=DECADES)
 @pytest.mark.first(1)
 @pytest.mark.parametrize("rest", [False, True])
-def test_the_unit_of_time_changes_no_answer(rest, of_time, of_y):
+def test_the_unit_of_time_changes_no_estimate(rest, of_time, of_y):
     rng = np.random.default_rng(5)
     u = rng.standard_normal((600, 1))
     found = []
@@ -89,7 +89,7 @@ def test_the_unit_of_time_changes_no_answer(rest, of_time, of_y):
 @settings(max_examples=3, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("kind", ["a sinusoid too few", "two inputs as one", "feedback alone"])
-def test_data_that_cannot_tell_are_refused_in_any_unit(kind, of_u, of_y):
+def test_data_that_do_not_determine_parameters_are_refused_in_any_unit(kind, of_u, of_y):
     rng = np.random.default_rng(7)
     e = 0.1 * rng.standard_normal(300)
     match kind:
@@ -114,13 +114,13 @@ def _two_inputs():
     return PolynomialModel(((entry, entry),), (pole,), ((one, one),), (one,), (one,), np.eye(1))
 
 
-# Numerator and denominator of parameters p, q: none has a negative one, whose infimum lies at infinity.
+# Numerator and denominator by parameters p, q: negative values are out of reach, their infimum at infinity.
 OUT_OF_REACH = [("exp(p)", "exp(q)"), ("p*p", "1/(q*q)"), ("exp(p)/q", "1/q"), ("exp(p + q)", "exp(q)")]
 
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("terms", OUT_OF_REACH)
-def test_a_start_that_no_parameters_reach_is_brought_back_all_the_same(terms):
+def test_a_start_that_no_parameters_reach_gives_finite_parameters(terms):
     at = Parametrisation(
         ("p", "q"), ("p", "q"), np.array([1.0, 1.0]), np.ones(2, dtype=bool), tuple(map(Expression.of, terms))
     )

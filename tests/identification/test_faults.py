@@ -1,4 +1,4 @@
-"""Spikes, still sensors and signals logged at another time are seen; noise and rounding are none."""
+"""Spikes, frozen sensors and signals logged late are found; noise and rounding are no faults."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from inputdesign_cli.identification.faults import frozen, period_spikes, resolut
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix
 
-# Steps of rounding over the standard deviation of white e; None: as it is.
+# Resolution over the standard deviation of white e; None: no rounding.
 STEPS = (None, 0.1, 0.5, 1.0, 2.0, 5.0, 20.0)
 SAMPLES = 400
 
@@ -64,7 +64,7 @@ def test_a_frozen_stretch_is_found_where_it_is(step, stuck, seed):
 
 
 @pytest.mark.parametrize("step", [None, 0.1, 5.0])
-def test_a_step_of_rounding_is_that_of_the_record(step):
+def test_the_resolution_of_a_rounded_record_is_found(step):
     x = np.random.default_rng(0).standard_normal((2000, 1)) * 3.0
     if step is None:
         assert resolution_of(x)[0] < 0.1 * np.std(x)
@@ -75,7 +75,7 @@ def test_a_step_of_rounding_is_that_of_the_record(step):
     assert step * (1 - 1e-9) <= resolution_of(rounded)[0] <= max(1.0 + 1e-9, 0.3 / step) * step
 
 
-def test_without_noise_or_without_an_input_that_moves_nothing_is_said():
+def test_without_noise_or_moves_of_the_input_no_stretch_is_called_frozen():
     y = np.repeat(np.random.default_rng(1).standard_normal(20), 10)[:, None]
     held = np.concatenate([[[False]], y[1:] == y[:-1]])
     still, zero = np.ones_like(y), np.zeros_like(y)
@@ -85,12 +85,12 @@ def test_without_noise_or_without_an_input_that_moves_nothing_is_said():
     assert len(frozen(held, np.array([1e-3]), noise, noise, noise, zero, [200])[0]) == 20
 
 
-def test_an_input_that_rests_and_flickers_does_not_move():
+def test_flicker_of_the_last_digit_of_an_input_is_no_move():
     """A plant at rest under a measured input: neither moves but for the last digit of the input."""
     rng = np.random.default_rng(3)
     u = np.repeat(rng.uniform(0.0, 10.0, 20), 30)[:, None]
     y = scipy.signal.lfilter([0.3], [1, -0.7], u[:, 0])[:, None]
-    y[::30] += rng.standard_normal((20, 1))  # what happens, happens at the steps
+    y[::30] += rng.standard_normal((20, 1))  # disturbances come at the steps only
     held = np.concatenate([[[False]], np.abs(y[1:] - y[:-1]) < 0.01])
     flicker = u + 0.01 * rng.integers(0, 2, u.shape)
     errors = rng.standard_normal(u.shape)
@@ -110,7 +110,7 @@ def test_an_input_that_rests_and_flickers_does_not_move():
     size=st.floats(20, 1e12),
 )
 def test_spikes_are_found_whatever_the_unit(seed, scale, where, size):
-    """Of at least twenty standard deviations one in 200 holds more than half: 400 of 400 + 200."""
+    """One spike of twenty deviations in 200 samples has more than half of the squares: 400 of 400 + 200."""
     rng = np.random.default_rng(seed)
     e = rng.normal(size=(200, 2))
     assert spikes(e) == []
@@ -128,7 +128,7 @@ def test_noise_is_no_spike(kind, samples):
     assert not any(spikes(getattr(rng, kind)(size=(samples, 1))) for _ in range(300))
 
 
-def test_what_is_frequent_or_without_spread_is_no_spike():
+def test_frequent_outliers_and_constant_signals_are_no_spikes():
     e = np.random.default_rng(0).normal(size=(100, 1))
     e[:30:4] += 1e3  # eight of a hundred: an event, or a model that is wrong
     assert spikes(e) == []
@@ -144,8 +144,8 @@ def test_what_is_frequent_or_without_spread_is_no_spike():
     where=st.sets(st.integers(0, 399), min_size=1, max_size=2),
     drift=st.floats(-10, 10),
 )
-def test_spikes_of_periods_are_found_whatever_the_period_holds(seed, blocks, repeats, skip, where, drift):
-    """Not in the transient. The noise has a limit: of 60 examples none is to be far by chance."""
+def test_spikes_are_found_in_any_periodic_output(seed, blocks, repeats, skip, where, drift):
+    """Spikes in the transient do not count. The noise is bounded, so that none is a spike by chance."""
     rng = np.random.default_rng(seed)
     periods, samples = Periods(100, blocks=blocks, skip=skip), blocks * 600
     y = np.concatenate([np.tile(100.0 * rng.standard_normal(100), samples // 100) for _ in range(1)])
@@ -179,10 +179,10 @@ def loop(controller, samples=300, level=0.0, seed=0):
 
 @pytest.mark.parametrize("controller", [PI, GAIN], ids=["PI", "gain"])
 @pytest.mark.parametrize("level", [0.0, 50.0])
-def test_signals_as_they_were_obey_the_controller(controller, level):
+def test_signals_logged_in_time_obey_the_controller(controller, level):
     u, y, r = loop(controller, level=level)
     assert shifted(controller, u, y, r, [len(u)]) == []
-    # Rounding, and a controller that is not quite that of the spec, are no shift.
+    # Rounding, and a controller that differs a little from the spec, are no shift.
     assert shifted(controller, np.round(u, 1), np.round(y, 1), r, [len(u)]) == []
     assert shifted(controller.scaled(Rational.build([1.2])), u, y, r, [len(u)]) == []
 
@@ -199,7 +199,7 @@ def test_a_signal_that_was_logged_at_another_time_is_found(controller, letter, l
         assert found.left > 0.1
 
 
-def test_each_input_has_its_own_law():
+def test_each_input_is_tested_by_its_own_control_law():
     """Two loops side by side: the second input alone is late."""
     C = TransferMatrix.build([[[0.6, -0.4], [0.0]], [[0.0], [0.6, -0.4]]], [[[1.0, -1.0]] * 2] * 2)
     one, two = loop(PI, seed=1), loop(PI, seed=2)
@@ -210,6 +210,6 @@ def test_each_input_has_its_own_law():
     assert (found.letter, found.channel, found.lag) == ("u", 1, 1)
 
 
-def test_short_stretches_say_nothing():
+def test_short_records_show_no_shift():
     u, y, r = loop(PI, samples=20)
     assert shifted(PI, np.roll(u, 1), y, r, [20]) == []

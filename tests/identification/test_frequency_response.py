@@ -1,4 +1,4 @@
-"""The frequency response without a model: exact at lines, unbiased, and its discs hold what they say."""
+"""The frequency response without a model: exact at lines, unbiased, within its discs as often as stated."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def plant(w):
     return scipy.signal.freqz(B, F, worN=w)[1]
 
 
-def test_lines_of_a_periodic_input_without_noise_are_exact():
+def test_without_noise_the_response_at_lines_of_a_periodic_input_is_exact():
     rng = np.random.default_rng(1)
     lines = np.array([1, 4, 9, 20, 31])
     angle = 2 * np.pi * np.outer(np.arange(640), lines) / 64
@@ -24,13 +24,13 @@ def test_lines_of_a_periodic_input_without_noise_are_exact():
     found = frequency_response(u[:, None], y[:, None])
     assert found.method == "lines"
     np.testing.assert_allclose(found.frequency, 2 * np.pi * lines / 64)
-    # what is left of the transient after the first of ten periods: 0.775^64
+    # the transient has decayed to 0.775^64 after the first of ten periods
     np.testing.assert_allclose(found.G[:, 0, 0], plant(found.frequency), atol=1e-7)
     assert found.radius.max() < 1e-6
 
 
-def test_mean_and_variance_at_lines_are_those_of_theory():
-    """Of P periods without the first the variance is Phi_v / ((P - 1) N |U|^2), noise of variance Phi_v."""
+def test_mean_square_error_and_coverage_at_lines_agree_with_theory():
+    """P - 1 periods and noise of variance Phi_v give the variance Phi_v / ((P - 1) N |U|^2)."""
     period = np.random.default_rng(2).choice([-1.0, 1.0], 32)
     u, power = np.tile(period, 7), 0.3
     caused = scipy.signal.lfilter(B, F, u)
@@ -47,7 +47,7 @@ def test_mean_and_variance_at_lines_are_those_of_theory():
 
 
 @pytest.mark.slow
-def test_white_noise_in_gives_the_plant_within_its_discs():
+def test_for_white_inputs_95_percent_of_discs_contain_the_plant():
     errors, inside = [], []
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -55,7 +55,7 @@ def test_white_noise_in_gives_the_plant_within_its_discs():
         y = scipy.signal.lfilter(B, F, u) + 0.5 * scipy.signal.lfilter(
             [1], [1, -0.5], rng.standard_normal(1000)
         )
-        # a record cut out of a longer one: its start is unknown
+        # the record is cut out of a longer one, so that its start is unknown
         found = frequency_response(u[500:, None], y[500:, None])
         assert found.method == "local_polynomial"
         errors.append(found.G[:, 0, 0] - plant(found.frequency))
@@ -66,8 +66,8 @@ def test_white_noise_in_gives_the_plant_within_its_discs():
 
 
 @pytest.mark.parametrize("periodic", [False, True])
-def test_noise_and_coherence_are_those_of_theory(periodic):
-    """White noise of variance v has the spectrum v; the coherence is |G|^2 / (|G|^2 + v) of a white input."""
+def test_noise_and_coherence_agree_with_theory(periodic):
+    """White noise of variance v has the spectrum v; a white input, the coherence |G|^2 / (|G|^2 + v)."""
     rng = np.random.default_rng(6)
     u = np.tile(rng.choice([-1.0, 1.0], 400), 10) if periodic else rng.standard_normal(4000)
     y = scipy.signal.lfilter(B, F, u) + np.sqrt(0.3) * rng.standard_normal(4000)
@@ -82,7 +82,7 @@ def test_noise_and_coherence_are_those_of_theory(periodic):
     assert np.all((found.coherence >= 0.0) & (found.coherence <= 1.0))
 
 
-def test_two_inputs_and_two_records():
+def test_discs_from_two_records_of_two_inputs_contain_the_plant():
     rng = np.random.default_rng(3)
     u = rng.standard_normal((1300, 2))
     y = np.stack([scipy.signal.lfilter([0, 1], [1, -0.5], u[:, 0]) + 0.5 * u[:, 1], -2.0 * u[:, 1]], axis=1)
@@ -94,8 +94,8 @@ def test_two_inputs_and_two_records():
 
 
 @pytest.mark.parametrize("seeds", [2, pytest.param(12, marks=pytest.mark.slow)])
-def test_behind_a_slow_reference_the_discs_hold_the_plant(seeds):
-    """Where the input answers noise more than the reference, a ratio of responses is far from normal."""
+def test_in_a_loop_with_a_slow_reference_the_discs_contain_the_plant(seeds):
+    """Where noise moves the input more than the reference does, a ratio of responses is far from normal."""
     inside = []
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
@@ -112,7 +112,7 @@ def test_behind_a_slow_reference_the_discs_hold_the_plant(seeds):
 
 
 @pytest.mark.parametrize("samples", [*range(1, 60), 300])
-def test_short_or_poor_records_have_a_response_or_none(samples):
+def test_responses_of_short_or_poor_records_are_finite_or_none(samples):
     rng = np.random.default_rng(samples)
     u, y = rng.standard_normal((2, samples, 1))
     sinusoid = np.sin(0.3 * np.arange(samples))[:, None]
@@ -126,7 +126,7 @@ LATE = [[90, 3], [0, 40]]
 
 
 def _late_record(seed, samples=800):
-    """Two noises into two outputs behind LATE, cut out of a longer record."""
+    """u, y (samples, 2): white inputs through the dead times LATE, cut out of a longer record."""
     rng = np.random.default_rng(seed)
     u = rng.standard_normal((samples + 300, 2))
     y = 0.3 * rng.standard_normal((samples + 300, 2))
@@ -137,25 +137,25 @@ def _late_record(seed, samples=800):
 
 
 def _held(found):
-    """The share of its entries, of all frequencies, whose discs hold the plant."""
+    """The share of discs, over entries and frequencies, that contain the plant."""
     late = np.exp(-1j * found.frequency[:, None, None] * np.array(LATE))
     return np.mean(np.abs(found.G - plant(found.frequency)[:, None, None] * late) < found.radius)
 
 
 @pytest.mark.slow
-def test_behind_their_dead_times_the_discs_of_each_entry_hold_the_plant():
+def test_with_stated_dead_times_the_discs_of_each_entry_contain_the_plant():
     told, untold = [], []
     for seed in range(12):
         u, y = _late_record(seed)
         told.append(frequency_response(u, y, delays=np.array(LATE)))
         untold.append(frequency_response(u, y))
     assert np.mean([_held(found) for found in told]) == pytest.approx(0.95, abs=0.02)
-    # A parabola over the phase of 90 samples is useless, though its discs grow with what a line is off it.
+    # A parabola cannot follow the phase of 90 samples, though its discs grow with its difference from a line.
     wide = np.median([found.radius[:, 0, 0] for found in untold])
     assert np.median([found.radius[:, 0, 0] for found in told]) < 0.5 * wide
 
 
-def test_delays_of_responses_are_where_they_begin():
+def test_the_delay_of_a_response_is_the_lag_at_which_it_begins():
     one, none = np.ones(1), np.zeros(1)
     model = PolynomialModel(
         ((np.array([0, 0, 0, 1.0]), none), (np.array([0.4]), np.array([0, 1e-4, 0.5]))),

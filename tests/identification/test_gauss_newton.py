@@ -1,4 +1,4 @@
-"""The search on costs whose minima are known, and that rounding or a kink makes hard."""
+"""The search on costs with known minima that rounding errors or a kink make hard to find."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ERRORS = 12_000
 
 @dataclass(frozen=True)
 class Valley:
-    """cost = N + sum x^2 (1 + rounding): one standard deviation is one. The Hessian is wrong by a share."""
+    """cost = (N + sum x^2) (1 + rounding): deviations are one. The Hessian is too large by a share."""
 
     rounding: float
     share: float = 0.3
@@ -22,7 +22,7 @@ class Valley:
 
     def at(self, theta):
         cost = _ERRORS + np.sum(theta**2, axis=1)
-        # As if cancellation had lost the last digits, otherwise at every theta.
+        # Cancellation loses the last digits like this, differently at every theta.
         cost *= 1.0 + self.rounding * np.sin(1e13 * theta[:, 0])
         hessian = np.tile((1.0 + self.share) * np.eye(theta.shape[1]), (len(theta), 1, 1))
         return cost, hessian, -theta
@@ -36,7 +36,7 @@ class Valley:
 
 @dataclass(frozen=True)
 class Kink(Valley):
-    """cost = N + |x|, which no step of Gauss and Newton meets."""
+    """cost = N + |x - 0.3|, whose minimum no Gauss-Newton step finds."""
 
     def at(self, theta):
         cost = _ERRORS + np.abs(theta[:, 0] - 0.3)
@@ -45,7 +45,7 @@ class Kink(Valley):
 
 @pytest.mark.parametrize("rounding", [0.0, 1e-13, 2e-11, 5e-11])
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.6])
-def test_a_cost_that_is_known_to_its_rounding_only_has_its_minimum(rounding, share):
+def test_the_minimum_of_a_cost_with_rounding_errors_is_found(rounding, share):
     start = np.array([[30.0, -20.0], [1.0, 1e-3]])
     found = minimise(Valley(rounding, share), start)
     assert np.all(found.converged)
@@ -53,7 +53,7 @@ def test_a_cost_that_is_known_to_its_rounding_only_has_its_minimum(rounding, sha
     assert np.abs(found.theta).max() < 1e-3
 
 
-def test_a_kink_ends_the_search_early_and_unsettled():
+def test_at_a_kink_the_search_ends_early_and_has_not_converged():
     found = minimise(Kink(0.0), np.array([[5.0], [0.31]]))
     assert not np.any(found.converged)
     assert np.all(found.steps < MOST_STEPS)

@@ -1,4 +1,4 @@
-"""Outputs that shift and stay, whatever the inputs do."""
+"""Shifts of the level of an output that the inputs do not cause."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ LAG = (
     "sample_time: 1\nplant: {parameters: {K: 1, T: 10, L: 3.3}, "
     "continuous: {numerator: [K], denominator: [T, 1], delay: L}, sample: zoh}\n"
 )
-# What `lag_of` simulates, in q: its estimates take a tenth of the time.
+# The plant that `lag_of` simulates, in q: its estimates take a tenth of the time.
 FINE = "sample_time: 1\nplant: {B: [0, 0, 0, 0.1], F: [1, -0.9]}\n"
 NOISES = {
     "white": "noise: {variance: 0.01}",
@@ -42,8 +42,8 @@ def shift_of(text, u, y, **settings):
     return identify(stated(text), u, y, **settings).tests.shift
 
 
-def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_more():
-    """Of ARX models a shift is a regressor; it makes the sum of squares smaller by a factor."""
+def test_the_shift_statistic_of_arx_is_the_likelihood_ratio_of_two_regressions():
+    """A shift is one more regressor; the statistic is N log of the ratio of sums of squares."""
     rng = np.random.default_rng(4)
     u, e = rng.choice([-1.0, 1.0], 120), 0.1 * rng.standard_normal(120)
     y = scipy.signal.lfilter([0.0, 0.5], [1.0, -0.8], u) + scipy.signal.lfilter([1.0], [1.0, -0.8], e)
@@ -60,7 +60,7 @@ def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_
             expected[lag, at] = 120.0 * np.log(squares(phi) / squares(np.column_stack([phi, column])))
     found = shift_of(ARX, u[:, None], y[:, None], rest=True)
     best = max(expected, key=expected.get)
-    # The third lag that is tried has 16 samples, more than an eighth of the record.
+    # Only lags up to an eighth of the record are tried; the third would have 16 samples.
     assert found.test.statistic == pytest.approx(expected[best], rel=1e-6)
     assert found.sample == best[1]
 
@@ -68,7 +68,7 @@ def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_
 @pytest.mark.parametrize(
     ("words", "noise"), [(FINE, "white"), *(pytest.param(LAG, n, marks=pytest.mark.slow) for n in NOISES)]
 )
-def test_right_models_have_none(words, noise):
+def test_right_models_show_no_level_shift(words, noise):
     told = [
         shift_of(words + NOISES[noise], *lag_of(int(120 + 37 * seed), seed, noise)).test.probability < 1e-3
         for seed in range(3)
@@ -86,7 +86,7 @@ def test_right_models_have_none(words, noise):
         ),
     ],
 )
-def test_where_it_happens_is_found(words, at, lag, sign):
+def test_the_sample_and_the_sign_of_a_shift_are_found(words, at, lag, sign):
     u, y = lag_of(300, 3)
     after = np.maximum(np.arange(300.0) - at, 0.0)
     y[:, 0] += sign * 0.5 * (-np.expm1(-after / lag) if lag else after >= 1.0)
@@ -101,7 +101,7 @@ def test_where_it_happens_is_found(words, at, lag, sign):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 8])
-def test_a_load_that_comes_and_goes_is_two(seed):
+def test_a_load_that_comes_and_goes_gives_two_shifts(seed):
     u, y = lag_of(300, seed)
     y[120:180] += 0.6
     found = identify(stated(LAG + NOISES["white"]), u, y)
@@ -111,7 +111,7 @@ def test_a_load_that_comes_and_goes_is_two(seed):
 
 
 @pytest.mark.slow
-def test_it_belongs_to_a_record_and_to_an_output():
+def test_a_shift_belongs_to_one_record_and_one_output():
     first, second = lag_of(150, 5), lag_of(200, 6)
     matrix = stated(
         "sample_time: 1\nplant: {A: [[1, -0.9], [1, -0.9]], B: [[[0, 0.1]], [[0, 0.1]]]}\n"
@@ -125,7 +125,7 @@ def test_it_belongs_to_a_record_and_to_an_output():
     assert (found.output, found.sample) == (0, 250)
     two = two[:, ::-1]
     assert identify(matrix, u, two, lengths=[150, 200]).tests.shift.output == 1
-    # A record of its own has a level of its own.
+    # Separate records may have different levels.
     apart = np.concatenate([first[1], second[1] + 3.0])
     assert shift_of(LAG + NOISES["white"], u, apart, lengths=[150, 200], rest=False).test.probability > 0.01
 
@@ -145,7 +145,7 @@ def test_lines_and_single_samples_are_no_shifts():
     assert found.tests.shifted == ()
 
 
-def test_a_record_too_short_for_any_has_none():
+def test_a_record_too_short_for_a_shift_has_none():
     rng = np.random.default_rng(2)
     u = rng.choice([-1.0, 1.0], (10, 1))
     y = np.append(0.0, 0.5 * u[:-1, 0])[:, None] + 0.1 * rng.standard_normal((10, 1))
@@ -154,8 +154,8 @@ def test_a_record_too_short_for_any_has_none():
 
 
 @pytest.mark.slow
-def test_a_shift_that_alone_refutes_a_model_is_told_whatever_hardly_counts():
-    """Its score may say less than a test that does not fail; another one that fails outweighs it."""
+def test_a_shift_that_alone_refutes_a_model_is_reported_unless_another_test_fails():
+    """Its score may be below that of a test that passes; another test that fails outweighs it."""
     u, y = lag_of(300, 5)
     y[120:] += 0.6
     found = identify(stated(LAG + NOISES["white"]), u, y)

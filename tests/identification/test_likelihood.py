@@ -1,4 +1,4 @@
-"""The likelihood is that of the density of all samples; unknown starts are eliminated as by a regression."""
+"""The likelihood is the Gaussian density of all samples; unknown starts are eliminated by regression."""
 
 import numpy as np
 import pytest
@@ -29,13 +29,13 @@ def response(above, below, samples):
 
 
 def covariance(C, D, samples):
-    """Of stationary noise C/D e, from its autocovariances, the tail of its response being summed."""
+    """The covariance (samples, samples) of stationary noise C/D e, from its long impulse response."""
     h = response(C, D, 6000)
     return scipy.linalg.toeplitz([h[lag:] @ h[: len(h) - lag] for lag in range(samples)])
 
 
 def textbook(model, records, *, free):
-    """-2 log likelihood at the likeliest variance, up to a constant, unknown starts being integrated out."""
+    """-2 log likelihood at the likeliest variance, up to a constant; unknown starts are integrated out."""
     (B,), (F,), (C,), (D,) = model.B[0], model.F[0], model.C, model.D
     deviance, squares, freedom = 2.0 * np.log(np.sum(response([1.0], C, 6000) ** 2)), 0.0, 0
     for u, y in records:
@@ -67,8 +67,8 @@ def ours(model, parts, *, free):
 @pytest.mark.parametrize("lengths", [(N,), (30, N, 24)])
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_it_is_that_of_the_covariance_of_all_samples(model, free, lengths):
-    """Differences between models are compared; a stationary start and its determinant are in both."""
+def test_the_likelihood_is_the_gaussian_density_of_all_samples(model, free, lengths):
+    """Differences between models are compared; both include the stationary start and its determinant."""
     rng = np.random.default_rng(3)
     parts = [(rng.standard_normal(n), np.cumsum(rng.standard_normal(n))) for n in lengths]
     other = model.at(model.theta * (1.0 - 0.1 * rng.random(model.theta.size)), model.covariance)
@@ -79,8 +79,8 @@ def test_it_is_that_of_the_covariance_of_all_samples(model, free, lengths):
 
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_its_slope_is_that_of_differences(model, free):
-    """At errors that no parameter changes much the slope of Gauss and Newton is exact to first order."""
+def test_the_slope_of_the_likelihood_is_a_difference_quotient(model, free):
+    """No parameter changes these errors much; there the Gauss-Newton slope is exact to first order."""
     rng = np.random.default_rng(4)
     parts = [(rng.standard_normal(n), rng.standard_normal(n)) for n in (N, 30)]
     _, records, point = ours(model, parts, free=free)
@@ -89,8 +89,8 @@ def test_its_slope_is_that_of_differences(model, free):
         assert -2.0 * point.slope[k] == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-5)
 
 
-def test_a_known_pole_on_the_circle_leaves_a_regression_of_differences():
-    """y = b u(t - 1) + noise that is a sum: where it began is unknown, of its steps nothing is."""
+def test_with_a_known_noise_pole_at_one_the_estimate_regresses_differences():
+    """y = b u(t - 1) + a random walk, whose start is unknown; its steps have no unknown past."""
     rng = np.random.default_rng(5)
     u, e = rng.standard_normal(N), rng.standard_normal(N)
     delayed = np.append(0.0, u[:-1])
@@ -113,7 +113,7 @@ def rng():
 
 
 def dense(responses):
-    """(N p, m): every response among the errors of all outputs and records."""
+    """Every response as a column (N p, m) of the errors of all outputs and records."""
     columns, begin = [], 0
     for length in LENGTHS:
         for output, block in enumerate(responses):
@@ -135,7 +135,7 @@ def begun(responses):
 
 @pytest.mark.parametrize("weights", [None, np.array([[2.0, -1.2], [-1.2, 1.0]])])
 @pytest.mark.parametrize("level", [0.0, 1e4])
-def test_what_is_left_is_that_of_weighed_least_squares(weights, level, rng):
+def test_starts_are_eliminated_as_by_weighted_least_squares(weights, level, rng):
     responses = drawn(rng)
     for block in responses:
         block[0] = 1.0
@@ -156,7 +156,7 @@ def test_what_is_left_is_that_of_weighed_least_squares(weights, level, rng):
 
 
 @pytest.mark.parametrize("share", [-3.0, 0.0])
-def test_responses_that_are_the_same_or_that_no_output_shows_take_no_direction(share, rng):
+def test_proportional_and_zero_responses_span_no_additional_direction(share, rng):
     responses = drawn(rng)
     responses[1][1] = share * responses[1][0]
     errors = rng.standard_normal((sum(LENGTHS), 2))
@@ -165,8 +165,8 @@ def test_responses_that_are_the_same_or_that_no_output_shows_take_no_direction(s
     assert np.all(np.isfinite(directions))
 
 
-def test_outputs_whose_errors_are_nearly_the_same_lose_no_direction(rng):
-    """Normal equations would: the directions are orthonormal none the less."""
+def test_directions_are_orthonormal_for_outputs_with_nearly_equal_errors(rng):
+    """Normal equations would lose directions here."""
     errors = rng.standard_normal((sum(LENGTHS), 1)) + 1e-6 * rng.standard_normal((sum(LENGTHS), 2))
     _, _, directions = begun(drawn(rng)).eliminated(errors, None)
     np.testing.assert_allclose(directions.T @ directions, np.eye(directions.shape[1]), atol=1e-9)

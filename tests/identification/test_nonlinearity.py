@@ -1,4 +1,4 @@
-"""Silent lines and cubes: noise and drifts do not speak, nonlinearities do, by as much as they change."""
+"""Power at silent lines shows nonlinearities, not noise or drifts; cubes give the change of G."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def odd_multisine(rng, period, times):
     return np.cos(2 * np.pi * np.outer(t, lines) / period + phases).sum(axis=1)[:, None] / 4
 
 
-def test_of_coloured_noise_alone_the_probability_is_uniform():
+def test_for_coloured_noise_alone_the_probability_is_uniform():
     rng = np.random.default_rng(0)
     found = []
     for _ in range(150):
@@ -36,7 +36,7 @@ def test_of_coloured_noise_alone_the_probability_is_uniform():
         (lambda u: u + 0.1 * u**3, 0.0, {"odd"}),
     ],
 )
-def test_the_degree_is_told_and_a_drift_does_not_speak(bent, drift, speaks):
+def test_even_and_odd_nonlinearities_are_distinguished_and_drifts_ignored(bent, drift, speaks):
     rng = np.random.default_rng(1)
     u = odd_multisine(rng, 256, 6)
     y = scipy.signal.lfilter([0, 0.5], [1, -0.6], bent(u[:, 0])) + 0.1 * rng.standard_normal(len(u))
@@ -44,7 +44,7 @@ def test_the_degree_is_told_and_a_drift_does_not_speak(bent, drift, speaks):
     assert {kind for kind, one in found.items() if one.probability[0] < 0.01} == speaks
 
 
-def test_the_level_beyond_the_noise_is_told():
+def test_the_rms_of_distortions_beyond_the_noise_is_found():
     rng = np.random.default_rng(2)
     u = odd_multisine(rng, 256, 8)
     more = 0.05 * np.sqrt(2) * np.cos(2 * np.pi * 10 * np.arange(len(u)) / 256)[:, None]
@@ -52,7 +52,7 @@ def test_the_level_beyond_the_noise_is_told():
     assert found["even"].rms[0] == pytest.approx(0.05, rel=0.3)
 
 
-def test_inputs_that_do_not_repeat_say_nothing():
+def test_inputs_that_do_not_repeat_have_no_silent_lines():
     rng = np.random.default_rng(4)
     assert silent_in(rng.standard_normal((500, 1)), rng.standard_normal((500, 1))) == {}
     assert silent_in(rng.standard_normal((500, 2)), rng.standard_normal((500, 1))) == {}
@@ -65,7 +65,7 @@ LINES = np.setdiff1d(ODD, SILENT)
 
 
 def low_peaks():
-    """A period of random phases of which the lowest peak of many tries is left: little crest factor."""
+    """One period (PERIOD,) of a multisine of low crest factor, the best of 200 choices of the phases."""
     rng = np.random.default_rng(0)
     t = np.arange(PERIOD)
     phases = 2.0 * np.pi * rng.uniform(size=(200, LINES.size))
@@ -94,7 +94,7 @@ def measured(y, seed, size=0.05, late=0, rough=1.0, level=0.0):
 
 
 def truth(y, late=0):
-    """The change at the lines without noise: of the last period over that of the linear plant."""
+    """The size of the change of G at the lines without noise, from the last periods of y and of the plant."""
     linear = plant(np.tile(low_peaks(), TIMES), late)
     last = [np.fft.rfft(one[-PERIOD:])[LINES] for one in (y, linear)]
     return np.abs((last[0] / last[1] - 1.0) * response(LINES, late)[:, 0, 0])
@@ -103,7 +103,7 @@ def truth(y, late=0):
 @pytest.mark.parametrize(
     ("late", "rough"), [(0, 1.0), (0, 3.0), (12, 1.0)], ids=["plant", "model off", "dead time"]
 )
-def test_the_change_by_a_cube_of_the_input_is_told(late, rough):
+def test_the_change_of_g_by_a_cube_of_the_input_is_found(late, rough):
     u = np.tile(low_peaks(), TIMES)
     y = plant(u + 0.03 * u**3, late)
     found = measured(y, 1, size=0.02, late=late, rough=rough)
@@ -112,7 +112,7 @@ def test_the_change_by_a_cube_of_the_input_is_told(late, rough):
     assert found.error[:, 0, 0] == pytest.approx(truth(y, late), rel=0.25)
 
 
-def test_the_change_by_a_cube_of_the_output_is_told():
+def test_the_change_of_g_by_a_cube_of_the_output_is_found():
     x = plant(np.tile(low_peaks(), TIMES))
     y = x - 0.02 * x**3
     found = measured(y, 2, size=0.003)
@@ -120,7 +120,7 @@ def test_the_change_by_a_cube_of_the_output_is_told():
     assert found.error[:, 0, 0] == pytest.approx(truth(y), rel=0.3, abs=0.1 * truth(y).max())
 
 
-def test_a_level_of_the_input_is_no_part_of_the_cube():
+def test_the_level_of_the_input_does_not_enter_its_cube():
     u = np.tile(low_peaks(), TIMES)
     y = plant(u + 0.03 * u**3)
     plain, about = (measured(y, 1, size=0.02, level=level).error for level in (0.0, 40.0))
@@ -128,14 +128,14 @@ def test_a_level_of_the_input_is_no_part_of_the_cube():
 
 
 @pytest.mark.slow
-def test_of_noise_alone_the_probability_is_not_small_too_often():
-    """0.1 where the two cubes were independent, less as they are not."""
+def test_for_noise_alone_small_probabilities_are_rare():
+    """The share below 0.1 is 0.1 if the two cubes are independent, and less since they are not."""
     y = plant(np.tile(low_peaks(), TIMES))
     found = np.array([measured(y, 100 + seed).probability[0] for seed in range(200)])
     assert 0.02 < np.mean(found < 0.1) < 0.14
 
 
-def test_which_of_two_inputs_is_cubed_is_told():
+def test_the_one_of_two_inputs_that_is_cubed_is_found():
     one = np.tile(low_peaks(), TIMES)
     other = np.roll(one, 37)
     first, second = np.concatenate([one, one]), np.concatenate([other, -other])

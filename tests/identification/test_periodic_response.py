@@ -1,4 +1,4 @@
-"""The response by periods, its deviations, and drifts beside inputs that repeat."""
+"""Frequency responses from periodic inputs, their standard deviations, and drifts of the outputs."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def blocks(G, rng, periods, times):
     return np.concatenate(u), np.concatenate(y), k
 
 
-def test_two_inputs_are_told_apart_exactly():
+def test_two_inputs_are_separated_exactly_by_two_blocks():
     rng, periods = np.random.default_rng(0), Periods(32, blocks=2, skip=1)
     G = rng.standard_normal((10, 3, 2)) + 1j * rng.standard_normal((10, 3, 2))
     u, y, k = blocks(G, rng, periods, 3)
@@ -39,13 +39,13 @@ def test_two_inputs_are_told_apart_exactly():
     assert found.freedom == 2
 
 
-def test_inputs_in_phase_are_not_told_apart():
+def test_inputs_in_phase_have_no_separate_responses():
     periods = Periods(32, blocks=2)
     u = np.cos(2 * np.pi * 3 * np.arange(128) / 32)[:, None] * np.array([1.0, 2.0])
     assert periodic_response(u, u, periods, np.array([3])) is None
 
 
-def test_the_deviations_are_those_of_many_records():
+def test_the_standard_deviations_agree_with_many_simulated_records():
     rng, periods = np.random.default_rng(1), Periods(16, blocks=2, skip=0)
     G = rng.standard_normal((4, 1, 2)) + 1j * rng.standard_normal((4, 1, 2))
     u, y, k = blocks(G, rng, periods, 5)
@@ -72,7 +72,7 @@ PERIOD = 100
     repeats=st.integers(1, 2),
     unit=st.sampled_from([1e-3, 1.0, 3600.0]),
 )
-def test_a_polynomial_comes_back_whatever_the_period_holds(seed, degree, blocks, skip, repeats, unit):
+def test_a_polynomial_drift_is_recovered_from_any_periodic_output(seed, degree, blocks, skip, repeats, unit):
     rng = np.random.default_rng(seed)
     periods, samples = Periods(PERIOD, blocks=blocks, skip=skip), 6 * PERIOD * blocks
     shape = rng.standard_normal(PERIOD)
@@ -91,7 +91,7 @@ def test_a_polynomial_comes_back_whatever_the_period_holds(seed, degree, blocks,
 
 
 @pytest.mark.parametrize("past", [0.0, 0.8])
-def test_noise_is_hardly_ever_a_drift(past):
+def test_noise_is_hardly_ever_taken_for_a_drift(past):
     rng = np.random.default_rng(1)
     level, found = 1.0 / (1.0 - past) ** 2, 0
     for _ in range(400):
@@ -110,7 +110,7 @@ def test_only_the_output_that_drifts_is_changed():
     assert np.ptp(found.curve[:, 1]) == pytest.approx(4.0, rel=0.05)
 
 
-def test_the_line_of_the_periods_is_that_of_their_means():
+def test_the_drift_line_has_the_slope_of_a_regression_of_period_means():
     y = np.random.default_rng(3).standard_normal((530, 1)).cumsum(axis=0)
     means = y[30:, 0].reshape(5, PERIOD).mean(axis=1)
     slope = np.polyfit(PERIOD * np.arange(5.0), means, 1)[0]

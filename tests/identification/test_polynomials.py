@@ -22,7 +22,7 @@ from tests.support.refusals import refused
 
 
 def theory(model, samples):
-    """M of unit white inputs, from the frequency domain."""
+    """The information matrix M of unit white inputs, by integrals over frequency."""
     experiment = Experiment(model, samples)
     basis = FirBasis(model.inputs, 0)
     maps = basis.integrals(experiment.information_density, experiment.singularities)
@@ -45,7 +45,7 @@ def stacked(model, u, y):
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("runs", [3, 30])
-def test_cost_and_gradient_are_those_of_finite_differences(runs):
+def test_the_gradient_of_a_batch_is_a_difference_quotient_of_its_cost(runs):
     model, rng = box_jenkins(), np.random.default_rng(1)
     problem = FromRest.of(model, *simulated(model, 80, rng, runs))
     theta = model.theta * (1 + 0.03 * rng.standard_normal((runs, model.theta.size)))
@@ -58,13 +58,13 @@ def test_cost_and_gradient_are_those_of_finite_differences(runs):
 
 
 def with_known_noise(model, u, y):
-    """Theta and information where the covariance of the noise is known: the weights of the search."""
+    """Theta and its information matrix; the known covariance of the noise weights the search."""
     records = Records(estimator(model, 1.0), ((u, y),), weights=np.linalg.inv(model.covariance))
     theta = minimise(RecordProblem((records,)), model.theta[None]).theta[0]
     return theta, information_of(records, evaluate(records, theta), model.covariance)
 
 
-def test_with_a_known_covariance_it_is_generalised_least_squares():
+def test_with_known_noise_covariance_the_estimate_is_generalised_least_squares():
     model = arx(per_output=False)
     u, y = (x[0] for x in simulated(model, 300, np.random.default_rng(4)))
     root = np.linalg.inv(np.linalg.cholesky(model.covariance))
@@ -75,8 +75,8 @@ def test_with_a_known_covariance_it_is_generalised_least_squares():
     np.testing.assert_allclose(information, phi.T @ phi, rtol=1e-9, atol=1e-6)
 
 
-def test_an_unknown_covariance_is_that_of_the_residuals():
-    """Iterated generalised least squares (Zellner) ends where the determinant is least."""
+def test_with_unknown_noise_covariance_the_estimate_is_zellners():
+    """Iterated generalised least squares (Zellner) minimise the determinant of the residual covariance."""
     model = arx(per_output=False)
     u, y = (x[0] for x in simulated(model, 300, np.random.default_rng(5)))
     phi = stacked(model, u, y)
@@ -103,7 +103,7 @@ class Renamed:
     inputs: int = 1
 
 
-def test_a_new_kind_of_model_brings_its_estimator():
+def test_an_estimator_can_be_registered_for_a_new_kind_of_model():
     with pytest.raises(TypeError, match="object"):
         identify(object(), np.ones((10, 1)), np.ones((10, 1)))
     estimator.register(Renamed, lambda model, step: estimator(model.inner, step))
@@ -121,7 +121,7 @@ def test_prediction_errors_at_the_truth_are_the_noise(model):
 
 
 @pytest.mark.parametrize("name", ["armax", "oe", "bj"])
-def test_a_batch_finds_what_a_plain_optimiser_finds(name):
+def test_the_estimates_of_a_batch_agree_with_scipy_least_squares(name):
     model = SYSTEMS[name]
     u, y = data(name, 400, np.random.default_rng(5), runs=4)
     found = fit_batch(model, u, y, start=model.theta)
@@ -138,8 +138,8 @@ def test_a_batch_finds_what_a_plain_optimiser_finds(name):
 
 
 @pytest.mark.slow
-def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
-    """y = 0.5 u(t-1) + 0.8 y(t-1) - .. + e under u = r - 0.6 y, r slow: u(t) itself tells e(t)."""
+def test_stated_feedback_does_not_fail_the_independence_test():
+    """The plant 0.5 q^-1 / (1 - 0.8 q^-1) under u = r - 0.6 y with slow r: u(t) contains e(t)."""
     model, rng = one_channel([0, 1], F=[1, 0]), np.random.default_rng(3)
     slow = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((40, 400)))
     e, y, u, x = 0.3 * rng.standard_normal((40, 400)), np.zeros((40, 400)), np.zeros((40, 400)), 0.0
@@ -213,7 +213,7 @@ def test_bad_data_is_refused_and_the_channel_named(change, code, named):
     found = refused(identify, arx(), *change(u, y))
     assert found[0].code == code
     assert named in found[0].message
-    assert ("b1[1,1]" in found[0].message) == (named == "b1[1,1]")  # what another input shows is not denied
+    assert ("b1[1,1]" in found[0].message) == (named == "b1[1,1]")  # never a determined one
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_estimates_reach_the_cramer_rao_bound(model, runs, samples):
     assert np.all(found.converged)
     information = theory(model, samples)
     alone = identify(model, u[3], y[3], start=model.theta)
-    # With a noise model the single estimate has the noise before the record as well.
+    # With a noise model the single estimate also estimates the noise before the record.
     apart = (found.theta[3] - alone.theta) / np.sqrt(np.diag(alone.covariance))
     assert np.abs(apart).max() < (1e-5 if model.C[0].size == model.D[0].size == 1 else 0.1)
     np.testing.assert_allclose(found.noise.mean(axis=0), model.covariance, atol=0.02 * model.covariance.max())
@@ -247,7 +247,7 @@ def test_estimates_reach_the_cramer_rao_bound(model, runs, samples):
 
 @pytest.mark.parametrize("gap", [0.0, 1e-15, 1e-13, 1e-12, 1e-11, 1e-10, 3e-10, 3e-9, 1e-8, 1e-4])
 @pytest.mark.parametrize("angle", [0.0, 1.0, np.pi])
-def test_what_counts_as_stable_may_stand_in_a_spec(gap, angle):
+def test_polynomials_that_count_as_stable_are_accepted_in_a_spec(gap, angle):
     roots = (1.0 - gap) * np.exp(1j * np.array([angle, -angle] if angle == 1.0 else [angle]))
     for others in ((), (0.5,), (0.5, -0.9)):
         monic = np.poly([*roots, *others]).real
@@ -263,8 +263,8 @@ _IN_S = "{continuous: {gain: 2, time_constant: 10}, sample: zoh}"
 
 @pytest.mark.parametrize("gap", [-0.5, 0.0, 1e-13, 1e-11, 1e-8])
 @pytest.mark.parametrize("plant", ["{B: [0, 1], F: [1, -0.7]}", _IN_S], ids=["q", "s"])
-def test_noise_that_a_search_may_arrive_at_may_stand_in_a_spec(plant, gap):
-    """Whatever the step, C and D have their roots inside the circle by more than rounding."""
+def test_noise_models_of_a_search_are_accepted_in_a_spec(plant, gap):
+    """After any step, C and D have their roots inside the circle by more than rounding."""
     model = stated(f"plant: {plant}\nnoise: {{variance: 1, C: [1, 0.2], D: [1, -0.5]}}\n")
     theta = model.theta.copy()
     for name, sign in (("c1", 1.0), ("d1", -1.0)):

@@ -19,7 +19,7 @@ CUT = 60
 
 
 def model_and_data(name, samples, rng, noise):
-    """A model, and samples of it."""
+    """A model, its inputs u (samples, r) and its outputs y (samples, p)."""
     if name == "in s":
         model = SampledModel(two_by_two(), 0.4)
     else:
@@ -53,7 +53,7 @@ def test_the_slope_with_unknown_starts_is_a_difference_quotient(name, ramp):
 
 
 @pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
-def test_an_unknown_start_explains_what_was_cut_off(name):
+def test_an_unknown_start_explains_a_record_cut_out_of_a_longer_one(name):
     """Without noise, the later part of a record about any level leaves no error at the true parameters."""
     model, u, y = model_and_data(name, 300, np.random.default_rng(5), 0.0)
     records = Records(estimator(model, 1.0), ((u[CUT:], y[CUT:] + 7.0),))
@@ -63,8 +63,8 @@ def test_an_unknown_start_explains_what_was_cut_off(name):
 
 
 @pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
-def test_lines_in_the_outputs_leave_nothing_where_they_may_drift(name):
-    """Errors and their gradient are the same whatever line every record has, and another without the ramp."""
+def test_the_ramp_of_a_start_removes_straight_lines_from_the_outputs(name):
+    """With the ramp, lines in the records change neither errors nor gradient; without it errors change."""
     records, theta = record_of(name)
     records = replace(records, ramp=True)
     lined = tuple(
@@ -110,8 +110,8 @@ def test_arx_from_rest_is_stacked_least_squares(runs):
     np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(phi.T @ phi), rtol=1e-7)
 
 
-def test_the_simulation_begins_where_the_record_does():
-    """A plant that swings out while the record begins: level and state are in the simulated output."""
+def test_the_simulation_starts_in_the_state_of_the_record():
+    """The record begins with a decaying oscillation; the simulation contains its level and initial state."""
     rng = np.random.default_rng(9)
     u = rng.standard_normal((400, 1))
     y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u, axis=0)
@@ -123,7 +123,7 @@ def test_the_simulation_begins_where_the_record_does():
 
 
 def test_levels_of_records_do_not_count_as_explained():
-    """The fit of records about different levels is that of the same records about zero."""
+    """The fit of records about different levels equals the fit of the same records about zero."""
     u, y = (x[0] for x in data("oe", 200, np.random.default_rng(3)))
     levels = np.repeat([[40.0], [-5.0]], 100, axis=0)
     apart, plain = (identify(SYSTEMS["oe"], u, v, lengths=(100, 100), rest=False) for v in (y + levels, y))
@@ -144,8 +144,8 @@ def jointly(*records, model=SYSTEMS["arx"]):
     return identify(model, u, y, lengths=lengths, experiments=lengths, rest=True)
 
 
-def test_of_arx_it_is_the_test_of_wald():
-    """Two regressions on their own; the noise of each is that which the joint parameters leave."""
+def test_the_equality_test_of_two_arx_records_is_the_wald_test():
+    """Each record has its own regression; its noise is estimated from the residuals of the joint estimate."""
     records = [recorded(1.0, 300, 1), recorded(1.1, 200, 2, spread=2.0)]
     found = jointly(*records)
     estimates, variances = [], []
@@ -160,7 +160,7 @@ def test_of_arx_it_is_the_test_of_wald():
 
 
 @pytest.mark.slow
-def test_of_one_system_the_probability_is_uniform():
+def test_the_equality_test_has_uniform_probability_for_one_system():
     model = one_channel([0, 1.0, 0.5], F=[1, -1.5, 0.7])
     found = []
     for seed in range(20):
@@ -174,7 +174,7 @@ def test_of_one_system_the_probability_is_uniform():
 @pytest.mark.first(4)
 @pytest.mark.parametrize("samples", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
+def test_a_very_short_first_experiment_does_not_change_the_estimate(samples, seed):
     """It has no information in most directions, exactly none in some."""
     u, y = recorded(1.0, 200, seed)
     with np.errstate(all="raise", under="ignore"):
@@ -187,8 +187,8 @@ def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
 
 
 @pytest.mark.parametrize("samples", range(1, 7))
-def test_gradients_of_a_segment_shorter_than_its_lags_are_differences(samples):
-    """What is left between gaps may be shorter than the delay and the orders."""
+def test_gradients_of_a_segment_shorter_than_its_lags_are_difference_quotients(samples):
+    """A segment between gaps may be shorter than the delay and the orders."""
     model = one_channel([0, 0, 0, 0.4, 0.2], F=[1, -0.8], C=[1, 0.5], D=[1, -0.7, 0.1])
     kind, rng = estimator(model, 1.0), np.random.default_rng(samples)
     u, y = rng.standard_normal((2, samples, 1))

@@ -66,7 +66,7 @@ def as_sampled(model, hold):
 
 
 @pytest.mark.parametrize("name", PLANTS)
-def test_a_held_input_gives_what_a_sampled_state_space_gives(name):
+def test_the_response_to_a_held_input_agrees_with_zero_order_hold_sampling(name):
     model = PLANTS[name]
     u = np.random.default_rng(0).normal(size=(200, model.inputs))
     expected = np.zeros((200, model.outputs))
@@ -79,7 +79,7 @@ def test_a_held_input_gives_what_a_sampled_state_space_gives(name):
     np.testing.assert_allclose(model.driven(u, Intersample(STEP, True)), expected, atol=1e-11)
 
 
-def test_a_held_input_is_exact_when_the_plant_remembers_more_than_the_record():
+def test_the_response_to_a_held_input_is_exact_for_lags_beyond_the_record():
     slow = plant([[[1.0]]], [[[1.0, 1e-6]]])
     u = np.ones((300, 1))
     expected = (1.0 - np.exp(-1e-6 * STEP * np.arange(300))) / 1e-6
@@ -87,7 +87,7 @@ def test_a_held_input_is_exact_when_the_plant_remembers_more_than_the_record():
     np.testing.assert_allclose(ours, expected, atol=1e-10 * expected.max())
 
 
-def test_a_band_limited_input_is_its_fine_interpolation():
+def test_a_band_limited_input_gives_the_response_to_its_interpolation():
     model, factor = PLANTS["two by two"], 64
     u = excitation(256, 2, np.random.default_rng(1), share=0.3) * np.hanning(256)[:, None]
     around = np.concatenate([np.zeros((256, 2)), u, np.zeros((256, 2))])
@@ -103,7 +103,7 @@ def test_a_band_limited_input_is_its_fine_interpolation():
 
 @HOLDS
 @pytest.mark.parametrize("name", ["two by two", "one common denominator"])
-def test_outputs_are_those_by_which_the_record_was_judged(name, hold):
+def test_simulated_outputs_agree_with_the_designed_finite_record(name, hold):
     model = PLANTS[name]
     u = excitation(500, model.inputs, np.random.default_rng(2), share=0.3)
     expected = FiniteRecord(Experiment(as_sampled(model, hold), 500), 500, STEP).signals("output", u)
@@ -130,7 +130,7 @@ def test_the_gradient_is_a_difference_quotient(name, hold):
 
 @HOLDS
 @pytest.mark.parametrize("name", PLANTS)
-def test_data_without_noise_return_the_parameters(name, hold):
+def test_data_without_noise_give_the_true_parameters(name, hold):
     model = PLANTS[name]
     u = excitation(300, model.inputs, np.random.default_rng(5))
     y = model.driven(u, Intersample(STEP, hold))
@@ -149,7 +149,7 @@ def test_parameters_are_found_without_a_start(name, hold):
     rng = np.random.default_rng(6)
     u = excitation(600, model.inputs, rng)
     y, truth = noisy(model, u, rng, hold=hold, level=0.2)
-    # The numbers of the structure are not used.
+    # The parameter values of the structure are not used.
     anything = model.at(np.ones(model.theta.size))
     found = identify(as_sampled(anything, hold), u, y, STEP)
     assert found.search.converged
@@ -163,7 +163,7 @@ def test_parameters_are_found_without_a_start(name, hold):
     assert found.tests.independence.probability > 1e-3
 
 
-def test_one_channel_has_the_estimate_of_a_plain_optimiser():
+def test_the_estimate_of_one_channel_agrees_with_scipy_least_squares():
     model = PLANTS["one channel"]
     rng = np.random.default_rng(7)
     u = rng.normal(size=(400, 1))
@@ -185,7 +185,7 @@ def test_one_channel_has_the_estimate_of_a_plain_optimiser():
 
 @pytest.mark.first(1)
 @HOLDS
-def test_the_covariance_is_that_of_the_records_information(hold):
+def test_the_covariance_is_the_inverse_information_of_the_record(hold):
     rng = np.random.default_rng(8)
     u = excitation(500, 2, rng, share=0.4)
     y, _ = noisy(actual(), u, rng, hold=hold, level=0.2, covariance=[[1, 0.7], [0.7, 1]])
@@ -198,7 +198,7 @@ def test_the_covariance_is_that_of_the_records_information(hold):
     np.testing.assert_allclose(found.covariance @ found.information, np.eye(12), atol=1e-8)
 
 
-def test_unstable_starts_are_mirrored():
+def test_unstable_starting_points_are_mirrored_at_the_imaginary_axis():
     model = PLANTS["one channel"]
     kind, unstable = estimator(as_sampled(model, True), STEP), np.array([1.0, 1.0, 2.0, -0.3])
     np.testing.assert_allclose(kind.stabilised(unstable, 100), [1.0, 1.0, 2.0, 0.3])
@@ -212,7 +212,7 @@ def test_unstable_starts_are_mirrored():
 
 
 def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
-    """A ramp is the answer to a step of an integrator, which the structure does not allow."""
+    """The response to a step grows as if the plant integrated, which the structure does not allow."""
     model = plant([[[1.0]]], [[[1.0, 1.0]]])
     rng = np.random.default_rng(12)
     u = np.where(np.arange(400) < 40, 0.0, 1.0)[:, None]
@@ -228,7 +228,7 @@ def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
 )
 @HOLDS
 def test_designed_records_reach_the_cramer_rao_bound(criterion, level, covariance, hold):
-    """Spectral design paper: noise of a tenth of the outputs, the estimate begun at the nominal plant."""
+    """The case of the spectral design paper; searches begin at the nominal plant."""
     spec = load_spec(
         SPECS / "two_by_two.yaml",
         [f"accuracy.criterion={criterion}", "signal.samples=2000", f"sample_time={STEP}"],

@@ -1,4 +1,4 @@
-"""What cannot be read for sure is refused by its code, with its line and the option that settles it."""
+"""Files that cannot be read with certainty are refused with a code, a line and an option that helps."""
 
 import contextlib
 import gzip
@@ -61,7 +61,7 @@ MOMENTS = [BEGAN + timedelta(seconds=30 * k) for k in range(20)]
         ("u,y,time\n1,2,0\n", "too-few-samples", 2, "more samples"),
     ],
 )
-def test_text_by_its_code_line_and_option(text, code, line, option, tmp_path):
+def test_unclear_text_is_refused_with_a_code_a_line_and_an_option(text, code, line, option, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(text)
     found = refused_log(path)
@@ -71,7 +71,7 @@ def test_text_by_its_code_line_and_option(text, code, line, option, tmp_path):
 
 @pytest.mark.parametrize("form", ["%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S"])
 @pytest.mark.parametrize("kind", ["csv", "npz"])
-def test_dates_in_digits_are_asked_about(form, kind, tmp_path):
+def test_dates_in_digits_are_refused_until_their_form_is_stated(form, kind, tmp_path):
     step = {"%Y%m%d": timedelta(days=1), "%Y%m%d%H%M": timedelta(minutes=1)}.get(form, timedelta(seconds=30))
     stamps = [int((BEGAN + k * step).strftime(form)) for k in range(20)]
     path = tmp_path / f"log.{kind}"
@@ -87,7 +87,7 @@ def test_dates_in_digits_are_asked_about(form, kind, tmp_path):
     )
 
 
-def test_dates_whose_order_is_not_clear_are_asked_about(tmp_path):
+def test_dates_of_unclear_order_are_refused_until_their_form_is_stated(tmp_path):
     path = log(
         tmp_path / "log.csv",
         [f"{t:%d/%m/%Y %H:%M:%S}" for t in (BEGAN + timedelta(days=k) for k in range(5))],
@@ -100,7 +100,7 @@ def test_dates_whose_order_is_not_clear_are_asked_about(tmp_path):
 
 
 @pytest.mark.parametrize("wrong", ["yesterday", "2024-13-01 00:00:00", "12.03.2024 10:15:00"])
-def test_a_cell_among_dates_that_is_none_is_shown_with_its_line(wrong, tmp_path):
+def test_a_cell_among_dates_that_is_no_date_is_refused_with_its_line(wrong, tmp_path):
     stamps = [t.isoformat(" ") for t in MOMENTS]
     stamps[7] = wrong
     found = refused_log(log(tmp_path / "log.csv", stamps))
@@ -108,7 +108,7 @@ def test_a_cell_among_dates_that_is_none_is_shown_with_its_line(wrong, tmp_path)
     assert "--time-format" in found.hint
 
 
-def test_a_form_or_a_mark_that_the_cells_do_not_have_is_refused(tmp_path):
+def test_a_stated_form_or_decimal_mark_that_does_not_fit_is_refused(tmp_path):
     path = log(tmp_path / "log.csv", [t.isoformat(" ") for t in MOMENTS])
     assert "--time-format" in refused_log(path, Preparation(time_format="%d.%m.%Y")).hint
     path.write_text("u;y\n1.234;1,5\n2;2,5\n")
@@ -144,7 +144,7 @@ TEXT = b"time,u,y\n0,1,2\n1,2,3\n"
     ],
     ids=range(13),
 )
-def test_what_is_no_table_is_unreadable(name, raw, tmp_path):
+def test_files_that_are_no_tables_are_unreadable(name, raw, tmp_path):
     (tmp_path / name).write_bytes(raw)
     assert refused_log(tmp_path / name).code == "data-unreadable"
 
@@ -181,8 +181,8 @@ def test_arrays_that_are_no_columns_are_refused(arrays, said, tmp_path):
         np.testing.assert_array_equal(read_log(tmp_path / "log.mat#z", Preparation()).u[:, 0], 2 * U)
 
 
-def test_structs_of_one_signal_each_are_columns_by_their_names(tmp_path):
-    """As Simulink logs them, with times of their own."""
+def test_structs_of_one_signal_each_are_read_as_columns(tmp_path):
+    """Simulink logs each signal like this, with its own times."""
     structs = {x: {"time": np.arange(0.0, 10.0, 0.5), "a": {"b": s}} for x, s in (("u", U), ("y", Y))}
     scipy.io.savemat(tmp_path / "log.mat", structs)
     read = read_log(tmp_path / "log.mat", Preparation(detrend="none"))
@@ -199,7 +199,7 @@ DIFFERENT = [
 
 
 @pytest.mark.parametrize(("steps", "names", "line", "mended"), DIFFERENT)
-def test_files_that_differ_are_refused_with_the_line_and_what_mends_it(steps, names, line, mended, tmp_path):
+def test_files_that_differ_are_refused_until_options_reconcile_them(steps, names, line, mended, tmp_path):
     rng, paths = np.random.default_rng(1), [tmp_path / "a.csv", tmp_path / "b.csv"]
     for path, step, header in zip(paths, steps, names, strict=True):
         table = np.column_stack([step * np.arange(40), rng.standard_normal((40, header.count(",")))])
@@ -227,7 +227,7 @@ READ = settings(max_examples=20, deadline=None, suppress_health_check=[HealthChe
 @pytest.mark.parametrize("ending", ["csv", "npz", "mat", "xlsx", "parquet"])
 @READ
 @given(pieces=st.lists(PIECES, max_size=40), form=st.sampled_from([None, "%d.%m.%Y", "%Y"]))
-def test_no_bytes_lead_to_another_error(ending, pieces, form, tmp_path):
+def test_no_bytes_lead_to_an_error_of_another_kind(ending, pieces, form, tmp_path):
     (tmp_path / f"log.{ending}").write_bytes(b"".join(pieces))
     with contextlib.suppress(IdesignError):
         read_log(tmp_path / f"log.{ending}", Preparation(columns={"u1": "1", "y1": "2"}, time_format=form))
@@ -238,15 +238,15 @@ def test_no_bytes_lead_to_another_error(ending, pieces, form, tmp_path):
     cells=st.lists(st.lists(CELLS, min_size=2, max_size=3), min_size=1, max_size=30),
     mark=st.sampled_from(",;\t"),
 )
-def test_no_table_leads_to_another_error(cells, mark, tmp_path):
+def test_no_table_leads_to_an_error_of_another_kind(cells, mark, tmp_path):
     (tmp_path / "log.csv").write_text("\n".join(mark.join(row) for row in cells))
     with contextlib.suppress(IdesignError):
         read_log(tmp_path / "log.csv", Preparation(columns={"u1": "1", "y1": "2"}))
 
 
 @pytest.mark.parametrize("kind", ["mat", "mat5", "npz", "xlsx", "parquet"])
-def test_no_damage_to_a_file_leads_to_another_error(kind, tmp_path):
-    """SciPy's reader would end the program at some of them."""
+def test_no_damage_to_a_file_leads_to_an_error_of_another_kind(kind, tmp_path):
+    """Some of these files would end the program in the reader of SciPy."""
     path = tmp_path / f"log.{kind[:3] if kind == 'mat5' else kind}"
     if kind.startswith("mat"):
         scipy.io.savemat(path, {"u": U, "y": Y, "Ts": 0.5, "s": {"a": U}}, do_compression=kind == "mat5")
@@ -278,7 +278,7 @@ def no_samples(path):
     return found
 
 
-def test_what_is_no_plain_file_is_refused_at_once(tmp_path):
+def test_paths_that_are_no_plain_files_are_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("pipe")
     (tmp_path / "loop").symlink_to("loop")
@@ -298,7 +298,7 @@ def test_what_is_no_plain_file_is_refused_at_once(tmp_path):
         "frequency,r_adm\nhunter2,swordfish\n1,hunter2\n",
     ],
 )
-def test_nothing_is_shown_of_a_file_that_holds_no_numbers(text, tmp_path):
+def test_the_contents_of_a_file_without_numbers_are_not_shown(text, tmp_path):
     (tmp_path / "secret").write_text(text)
     for wanted in ({"u": "u"}, {"frequency": "frequency", "r_adm": "r_adm"}, {"y1": "y1"}):
         said = repr(named(tmp_path / "secret", wanted)).replace(str(tmp_path), "")
@@ -313,13 +313,13 @@ def test_the_header_of_a_table_is_shown(tmp_path):
 
 
 @pytest.mark.parametrize("line", ["", "# 3,0"])
-def test_a_signal_lacks_no_sample_between_its_rows(line, tmp_path):
+def test_a_signal_with_a_blank_or_commented_row_is_refused(line, tmp_path):
     (tmp_path / "u.csv").write_text(f"u,r\n1,0\n2,0\n{line}\n4,0\n")
     assert no_samples(tmp_path / "u.csv").code == "data-not-a-number"
 
 
 @pytest.mark.parametrize("value", [9e99, -1e308, 1e30, 1e12])
-def test_a_value_beside_which_all_others_are_lost_is_refused_with_its_line(value, tmp_path):
+def test_a_value_that_drowns_all_others_in_rounding_is_refused_with_its_line(value, tmp_path):
     (tmp_path / "u.csv").write_text("u\n" + "".join(f"{value if k == 30 else k % 7}\n" for k in range(60)))
     found = no_samples(tmp_path / "u.csv")
     assert (found.code, found.location.line) == ("beyond-precision", 32)

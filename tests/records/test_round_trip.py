@@ -58,7 +58,7 @@ def check(path, prepared=None, *, shown=0.0):
 @pytest.mark.parametrize("mark", [",", ";", "\t", "|"])
 @pytest.mark.parametrize("decimal", [".", ","])
 @pytest.mark.parametrize("moment", DATES.values(), ids=DATES)
-def test_text_in_every_separator_decimal_mark_and_form_of_date(mark, decimal, moment, tmp_path):
+def test_text_is_read_in_every_separator_decimal_mark_and_form_of_date(mark, decimal, moment, tmp_path):
     if moment is DATES["seconds"]:
         plain = moment
         moment = lambda t: plain(t).replace(".", decimal)  # noqa: E731
@@ -70,8 +70,8 @@ def test_text_in_every_separator_decimal_mark_and_form_of_date(mark, decimal, mo
     ("encoding", "names"),
     [*((one, ("valve °C", "level %")) for one in ENCODINGS), ("cp932", ("入力バルブ開度", "出力レベル"))],
 )
-def test_text_in_every_encoding(encoding, names, tmp_path):
-    """Also letters of other scripts."""
+def test_text_is_read_in_every_encoding(encoding, names, tmp_path):
+    """Letters of other scripts are read, too."""
     path = tmp_path / "log.csv"
     path.write_bytes(text(";", ",", DATES["german"], ("Zeit", *names)).encode(encoding))
     assert read_sheet(path).names == ("Zeit", *names)
@@ -89,7 +89,7 @@ def test_blanks_separate_columns_of_numbers(tmp_path):
 @pytest.mark.parametrize(
     "layout", ["preamble", "units", "comments", "no header", "short rows", "trailing separator", "quotes"]
 )
-def test_text_in_every_layout(layout, tmp_path):
+def test_text_is_read_in_every_layout(layout, tmp_path):
     lines = text(";", ".", DATES["iso"]).splitlines()
     columns = COLUMNS
     if layout == "preamble":
@@ -114,7 +114,7 @@ def test_text_in_every_layout(layout, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat", "parquet", "parquet index", "xlsx", "iddata", "struct"])
-def test_every_kind_of_file(kind, tmp_path):
+def test_every_kind_of_file_is_read(kind, tmp_path):
     path = tmp_path / f"log.{ {'iddata': 'mat', 'struct': 'mat'}.get(kind, kind.split()[0]) }"
     arrays = {"Zeit": 2.5 * np.arange(N), "valve": U, "level": Y[:, None]}
     frame = pandas.DataFrame({"Zeit": TIMES, "valve": U, "level": Y})
@@ -149,18 +149,18 @@ def test_every_kind_of_file(kind, tmp_path):
         ("%d/%m/%Y %H-%M-%S.%f", COLUMNS),
     ],
 )
-def test_times_in_a_form_that_the_user_states(form, columns, tmp_path):
+def test_times_are_read_in_a_form_that_the_user_states(form, columns, tmp_path):
     (tmp_path / "log.csv").write_text(text(";", ".", lambda t: t.strftime(form)))
     check(tmp_path / "log.csv", Preparation(columns=columns, time_format=form))
 
 
 @pytest.mark.parametrize(("mark", "said"), [("^", "^"), ("\t", "tab"), (" ", "blank")])
-def test_a_separator_that_the_user_states(mark, said, tmp_path):
+def test_a_separator_that_the_user_states_is_used(mark, said, tmp_path):
     (tmp_path / "log.csv").write_text(text(mark, ".", DATES["seconds"], ("Zeit", "valve", "level")))
     check(tmp_path / "log.csv", Preparation(columns=COLUMNS, separator=said))
 
 
-def test_a_date_and_a_time_of_day_are_one_moment(tmp_path):
+def test_columns_of_dates_and_times_of_day_are_joined(tmp_path):
     moment = lambda t: f"{t:%d.%m.%Y};{t:%H:%M:%S}.{t.microsecond // 1000}"  # noqa: E731
     names = ("Datum;Uhrzeit", "valve", "level")
     (tmp_path / "log.csv").write_text(text(";", ".", moment, names))
@@ -175,7 +175,7 @@ def test_a_date_and_a_time_of_day_are_one_moment(tmp_path):
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("us", 1e6)])
-def test_parts_of_seconds_since_1970_are_asked_about_and_seconds_are_times(unit, scale, tmp_path):
+def test_milliseconds_since_1970_need_a_stated_unit_and_seconds_do_not(unit, scale, tmp_path):
     np.savez(tmp_path / "log.npz", time=[round(scale * t.timestamp()) for t in TIMES], u=U, y=Y)
     (found,) = refused(read_log, tmp_path / "log.npz", Preparation(), kind=DataError)
     assert (found.code, "--time-unit ms" in found.hint) == ("data-not-a-number", True)
@@ -191,8 +191,8 @@ def test_parts_of_seconds_since_1970_are_asked_about_and_seconds_are_times(unit,
     decimal=st.sampled_from(".,"),
     form=st.sampled_from(["r", ".17e"]),
 )
-def test_numbers_are_exact(values, mark, decimal, form, tmp_path):
-    """With a stated decimal mark every finite number is read as what it is."""
+def test_numbers_are_read_exactly(values, mark, decimal, form, tmp_path):
+    """The decimal mark is stated, and every finite number keeps its value."""
     cells = [repr(x) if form == "r" else f"{x:{form}}" for x in values]
     body = "\n".join(f"{cell.replace('.', decimal)}{mark}1" for cell in cells)
     (tmp_path / "log.csv").write_text(f"u{mark}y\n{body}\n")

@@ -1,4 +1,4 @@
-"""Jitter, gaps, spikes and columns of other times: what is done to a record is found once, by its code."""
+"""Jitter, gaps, spikes and columns of other times: each change of a record is reported by its code."""
 
 import numpy as np
 import pytest
@@ -51,8 +51,8 @@ def test_a_clean_record_is_left_alone(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_jitter_a_gap_and_a_spike_at_once(seed, tmp_path):
-    """The even samples are those of the plant to the accuracy of linear interpolation."""
+def test_jitter_a_gap_and_a_spike_are_repaired_in_one_record(seed, tmp_path):
+    """The even samples agree with the smooth signal to the accuracy of linear interpolation."""
     rng = np.random.default_rng(seed)
     u = signals(seed)[0]
     time = np.cumsum(np.r_[0.0, 1.0 + 0.2 * rng.uniform(-1, 1, N - 1)])
@@ -70,7 +70,7 @@ def test_jitter_a_gap_and_a_spike_at_once(seed, tmp_path):
     assert all(np.allclose(np.diff(part), 1.0) for part in np.split(record.time, ends))
 
 
-def test_more_jitter_is_evened_out_on_request_only(tmp_path):
+def test_large_jitter_is_evened_out_on_request_only(tmp_path):
     u, y = signals()
     time = np.arange(N) + 0.4 * np.random.default_rng(1).uniform(-0.5, 0.5, N)
     path = log(tmp_path / "log.csv", time, u, y)
@@ -80,7 +80,7 @@ def test_more_jitter_is_evened_out_on_request_only(tmp_path):
     assert "jitter-evened-out" in codes(read_log(path, Preparation(sample_time=1.0, resample=True)))
 
 
-def test_inputs_that_move_between_the_resampled_times_are_a_doubt(tmp_path):
+def test_inputs_that_move_between_the_resampled_times_are_reported(tmp_path):
     u, y = np.sign(np.random.default_rng(2).standard_normal(N)), signals()[1]
     path = log(tmp_path / "log.csv", 0.7 * np.arange(N), u, y)
     record = read_log(path, Preparation(sample_time=1.0, resample=True))
@@ -107,7 +107,7 @@ def test_single_spikes_are_replaced_by_the_mean_of_their_neighbours(sd, resoluti
     "make", ["pulses of the input", "two samples each", "heavy tails", "steps", "resonance"]
 )
 @pytest.mark.parametrize("seed", range(5))
-def test_what_is_no_fault_of_measurement_is_no_spike(make, seed, tmp_path):
+def test_pulses_heavy_tails_steps_and_resonances_are_no_spikes(make, seed, tmp_path):
     rng = np.random.default_rng(seed)
     u, y = signals(seed)
     if make == "pulses of the input":
@@ -126,7 +126,7 @@ def test_what_is_no_fault_of_measurement_is_no_spike(make, seed, tmp_path):
     )
 
 
-def test_missing_numbers_and_rows_on_request_cut_the_record(tmp_path):
+def test_missing_numbers_and_rows_left_out_on_request_cut_the_record(tmp_path):
     u, y = signals()
     y[[100, 101]] = np.nan
     path = log(tmp_path / "log.csv", np.arange(N), u, y)
@@ -161,7 +161,7 @@ def test_lines_between_rows_cut_a_record_without_times(line, timed, lengths, tmp
     assert ("times-assumed" in codes(record)) is not timed
 
 
-def test_blank_lines_between_all_rows_mean_nothing(tmp_path):
+def test_blank_lines_between_all_rows_do_not_cut_the_record(tmp_path):
     u, y = signals()
     path = log(tmp_path / "log.csv", None, u, y, "u,y")
     path.write_text(path.read_text().replace("\n", "\n\n"))
@@ -169,7 +169,7 @@ def test_blank_lines_between_all_rows_mean_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("detrend", ["constant", "linear", "auto"])
-def test_means_and_lines_are_taken_away_segment_by_segment(detrend, tmp_path):
+def test_means_and_lines_are_subtracted_segment_by_segment(detrend, tmp_path):
     u, y = signals()
     time = np.r_[np.arange(150), np.arange(170, 170 + N - 150)].astype(float)
     record = read_log(log(tmp_path / "log.csv", time, u, y + 0.5 * time), Preparation(detrend=detrend))
@@ -181,7 +181,7 @@ def test_means_and_lines_are_taken_away_segment_by_segment(detrend, tmp_path):
             assert abs(np.polyfit(np.arange(len(part)), part[:, 0], 1)[0]) < 1e-9
 
 
-def test_auto_takes_a_line_that_explains_half_the_power():
+def test_automatic_detrending_subtracts_a_line_that_explains_half_the_power():
     x = np.random.default_rng(1).standard_normal(200)
     ramp = np.arange(200.0)
     assert trend(x, "auto")[1] is False
@@ -190,7 +190,7 @@ def test_auto_takes_a_line_that_explains_half_the_power():
     np.testing.assert_allclose(away, np.polyval(np.polyfit(ramp, x + ramp, 1), ramp))
 
 
-def test_the_operating_point_is_taken_away(tmp_path):
+def test_the_operating_point_is_subtracted(tmp_path):
     u, y = signals()
     prepared = Preparation(operating_point={"u1": 40.0, "y1": -3.0})
     record = read_data([log(tmp_path / "log.csv", np.arange(N), 40.0 + u, y - 3.0)], UNITS, prepared)
@@ -201,7 +201,7 @@ def test_the_operating_point_is_taken_away(tmp_path):
 
 @pytest.mark.parametrize("apart", [1.157407, 1.4142, 1.9])
 @pytest.mark.parametrize("rounding", [np.round, np.floor])
-def test_even_times_that_are_rounded_coarsely_are_asked_about(apart, rounding, tmp_path):
+def test_even_times_that_are_rounded_coarsely_are_refused(apart, rounding, tmp_path):
     """Days with five decimals at a sample time of a second take steps of one and of two digits."""
     u, y = signals()
     path = log(tmp_path / "log.csv", rounding(apart * np.arange(N)), u, y)
@@ -210,7 +210,7 @@ def test_even_times_that_are_rounded_coarsely_are_asked_about(apart, rounding, t
     assert (found.step, found.lengths) == (apart, (N,))
 
 
-def test_rows_that_are_missing_here_and_there_are_no_rounding(tmp_path):
+def test_single_missing_rows_are_not_taken_for_rounded_times(tmp_path):
     u, y = signals()
     kept = np.delete(np.arange(len(u)), [40, 90, 170])
     found = read_log(log(tmp_path / "log.csv", kept.astype(float), u[kept], y[kept]), Preparation())
@@ -218,8 +218,8 @@ def test_rows_that_are_missing_here_and_there_are_no_rounding(tmp_path):
 
 
 @pytest.mark.parametrize("step", [0.98, 1.02, 1.06])
-def test_even_times_near_the_sample_time_of_the_spec_are_another_sample_time(step, tmp_path):
-    """Evened out, every move would come up to half a sample late, and the dead time be wrong by as much."""
+def test_even_times_near_the_sample_time_of_the_spec_are_not_jitter(step, tmp_path):
+    """Resampling would delay moves by up to half a sample, and change the dead time by as much."""
     u, y = signals()
     path = log(tmp_path / "log.csv", step * np.arange(N), u, y)
     found = refused(lambda: read_data([path], UNITS, Preparation()))
@@ -247,7 +247,7 @@ def test_a_sample_time_that_contradicts_times_or_spec_is_refused(tmp_path):
     assert read_log(tmp_path / "log.npz", Preparation()).step == 0.25
 
 
-def test_sensors_at_their_limits_are_seen(tmp_path):
+def test_saturated_and_rounded_sensors_are_reported(tmp_path):
     u, y = signals()
     clipped = read_log(log(tmp_path / "a.csv", np.arange(N), u, np.minimum(y, 0.5)), Preparation())
     assert figures(clipped, "sensor-saturated")["value"] == 0.5
@@ -272,16 +272,16 @@ def torn(read):
 
 
 @pytest.mark.parametrize("header", ["time,u,y", "step,u,y"])
-def test_rows_of_which_none_is_whole_are_refused(header, tmp_path):
-    """A logger that writes inputs and outputs in turn."""
+def test_a_record_without_a_complete_row_is_refused(header, tmp_path):
+    """The logger writes inputs and outputs in turn."""
     path = tmp_path / "log.csv"
     path.write_text("\n".join([header, *(f"{2 * k},{k % 3},\n{2 * k + 1},,{k % 7}" for k in range(20))]))
     for read_one in (lambda: read_data([path], UNITS, Preparation()), lambda: read_log(path, Preparation())):
         assert "join the rows" in torn(read_one).hint
 
 
-def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_path):
-    """u when it changes, y every 5 s, y2 every 10 s: u moves at the nearest y, y2 between neighbours."""
+def test_columns_logged_at_different_times_are_joined_on_request(tmp_path):
+    """Rows hold u on change, y1 every 5 s, y2 every 10 s: u moves at the nearest y1, y2 is interpolated."""
     path = tmp_path / "log.csv"
     rows = ["time,u,y1,y2", "0,7,0,0"]
     for k in range(1, 60):
@@ -291,7 +291,7 @@ def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_
     path.write_text("\n".join([*rows, ""]))
     assert "--resample" in torn(lambda: read_log(path, Preparation())).hint
     log = read_log(path, Preparation(resample=True))
-    k = np.arange(59)  # at the last y2 is no longer known
+    k = np.arange(59)  # y2 is not known at the last sample
     assert log.step == 5.0
     np.testing.assert_array_equal(log.u[:, 0], np.where(k < 6, 7, k - k % 6))
     (joined,) = (one.figures for one in log.findings if one.code == "columns-joined")
@@ -300,8 +300,8 @@ def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_
 
 
 @pytest.mark.parametrize(("every", "missing"), [(2, 1), (3, 2)])
-def test_an_output_that_was_written_more_seldom_than_the_input_sets_the_sample_time(tmp_path, every, missing):
-    """y at one of two or three rows: rows as they stand would be records of one sample each."""
+def test_an_output_logged_less_often_than_the_input_sets_the_sample_time(tmp_path, every, missing):
+    """One of two or three rows has y; unless rows are joined, each record would have one sample."""
     path = tmp_path / "log.csv"
     rows = [f"{k},{k // 6},{k * k if k % every == 0 else ''}" for k in range(120)]
     path.write_text("\n".join(["time,u,y", *rows, ""]))
@@ -322,7 +322,7 @@ def test_a_channel_whose_rows_have_no_times_is_refused(tmp_path, channel):
     assert "log the time" in torn(lambda: read_log(path, Preparation(resample=True))).hint
 
 
-def test_an_output_that_misses_some_rows_is_interpolated_but_over_gaps(tmp_path):
+def test_an_output_missing_in_some_rows_is_interpolated_except_over_gaps(tmp_path):
     path = tmp_path / "log.csv"
     there = [k for k in range(200) if k % 3 != 2 and not 90 <= k < 110]
     rows = [f"{k},{k % 7},{2 * k if k in there else ''}" for k in range(200)]

@@ -1,4 +1,4 @@
-"""How the columns of a record are found, and what is said of files that cannot be read."""
+"""The columns of a record are found by name and unit; unclear ones are refused."""
 
 import re
 from dataclasses import replace
@@ -20,7 +20,7 @@ EVEN = [2 * k for k in range(200)]
 
 @pytest.fixture
 def log(tmp_path):
-    """Writes a record with this header, times first if there are any."""
+    """A function that writes a record with this header, times first if there are any."""
 
     def written(header, times=None):
         columns = [U.tolist(), Y.tolist()] if times is None else [times, U.tolist(), Y.tolist()]
@@ -32,7 +32,7 @@ def log(tmp_path):
 
 
 def read(path, units=UNITS, **prepared):
-    """The record, whose samples are those that were written."""
+    """The record, after a check that its samples are those that were written."""
     record = read_data([path], units, Preparation(**prepared))
     np.testing.assert_array_equal(record.u[:, 0], U)
     np.testing.assert_array_equal(record.y[:, 0], Y)
@@ -44,14 +44,14 @@ def codes(record):
 
 
 @pytest.mark.parametrize("name", ["time", "time_min", "t", "t_min", "timestamp", "Time (min)", "t [min]"])
-def test_times_go_by_several_names(name, log):
+def test_a_column_of_times_may_have_several_names(name, log):
     np.testing.assert_array_equal(read(log(f"{name},u,y", EVEN)).time, EVEN)
     assert (
         code_of(read, log(f"{name},u,y", [3 * k for k in range(200)]), kind=DataError) == "data-not-uniform"
     )
 
 
-def test_another_unit_is_refused_until_the_user_states_it(log):
+def test_another_unit_of_time_is_refused_until_the_user_states_it(log):
     assert code_of(read, log("t_ms,u,y", EVEN), kind=DataError) == "data-wrong-unit"
     path = log("t_s,u,y", [120 * k for k in range(200)])
     (told,) = refused(read, path, kind=DataError)
@@ -69,7 +69,7 @@ def test_another_unit_is_refused_until_the_user_states_it(log):
         ("u1 Valve (%),y1 Level (m)", ["m"]),
     ],
 )
-def test_columns_go_by_the_names_of_channels_and_other_units_are_found(header, units, log):
+def test_columns_are_found_by_channel_names_and_other_units_are_reported(header, units, log):
     record = read(log(header), NAMED)
     noted = [one.figures["found"] for one in record.findings if one.code == "unit-not-converted"]
     assert noted == units
@@ -80,7 +80,7 @@ def test_columns_go_by_the_names_of_channels_and_other_units_are_found(header, u
     [("time,Heater 1,Temp 1", 2, 3), ("time,TIC.OP,TIC.PV", 2, 3), ("time,steam.PV,temp.OP (%)", 3, 2)],
 )
 def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
-    """By their words: OP is the input, PV the output."""
+    """Channels are recognised by words: OP is the input, PV the output."""
     path = log(header, EVEN)
     with pytest.raises(DataError, match=re.escape(header.replace(",", ", "))) as raised:
         read(path)
@@ -98,7 +98,7 @@ def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
         ("valve [%],level [cm]", {"u1": ("inlet valve", "%"), "y1": ("tank level", "cm")}),
     ],
 )
-def test_a_column_goes_by_its_unit_where_no_other_has_it(header, channels, log):
+def test_a_column_is_found_by_its_unit_where_no_other_has_it(header, channels, log):
     record = read(log(f"time,{header}", EVEN), replace(UNITS, channels=channels))
     assert "column-by-unit" in codes(record)
     again = record.columns_option.removeprefix("--columns ").strip("' ")
@@ -108,23 +108,23 @@ def test_a_column_goes_by_its_unit_where_no_other_has_it(header, channels, log):
 @pytest.mark.parametrize(
     "header", ["outside (°C),room (°C)", "a [V],b [V]", "valve [%],room [K]", "humidity [%],room (°C)"]
 )
-def test_columns_of_other_names_or_units_are_asked_for(header, log):
+def test_columns_with_neither_name_nor_unit_of_a_channel_are_refused(header, log):
     units = replace(UNITS, channels={"u1": ("valve", "%"), "y1": ("", "degC")})
     assert code_of(read, log(f"time,{header}", EVEN), units, kind=DataError) == "data-missing-column"
 
 
-def test_the_reference_of_a_loop_is_the_column_that_is_called_so(tmp_path):
+def test_the_reference_of_a_loop_is_found_by_its_name(tmp_path):
     rows = "\n".join(f"{2 * k},{u},{y},{u + y}" for k, (u, y) in enumerate(zip(U, Y, strict=True)))
     (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],r\n{rows}\n")
     channels = {"u1": ("inlet valve", "%"), "y1": ("level", "cm")}
     loop = replace(UNITS, closed_loop=True, channels=channels)
     np.testing.assert_allclose(read(tmp_path / "d.csv", loop).r[:, 0], U + Y)
-    # The set point of a controller is in the unit of the output: it is not what is added to the input.
+    # The set point of a controller has the unit of the output; the reference r is added to the input.
     (tmp_path / "d.csv").write_text(f"time,valve [%],level [cm],setpoint [cm]\n{rows}\n")
     assert read(tmp_path / "d.csv", loop).r is None
 
 
-def test_a_column_that_only_begins_like_a_time_is_none(log):
+def test_a_column_whose_name_only_begins_like_time_is_no_time(log):
     assert read(log("temperature,u,y", [7 * k for k in range(200)])).lengths == (200,)
 
 
@@ -134,7 +134,7 @@ def test_an_input_that_may_be_in_two_columns_is_refused(header, log):
     assert (told.code, "--columns u1=u" in told.hint) == ("data-missing-column", True)
 
 
-def test_of_several_inputs_the_first_has_its_number(tmp_path):
+def test_with_several_inputs_the_first_one_is_u1_and_not_u(tmp_path):
     (tmp_path / "d.csv").write_text(
         "u,u1,u2,y\n" + "".join(f"{k},{k % 3},{k % 5},{k % 7}\n" for k in range(20))
     )
@@ -143,7 +143,7 @@ def test_of_several_inputs_the_first_has_its_number(tmp_path):
 
 
 @pytest.mark.parametrize("column", ["1", "Time", "TIME [s]", "time [s]"])
-def test_the_unit_of_a_column_counts_however_it_is_named(column, log):
+def test_the_unit_of_a_column_counts_however_the_option_names_it(column, log):
     path, columns = log("Time [s],Valve (mA),level", EVEN), {"time": column, "u1": "2", "y1": "3"}
     assert code_of(read, path, NAMED, columns=columns, kind=DataError) == "data-wrong-unit"
     seconds = read(path, replace(NAMED, time_unit="s"), columns=columns)
@@ -166,7 +166,7 @@ def test_the_unit_of_a_column_counts_however_it_is_named(column, log):
         ("deg", "degC", False),
     ],
 )
-def test_spellings_of_one_unit_are_no_difference(one, other, same, log):
+def test_spellings_of_one_unit_count_as_the_same_unit(one, other, same, log):
     record = read(log(f"u,y ({other})"), replace(UNITS, channels={"y1": ("level", one)}))
     assert ("unit-not-converted" in codes(record)) is not same
 
@@ -174,7 +174,7 @@ def test_spellings_of_one_unit_are_no_difference(one, other, same, log):
 @pytest.mark.parametrize(("unit", "agrees"), [("s", True), ("min", False), ("h", False)])
 @pytest.mark.parametrize("times", ["seconds", "dates"])
 def test_a_unit_that_contradicts_the_file_is_refused_by_every_command(unit, agrees, times, log):
-    """Else a plant sixty times too fast would look like any other."""
+    """Otherwise the plant would be sixty times too fast without a warning."""
     stamps = [datetime(2024, 2, 28) + timedelta(minutes=2 * k) for k in range(200)]
     seconds = [120 * k for k in range(200)]
     path = log(*(("timestamp,u,y", stamps) if times == "dates" else ("Time (s),u,y", seconds)))

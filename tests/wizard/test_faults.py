@@ -1,4 +1,4 @@
-"""Whatever is wrong with an answer is said of that answer, in words of the question, and of nothing else."""
+"""Every fault of an answer is reported for that answer alone, in words of its question."""
 
 import json
 import re
@@ -97,7 +97,7 @@ HOSTILE = {
     "return": "perhaps",
     "names": "valve | valve, temperature, pressure |  , temperature | valve in %;, temperature",
 }
-# What only two answers together tell is said of the one that is easier to change.
+# A fault of two answers together is reported for the one that is easier to change.
 ALSO = {"plant": {"time"}}
 NOT_THEIRS = re.compile(
     r"<\w+>|q\^-1|\b(accuracy|plant|limits|noise|signal|experiment)\.\w|tau_c|--set|--columns"
@@ -114,7 +114,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.first(4)
 @pytest.mark.parametrize("key", KEYS)
-def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder):
+def test_every_fault_is_reported_for_its_answer_in_words_of_the_question(key, folder):
     for text in (*map(str.strip, HOSTILE[key].split("|")), *ANYWHERE):
         with pytest.raises(IdesignError) as caught:
             compose({**GOOD, key: text}, "x", folder).validate()
@@ -127,7 +127,7 @@ def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder)
             assert told.location is None or told.location.file.startswith(str(folder)), text
 
 
-def test_what_a_design_of_the_draft_says_is_told_in_words_too(folder):
+def test_errors_of_a_design_are_reported_in_words_of_the_question_too(folder):
     def solve(_):
         place = Location("<answers>", 3, 1, "limits: {amplitude: 5}")
         raise InfeasibleError.because("infeasible", "limits.amplitude is too small", "", "limits", place)
@@ -154,8 +154,8 @@ def test_a_file_that_cannot_be_written_is_no_fault_of_an_answer():
         ("gain margin 20", r"example (gain margin [\d.]+)"),
     ],
 )
-def test_a_weaker_margin_that_will_do_is_named_in_the_unit_of_the_wish(asked, named, tmp_path):
-    """The peak of |S| of this loop is 4.04 dB: what is a little above will do, and what is below will not."""
+def test_a_margin_that_the_loop_can_keep_is_named_in_the_unit_of_the_wish(asked, named, tmp_path):
+    """The peak of |S| of this loop is 4.04 dB: a limit a little above is accepted, one below is not."""
     with pytest.raises(SpecError) as caught:
         compose({**ENGINEER, "wish": f"PI loop with {asked}"}, "x", tmp_path).validate()
     found = re.search(named, caught.value.diagnostics[0].hint)
@@ -188,8 +188,8 @@ def answered(talk, until=None):
     return talk
 
 
-def test_what_only_all_answers_together_tell_leads_back_to_its_question(tmp_path):
-    """The loop of Skogestad's rule has a peak of 1.59 here: 1 dB cannot be asked of it."""
+def test_an_error_of_all_answers_together_leads_back_to_its_question(tmp_path):
+    """The loop by Skogestad's rule has a peak |S| of 1.59 here, so that 1 dB is impossible."""
     talk = answered(Conversation({"wish": "PI loop with 1 dB"}, "x", tmp_path), "names")
     assert talk.answer("as said").diagnostics[0].code == "admissible-not-positive"
     assert (talk.question.key, talk.draft) == ("wish", None)
@@ -197,15 +197,15 @@ def test_what_only_all_answers_together_tell_leads_back_to_its_question(tmp_path
     assert talk.draft is not None
 
 
-def test_the_loop_that_a_wish_needs_is_asked_for_by_the_wish(tmp_path):
+def test_a_wish_without_a_rule_of_tuning_is_asked_for_again(tmp_path):
     talk = answered(Conversation({"plant": "tank", "wish": "PI loop with 6 dB"}, "x", tmp_path), "loop")
     told = talk.answer("open")
     assert "no rule of tuning is at hand" in str(told)
     assert talk.question.key == "wish"
 
 
-def test_a_plant_is_understood_once(tmp_path, monkeypatch):
-    """A log takes seconds to be explored."""
+def test_the_answer_on_the_plant_is_interpreted_once(tmp_path, monkeypatch):
+    """The exploration of a log takes seconds."""
     seen = []
     real = composing.understand_plant
     monkeypatch.setattr(composing, "understand_plant", lambda *a: (seen.append(a[0]), real(*a))[1])
@@ -213,7 +213,7 @@ def test_a_plant_is_understood_once(tmp_path, monkeypatch):
     assert seen == [ANSWERS["plant"]]
 
 
-def test_of_a_log_the_noise_is_not_asked(tmp_path):
+def test_for_a_log_the_noise_is_not_asked(tmp_path):
     talk = Conversation({"plant": "log log.csv", "wish": "prediction within 5 % up to 0.1"}, "x", tmp_path)
     assert talk.question.key == "range"
     known = {key: text for key, text in ANSWERS.items() if key not in ("noise", "drift", "names")}
@@ -221,8 +221,8 @@ def test_of_a_log_the_noise_is_not_asked(tmp_path):
     assert Conversation(known, "x", tmp_path).question.key == "noise"
 
 
-def test_no_stand_in_of_an_answer_gets_into_the_draft(tmp_path, monkeypatch):
-    """The noise of a log is that of the log: nobody said another one."""
+def test_default_answers_on_the_noise_of_a_log_do_not_enter_the_draft(tmp_path, monkeypatch):
+    """The log determines its noise; nobody stated another one."""
     seen = []
     plant = composing.understand_plant(ANSWERS["plant"], "x", tmp_path)
     monkeypatch.setattr(composing, "understand_plant", lambda *_: plant)
@@ -257,7 +257,7 @@ def test_an_answer_that_names_its_question_may_come_out_of_turn(tmp_path):
         ("noise", "12 bits up to 100", "converter"),
     ],
 )
-def test_an_answer_to_another_question_is_refused_with_its_name(asked, text, meant, tmp_path):
+def test_an_answer_to_another_question_is_refused_with_that_question(asked, text, meant, tmp_path):
     talk = answered(Conversation({}, "x", tmp_path), asked)
     (told,) = talk.answer(text).diagnostics
     assert (told.key, talk.question.key) == (asked, asked)
@@ -285,7 +285,7 @@ _TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
         ('{"num": [2], "den": [1, 0, 1], "delay": 5}', "must lie in the left half plane"),
     ],
 )
-def test_what_is_wrong_is_told(tmp_path, text, words):
+def test_faulty_files_of_transfer_functions_are_refused_with_the_reason(tmp_path, text, words):
     file = tmp_path / "p.json"
     file.write_text(text)
     with pytest.raises((SpecError, DataError)) as error:
@@ -293,7 +293,7 @@ def test_what_is_wrong_is_told(tmp_path, text, words):
     assert words in str(error.value)
 
 
-def test_an_integrator_is_known(tmp_path):
+def test_a_transfer_function_with_an_integrator_is_accepted(tmp_path):
     (tmp_path / "p.json").write_text(json.dumps(_TANK))
     loop = "PI Kp 0.0005, Ti 3000"
     draft = compose(GOOD | {"plant": "p.json", "loop": loop}, "s", tmp_path)
@@ -307,8 +307,8 @@ def test_an_integrator_is_known(tmp_path):
     assert found == pytest.approx(np.polyval(_TANK["num"], s) / np.polyval(_TANK["den"], s), rel=1e-12)
 
 
-def test_a_pure_integrator_is_sampled_by_its_dead_time(tmp_path):
-    """As the template `tank`: 0.05 exp(-5 s)/s."""
+def test_the_dead_time_of_a_pure_integrator_determines_the_sample_time(tmp_path):
+    """The plant is the template `tank`, 0.05 exp(-5 s)/s."""
     (tmp_path / "p.json").write_text(json.dumps({"num": [0.05], "den": [1, 0], "delay": 5}))
     draft = compose(GOOD | {"plant": "p.json", "loop": "PI Kp 0.8, Ti 60"}, "s", tmp_path)
     assert "sample_time: 2  # half the dead time, rounded down" in draft.text
@@ -316,7 +316,7 @@ def test_a_pure_integrator_is_sampled_by_its_dead_time(tmp_path):
     assert {one.label for one in plant.named_parameters} == {"b0", "L"}
 
 
-def test_a_zero_that_cancels_the_integrator_leaves_none(tmp_path):
+def test_a_zero_at_the_origin_cancels_an_integrator(tmp_path):
     for name, num, den in (("a", [2, 0], [180, 1, 0]), ("b", [2], [180, 1])):
         (tmp_path / f"{name}.json").write_text(json.dumps({"num": num, "den": den}))
     one, other = (system_of(tmp_path / f"{name}.json") for name in "ab")

@@ -30,7 +30,7 @@ EFFECTS = {
 
 
 @pytest.mark.parametrize(("cause", "effect"), list(itertools.product(CAUSES, EFFECTS)))
-def test_the_sign_of_a_gain_is_the_product_of_those_of_cause_and_effect(cause, effect):
+def test_the_sign_of_a_gain_is_the_product_of_the_signs_of_cause_and_effect(cause, effect):
     sign = "-" * (CAUSES[cause] != EFFECTS[effect])
     assert in_one_form(f"{cause} {effect}").endswith(f"gain {sign}2 K per 5 %")
     if cause.startswith(("when", "if")):
@@ -51,7 +51,7 @@ def test_the_sign_of_a_gain_is_the_product_of_those_of_cause_and_effect(cause, e
         ("at 10 % more power it becomes some 30 degC hotter", "gain about 30 degC per 10 %"),
     ],
 )
-def test_a_gain_has_one_form(said, form):
+def test_every_wording_of_a_gain_has_one_form(said, form):
     assert in_one_form(said).endswith(form)
     assert in_one_form(f"blorgy {said}").startswith("blorgy ")
 
@@ -74,9 +74,9 @@ def test_a_gain_has_one_form(said, form):
         "the pressure must stay within 200 mbar when the valve moves 5 %",
     ],
 )
-def test_other_sizes_are_no_gain(other):
+def test_sizes_that_state_no_gain_are_left_as_they_are(other):
     assert in_one_form(other) == other
 
 
-def test_a_size_that_nothing_calls_a_change_is_said_back():
+def test_a_size_that_is_not_called_a_change_is_reported_as_assumed():
     assert [one.assumed for one in gains("9 V gives 18 K; 2 V more gives 4 K")] == ["9 V", ""]

@@ -45,13 +45,13 @@ def written(key, text, folder=Path()):
 
 
 def entry(name, text):
-    """What stands behind a key of the spec, up to a comment."""
+    """The text after a key of the spec, up to a comment."""
     return re.search(rf"\b{name}: ([^#\n]*)", text)[1].strip()
 
 
 @pytest.mark.parametrize(("key", "text"), EVERY)
-def test_a_word_that_is_not_understood_is_told(key, text):
-    """But for one behind a number, which is its unit."""
+def test_a_word_that_is_not_understood_is_refused(key, text):
+    """A word after a number is excepted, since it may be a unit."""
     written(key, text)
     for more in (f"{text}, nonsense", f"nonsense {text}", f"{text}, Tf 20"):
         with pytest.raises(SpecError) as caught:
@@ -70,7 +70,7 @@ def test_a_word_that_is_not_understood_is_told(key, text):
         ("gain 2 +- 10 %, time constant 180 s, dead time 25 s, each within 30 %", (0.1, 0.3, 0.3)),
     ],
 )
-def test_each_quantity_is_known_as_well_as_is_said(text, shares):
+def test_each_quantity_has_the_tolerance_that_is_stated(text, shares):
     values = {"gain": 2.0, "time_constant": 180.0, "dead_time": 25.0}
     stated = {name: share for name, share in zip(values, shares, strict=True) if share is not None}
     ends = {name: (values[name] * (1 - share), values[name] * (1 + share)) for name, share in stated.items()}
@@ -107,20 +107,20 @@ def test_each_quantity_is_known_as_well_as_is_said(text, shares):
         ("range", "the valve may move +-8 around 45 %", "amplitude", 8),
     ],
 )
-def test_units_are_those_that_are_named(key, text, name, value):
+def test_values_are_read_in_the_units_that_are_named(key, text, name, value):
     found = re.match(r"[-+.\de]+", entry(name, written(key, text)))
     assert float(found[0]) == pytest.approx(value, rel=1e-5)
 
 
-def test_hertz_are_no_radians():
+def test_frequencies_in_hertz_are_converted_to_radians_per_second():
     low, high = re.findall(r"[\d.]+", entry("band", written("wish", "prediction within 5 % up to 0.005 Hz")))
     assert (float(low), float(high)) == pytest.approx((2 * np.pi / 3600, 0.005 * 2 * np.pi), rel=1e-4)
 
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("every", "head"), [(1, "time_s"), (20, "time_s"), (20, "time_min")])
-def test_noise_at_rest_has_its_own_sample_time(tmp_path, every, head):
-    """Noise with one pole, 0.9 over the five seconds of a sample, logged at another pace."""
+def test_noise_recorded_at_rest_may_have_its_own_sample_time(tmp_path, every, head):
+    """The noise has a pole of 0.9 at the sample time of 5 s, and is logged at another one."""
     pole = 0.9**0.2
     white = np.random.default_rng(5).standard_normal(200_000)
     seen = lfilter([0.2 * np.sqrt(1 - pole**2)], [1, -pole], white)[1000::every][:9000]
@@ -133,7 +133,7 @@ def test_noise_at_rest_has_its_own_sample_time(tmp_path, every, head):
 
 
 @pytest.mark.parametrize("said", ["from 0.001 to 0.005 Hz", "from 0.001 Hz up to 0.005", "from 1 - 5 mHz"])
-def test_a_unit_is_that_of_both_ends_of_a_band(said):
+def test_one_unit_holds_for_both_ends_of_a_band(said):
     low, high = json.loads(entry("band", written("wish", f"Bode plot within 5 % {said}")).split("]")[0] + "]")
     assert (low, high) == pytest.approx((0.002 * np.pi, 0.01 * np.pi), rel=1e-5)
 
@@ -147,7 +147,7 @@ def test_a_unit_is_that_of_both_ends_of_a_band(said):
         ("wish", "PI loop with 6 dB, Kp 1.5", "a PI controller needs Ti"),
     ],
 )
-def test_settings_are_those_of_the_controller_that_is_named(key, text, told):
+def test_settings_must_belong_to_the_controller_that_is_named(key, text, told):
     with pytest.raises(SpecError, match=told):
         written(key, text)
 

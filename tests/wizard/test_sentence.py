@@ -1,4 +1,4 @@
-"""From one sentence to a spec: what is heard, said back, asked beyond it, and asked again."""
+"""From one sentence to a spec: its answers, the remarks on it, and the questions that it leaves open."""
 
 import re
 
@@ -46,7 +46,7 @@ KNOWN = {
     ROOM: "time_constant=10800 dead_time=600 amplitude=20 correlation_time=1800 relative=0.05",
 }
 
-# As engineers write who have not read the page: a motor, a tank and a room; and what the spec then holds.
+# Sentences of engineers who have not read the documentation, and entries that the spec then has.
 # Steps q of a sensor add q^2/12 to the variance.
 WRITTEN = {
     "I have a DC motor with dry friction and want to tune a PI speed controller. 10 rad/s per volt, "
@@ -145,7 +145,7 @@ WRITTEN = {
 
 
 def heard(sentence, folder, *more):
-    """The draft after a sentence and the answers to what is asked beyond it."""
+    """The draft after a sentence, and `more` answers to the questions that it leaves open."""
     talk = Conversation({}, "x", folder)
     for text in (sentence, *more):
         assert talk.answer(text) is None
@@ -154,7 +154,7 @@ def heard(sentence, folder, *more):
 
 
 def written(sentence, folder):
-    """The draft after a sentence alone, of which all is understood, and its text without the title."""
+    """The draft after a sentence that is understood completely, and its text without the title."""
     found = in_sentence(sentence)
     if found.unclear:
         raise not_understood(found.unclear[0])
@@ -163,7 +163,7 @@ def written(sentence, folder):
 
 
 @pytest.mark.parametrize(("sentence", "facts"), (KNOWN | WRITTEN).items())
-def test_a_sentence_as_engineers_write_is_a_spec(sentence, facts, tmp_path):
+def test_a_sentence_as_engineers_write_it_becomes_a_spec(sentence, facts, tmp_path):
     draft, text = written(sentence, tmp_path)
     for name, value in (fact.split("=") for fact in facts.split()):
         found = re.search(rf"\b{name}: (?:\[)?([-+.\de]+)", text)
@@ -177,8 +177,8 @@ def test_a_sentence_as_engineers_write_is_a_spec(sentence, facts, tmp_path):
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("sentence", [*WRITTEN, *KNOWN])
-def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
-    """A strange word anywhere is refused, or said back or written; a strange number, too."""
+def test_no_word_of_a_sentence_is_dropped_silently(sentence, tmp_path):
+    """A strange word or number anywhere is refused, repeated in a remark, or written."""
     words = sentence.split(" ")
     for i in range(len(words) + 1):
         for strange in ("blorgy", "blorgy 7.77"):
@@ -208,7 +208,7 @@ def test_nothing_that_is_said_is_dropped_silently(sentence, tmp_path):
         ("PI loop", "P loop", "PI and PID"),
     ],
 )
-def test_a_size_that_is_not_understood_is_not_left_out(part, instead, refused, tmp_path):
+def test_a_size_that_is_not_understood_is_refused(part, instead, refused, tmp_path):
     """A plant without its dead time, or an hour in place of two nights, would be another experiment."""
     with pytest.raises(SpecError, match=refused) as found:
         written(EXCHANGER.replace(part, instead), tmp_path)
@@ -224,8 +224,8 @@ def test_a_size_that_is_not_understood_is_not_left_out(part, instead, refused, t
         "the existing PI has Kp 0.8, Ti 200 s",
     ],
 )
-def test_a_controller_that_runs_is_that_of_the_experiment(running, tmp_path):
-    """It was taken for the one that is asked for, and the experiment got a default."""
+def test_a_running_controller_becomes_the_controller_of_the_experiment(running, tmp_path):
+    """It was once taken for the controller to be tuned, and the experiment got a default."""
     text = f"level integrates 0.02 cm/s per %, dead time 10 s. {running}. PI loop with a safe margin, "
     text += "valve 50 +- 10 %, noise 0.15 cm white, 1 h"
     spec = written(text, tmp_path)[0].spec()
@@ -244,8 +244,8 @@ def test_a_controller_that_runs_is_that_of_the_experiment(running, tmp_path):
         ("an experiment of 30 min", "limits.duration", 1800.0),
     ],
 )
-def test_limits_are_understood_as_they_are_said(part, where, value, tmp_path):
-    """The rating of a device is said back; it asks for nothing."""
+def test_limits_are_understood_in_usual_wordings(part, where, value, tmp_path):
+    """The rating of a device, 2 kW, sets no limit."""
     spoken = "PI loop with a safe margin, gain 2 degC/%, time constant 180 s, dead time 25 s, noise 0.1 degC"
     parts = [spoken.replace("PI loop", "PI loop for a 2 kW heater"), part]
     spec = written(", ".join([*parts, *["valve 50 +- 10 %"] * ("go" not in part)]), tmp_path)[0].spec()
@@ -280,7 +280,7 @@ def test_a_time_between_two_ends_is_an_interval(said, ends):
         ("a good phase margin of 30 degrees", {"phase_margin": 30.0}),
     ],
 )
-def test_a_number_says_how_safe_a_margin_is(margin, entry, tmp_path):
+def test_a_number_determines_the_size_of_a_safe_margin(margin, entry, tmp_path):
     plant = "gain 2, time constant 100 s, dead time 10 s, 45 +- 5 %, 2 h, noise 0.1"
     spec = heard(f"PI loop with {margin}: {plant}", tmp_path, *["no"] * 3).spec()
     loop = spec.accuracy.loop
@@ -291,7 +291,7 @@ def test_a_number_says_how_safe_a_margin_is(margin, entry, tmp_path):
 @pytest.mark.parametrize(
     "leak", ["a slow outflow that grows with the level", "the tank leaks slowly", "it has a small leak"]
 )
-def test_a_leak_is_said_back_and_its_words_are_not_of_the_noise(leak, tmp_path):
+def test_a_leak_gives_a_remark_and_does_not_colour_the_noise(leak, tmp_path):
     tank = (
         "level rises about 0.5 cm per minute per %, dead time 20 s, noise of 0.15 cm, valve 50 +- 10 %, 2 h"
     )
@@ -300,8 +300,8 @@ def test_a_leak_is_said_back_and_its_words_are_not_of_the_noise(leak, tmp_path):
     assert "slow" not in draft.text.split("noise:")[1].split("accuracy:")[0]
 
 
-def test_a_sentence_stands_beside_answers(tmp_path):
-    """The plant of an answer stays; the sentence says the rest, which was dropped before."""
+def test_a_sentence_adds_to_other_answers(tmp_path):
+    """The plant of an answer is kept; the sentence adds the rest, which was once dropped."""
     answers = read_answers(None, ["plant=gain 2, time constant 180 s, dead time 25 s"])
     assert spread(answers, "PI loop with a safe margin")
     assert answers.texts["plant"].startswith("gain 2")
@@ -310,7 +310,7 @@ def test_a_sentence_stands_beside_answers(tmp_path):
         spread(read_answers(None, ["plant=heater"]), "something else")
 
 
-def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
+def test_only_questions_that_a_sentence_leaves_open_are_asked(tmp_path):
     talk = Conversation({}, "x", tmp_path)
     assert talk.answer(EXCHANGER.replace("valve 45 +- 8 %, ", "")) is None
     asked = []
@@ -458,7 +458,7 @@ def test_only_what_a_sentence_leaves_open_is_asked(tmp_path):
     ],
 )
 def test_a_part_of_a_sentence_answers_its_question(part, question, answer, tmp_path):
-    """What is taken for an answer is one, too, beside other answers without units."""
+    """The part is also accepted as an answer, next to other answers without units."""
     assert in_sentence(f"{part}; noise 0.1, white").answers[question] == answer
     if question in ("hold", "converter", "limits", "return", "drift", "loop", "signals"):  # whole answers
         said = {"plant": "gain 2, time constant 180 s, dead time 6 s", "range": "40 +- 5", "time": "1 day"}
@@ -478,8 +478,8 @@ def test_a_part_of_a_sentence_answers_its_question(part, question, answer, tmp_p
         *("the level scatters by +- 0.1", "noise of +-0.1", "the level is noisy with 0.1"),
     ],
 )
-def test_noise_fades_in_the_time_that_is_said(noise, fades, tmp_path):
-    """Also where nobody says how long the experiment may take: the time was taken for that."""
+def test_noise_has_the_correlation_time_that_is_stated(noise, fades, tmp_path):
+    """The length of the experiment is not stated; the time was once taken for it."""
     _, text = written(
         f"{noise}, {fades} about ten minutes; gain 2, lag 5 min, dead time 30 s; 40 +- 5; PI", tmp_path
     )
@@ -502,7 +502,7 @@ PLAIN = (
      "opening the valve by 10 % makes the temperature fall by 20 degC",
      "the temperature falls by 20 degC per 10 % of valve", "the temperature drops 2 degC per % of valve"],
 )  # fmt: skip
-def test_a_gain_that_is_negative_is(gain, tmp_path):
+def test_a_negative_gain_is_understood(gain, tmp_path):
     words = gain if "valve" in gain else f"gain {gain}"
     spec = heard(PLAIN.replace("gain 2 degC/%", words), tmp_path, *["no"] * 3).spec()
     assert spec.plant.continuous.gain == pytest.approx(-2.0)
@@ -510,7 +510,7 @@ def test_a_gain_that_is_negative_is(gain, tmp_path):
 
 @pytest.mark.parametrize("does", ["warms", "cools"])
 def test_a_rise_without_a_move_of_the_input_is_no_gain(does):
-    """The move may have been any: nothing is taken for it, and the size is no range of the input."""
+    """The size of the move is unknown and not assumed; the rise is no range of the input."""
     said = in_sentence(f"the heater {does} the room by 1.5 degC in about an hour; noise 0.1, white").answers
     assert "range" not in said
     assert code_of(plant_of_words, said["plant"]) == "bad-answer"
@@ -523,7 +523,7 @@ def test_a_rise_without_a_move_of_the_input_is_no_gain(does):
      "opening the pressure reducing valve by 5 % raises the temperature by 10 degC",
      "the temperature rises by 10 degC when the reducing valve opens 5 %"],
 )  # fmt: skip
-def test_no_other_gain_is_turned_round(words):
+def test_other_gains_keep_a_positive_sign(words):
     said = in_sentence(PLAIN.replace("gain 2 degC/%", words)).answers["plant"]
     assert plant_of_words(said).values["gain"] == pytest.approx(2.0)
 
@@ -533,7 +533,7 @@ def test_no_other_gain_is_turned_round(words):
     ["the experiment starts after 10 min", "the valve may increase by 5 %", "an increase of 5 % in load",
      "I want now a PI with Kp 1.2, Ti 90 s", "the plant gets 10 % slower in winter"],
 )  # fmt: skip
-def test_other_words_say_nothing_of_the_plant(part):
+def test_words_about_other_things_do_not_change_the_plant(part):
     heard = in_sentence(f"{PLAIN}; {part}").answers
     assert heard["plant"] == in_sentence(PLAIN).answers["plant"]
     assert "loop" not in heard
@@ -547,12 +547,12 @@ def test_other_words_say_nothing_of_the_plant(part):
      "PRBS please", "the valve is open or closed", "overnight", "not white", "not PID",
      "the loop is switched off", "columns of the log: valve and level", "sample time x", "u=valve"],
 )  # fmt: skip
-def test_words_that_matter_are_asked_for(part):
+def test_words_that_change_the_meaning_are_asked_about(part):
     assert in_sentence(f"{part}; {PLAIN}").unclear
 
 
 @pytest.mark.parametrize("apart", ["0.5 min", "30 s", "16.6667 %"])
-def test_a_tolerance_has_a_unit_of_its_own(apart):
+def test_a_tolerance_may_have_its_own_unit(apart):
     gain = plant_of_words("gain 1.5 degC/% +- 0.2, time constant 9 s").intervals["gain"]
     assert gain == pytest.approx((1.3, 1.7))
     found = plant_of_words(f"gain 2, time constant 40 min, dead time 3 min +- {apart}")
@@ -567,7 +567,7 @@ def test_a_tolerance_of_one_quantity_is_no_tolerance_of_all(last):
     assert set(both.intervals) == {"gain", "time_constant", "dead_time"}
 
 
-def test_what_nobody_was_asked_is_said():
+def test_a_remark_lists_the_questions_that_were_not_asked():
     (said,) = taken_for_granted({"hold": "60 s"})
     assert [one.key for one in QUESTIONS if one.unsaid and one.unsaid in said] == [
         "time",
@@ -578,12 +578,12 @@ def test_what_nobody_was_asked_is_said():
 
 
 @pytest.mark.parametrize("lag", ["settles in about 4 h", "time constant about 1 h"])
-def test_a_time_in_which_it_settles_may_be_vague(lag):
+def test_a_settling_time_or_time_constant_may_be_approximate(lag):
     assert plant_of_words(f"gain 2, {lag}").intervals["time_constant"] == pytest.approx((2880.0, 4320.0))
 
 
-def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
-    """An answer to that is added to what is known, or the part is left out, and that is said back."""
+def test_parts_that_are_not_understood_are_asked_for_in_other_words(tmp_path):
+    """New words are added to the answers that are known."""
     talk = Conversation({}, "x", tmp_path)
     sentence = EXCHANGER.replace("time constant about 262 s, dead time 31 s", "some minutes or so")
     assert talk.answer(sentence.replace("valve 45 +- 8 %", "valve 45, 8 up")) is None
@@ -600,7 +600,7 @@ def test_what_is_not_understood_is_asked_for_in_other_words(tmp_path):
     assert (talk.draft.spec().limits.amplitude.input, talk.draft.spec().signal.offset) == (8, 45)
 
 
-def test_what_is_left_out_is_said_back(tmp_path):
+def test_a_part_that_is_left_out_gives_a_remark(tmp_path):
     talk = Conversation({}, "x", tmp_path)
     assert talk.answer(f"{EXCHANGER} Serial number 77.") is None
     assert talk.answer("leave it out") is None
@@ -608,7 +608,7 @@ def test_what_is_left_out_is_said_back(tmp_path):
     assert talk.unclear == []
 
 
-def test_an_operating_point_that_is_said_twice_is_one():
+def test_an_operating_point_that_is_stated_twice_must_be_the_same():
     assert input_range("+-3 V around 9 V, at 9 V") == input_range("9 V +- 3 V")
     assert code_of(input_range, "+-3 V around 9 V, at 10 V") == "bad-answer"
 
@@ -619,7 +619,7 @@ def test_a_sentence_may_leave_the_plant_open():
     assert set(answers.texts) == {"wish"}
 
 
-def test_a_plant_that_lacks_a_quantity_is_completed(tmp_path):
+def test_a_plant_that_lacks_a_quantity_is_completed_by_the_next_answer(tmp_path):
     talk = Conversation({}, "x", tmp_path)
     assert talk.answer("gain 2, dead time 25 s").diagnostics[0].key == "plant"
     assert talk.answer("time constant 180 s") is None
@@ -640,7 +640,7 @@ def test_a_log_may_stand_in_a_sentence():
     assert set(found) == {"wish", "plant", "range"}
 
 
-def test_a_clause_that_answers_nothing_is_not_lost():
+def test_a_clause_that_answers_no_question_gives_a_remark():
     (remark,) = in_sentence(EXCHANGER + " The moon is full.".lower()).remarks
     assert "moon full" in remark
 
@@ -659,14 +659,14 @@ def test_a_clause_that_answers_nothing_is_not_lost():
         "avoid more than 0.5 % of overshoot",
     ],
 )
-def test_what_is_not_wanted_is_asked_about_and_answers_nothing(part):
+def test_negated_wishes_are_asked_about_and_answer_no_question(part):
     heard = in_sentence(f"gain 2 degC per %, lag 3 min, noise 0.1, {part}, 2 h")
     assert set(heard.answers) == {"plant", "noise", "time"}
     assert len(heard.unclear) == 1
     assert heard.unclear[0] in part
 
 
-def test_a_sentence_stands_behind_other_answers_and_has_their_place(tmp_path):
+def test_a_sentence_in_a_file_yields_to_other_answers_and_keeps_its_line(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text(f'time: 2 h\nplant: "{EXCHANGER}"\n')
     said = read_answers(file)
@@ -676,7 +676,7 @@ def test_a_sentence_stands_behind_other_answers_and_has_their_place(tmp_path):
 
 
 @pytest.mark.parametrize("word", ["about", "roughly", "circa", "ca.", "~", "approximately"])
-def test_about_is_within_a_fifth_and_said_back(word):
+def test_about_means_within_a_fifth_and_gives_a_remark(word):
     plant = plant_of_words(f"dead time {word} 35 s within 10 %, gain {word} 1.6, time constant 240 s")
     assert plant.intervals == {"gain": pytest.approx((1.28, 1.92)), "dead_time": pytest.approx((31.5, 38.5))}
     (said,) = plant.heard
@@ -694,7 +694,7 @@ def test_about_is_within_a_fifth_and_said_back(word):
         ("integrates 0.02 %/s per %, dead time 20 s", "lag of the actuator"),
     ],
 )
-def test_what_a_plant_in_words_leaves_out_is_said_back(said, missing):
+def test_quantities_that_a_plant_in_words_leaves_out_give_a_remark(said, missing):
     heard = plant_of_words(said).heard
     assert len(heard) == bool(missing)
     assert missing in "".join(heard)
@@ -703,16 +703,16 @@ def test_what_a_plant_in_words_leaves_out_is_said_back(said, missing):
 @pytest.mark.parametrize(
     "late", ["delayed by 5 s", "5 s transport delay", "a delay of 5 s", "pure delay 5 s"]
 )
-def test_a_dead_time_is_called_a_delay(late):
+def test_a_dead_time_may_be_called_a_delay(late):
     plant = plant_of_words(in_sentence(f"gain 2, lag near 25 minutes, {late}, noise 0.1").answers["plant"])
     assert plant.values == {"gain": 2.0, "time_constant": 1500.0, "dead_time": 5.0}
-    assert list(plant.intervals) == ["time_constant"]  # near is about
+    assert list(plant.intervals) == ["time_constant"]  # "near" means "about"
 
 
 @pytest.mark.parametrize("plant", ["words", "system"])
 @pytest.mark.parametrize("answer", [{"hold": "20 s"}, {"loop": "open"}, {"hold": "20 s", "loop": "open"}])
-def test_an_actuator_that_keeps_positions_plays_to_an_integrator_in_open_loop(plant, answer, tmp_path):
-    """No power at frequency zero: the sum of the input over the record, which the output is, stays small."""
+def test_an_integrator_in_open_loop_gets_no_power_at_frequency_zero(plant, answer, tmp_path):
+    """The output is proportional to the sum of the input over the record, which stays small."""
     (tmp_path / "p.json").write_text('{"num": [0.02], "den": [1, 0], "delay": 10}')
     known = "integrates 1.2 %/min per %, dead time 10 s" if plant == "words" else "p.json"
     draft = compose(ENGINEER | {"plant": known, "time": "30 min"} | answer, "x", tmp_path)
@@ -731,7 +731,7 @@ def test_an_actuator_that_keeps_positions_plays_to_an_integrator_in_open_loop(pl
         assert np.min(np.diff(np.flatnonzero(np.diff(u)))) * spec.sample_time >= 20
 
 
-def test_a_plant_that_integrates_is_held_by_a_stable_loop(tmp_path):
+def test_an_integrating_plant_gets_a_stable_loop_by_default(tmp_path):
     """1/(1 + C G) of Skogestad's settings has a peak below 6 dB, evaluated in continuous time."""
     answers = ENGINEER | {"plant": "integrates 1.2 %/min per %, dead time 10 s", "time": "1 h"}
     spec = compose(answers, "x", tmp_path).spec()
@@ -768,7 +768,7 @@ def test_a_plant_that_integrates_is_held_by_a_stable_loop(tmp_path):
         ("run at 40 V, +- 5 V", (5, 40, "", "V")),
     ],
 )
-def test_a_range_says_what_moves_and_in_which_unit(text, found):
+def test_a_range_states_the_name_and_the_unit_of_the_input(text, found):
     span = input_range(text)
     assert (span.amplitude, span.offset, span.name, span.unit) == found
 
@@ -789,7 +789,7 @@ def test_a_range_says_what_moves_and_in_which_unit(text, found):
         ("pump speed is controlled by an inverter, gain 2 bar/%, lag 20 s, PI loop", None),
     ],
 )
-def test_an_output_has_the_name_of_what_is_controlled_not_of_what_moves(text, name):
+def test_an_output_has_the_name_of_the_controlled_quantity_not_of_the_input(text, name):
     assert in_sentence(text).answers.get("names") == name
 
 
@@ -808,14 +808,14 @@ def test_an_output_has_the_name_of_what_is_controlled_not_of_what_moves(text, na
         ({}, {}),
     ],
 )  # fmt: skip
-def test_channels_have_the_names_and_units_that_were_said(answers, channels, tmp_path):
+def test_channels_have_the_names_and_units_that_were_stated(answers, channels, tmp_path):
     spec = compose(ENGINEER | {"plant": "gain 2, time constant 180 s"} | answers, "x", tmp_path).spec()
     found = {name: one.model_dump(exclude_none=True) for name, one in (spec.channels or {}).items()}
     assert found == channels
 
 
 def test_the_loop_of_a_lag_without_a_dead_time_keeps_the_default_margin(tmp_path):
-    """Skogestad's settings for a closed loop four times as fast: |1/(1 + C G)|, half a sample late."""
+    """Skogestad's settings for a closed loop four times as fast; |1/(1 + C G)| half a sample late."""
     answers = ENGINEER | {"plant": "gain 2, time constant 180 s"}
     draft = compose(answers, "x", tmp_path)
     draft.validate()
@@ -838,15 +838,15 @@ def test_the_loop_of_a_pid_is_sampled_fast_enough_for_its_derivative(lag, late, 
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 3.0])
-def test_every_level_is_a_multiple_of_the_step(step, tmp_path):
+def test_every_level_of_a_converter_is_a_multiple_of_its_step(step, tmp_path):
     spec = compose(ENGINEER | {"converter": f"steps of {step} %"}, "x", tmp_path).spec()
     converter = spec.signal.quantisation
     assert 2 * converter.range / 2**converter.bits == pytest.approx(step)
     assert converter.range >= 45.0
 
 
-def test_a_drift_moves_as_fast_whatever_the_colour(tmp_path):
-    """The long-run steps of (1 + c q^-1)/(1 - a q^-1) e have the deviation (1 + c)/(1 - a) of that of e."""
+def test_a_drift_is_equally_fast_for_every_colour_of_the_noise(tmp_path):
+    """The long-run steps of (1 + c q^-1)/(1 - a q^-1) e deviate by (1 + c)/(1 - a) times as much as e."""
     steps = []
     for colour in ("white", "fades in 20 s", "fades in 60 s"):
         noise = compose(ENGINEER | {"noise": f"0.2 degC, {colour}, drifting"}, "x", tmp_path).spec().noise
@@ -867,7 +867,7 @@ def test_a_log_in_which_the_input_moves_is_no_record_at_rest(tmp_path):
             compose(ENGINEER | {"noise": "as in log.csv"}, "x", tmp_path)
 
 
-def test_dwells_are_at_least_as_long_as_said(tmp_path):
+def test_positions_are_held_at_least_as_long_as_stated(tmp_path):
     spec = compose(ENGINEER | {"hold": "57 s", "return": "yes"}, "x", tmp_path).spec()
     assert (spec.signal.hold - 1) * spec.sample_time < 57 <= spec.signal.hold * spec.sample_time
     assert (spec.signal.type, spec.signal.at("return")) == ("binary", True)

@@ -1,4 +1,4 @@
-"""The wizard: answers in words become a spec with the simplest spectrum, and what it says of it."""
+"""The wizard: answers in words become a spec with the simplest spectrum, and a verdict in words."""
 
 import math
 from pathlib import Path
@@ -36,7 +36,7 @@ def saved(file, header, *columns):
     np.savetxt(file, np.c_[columns], "%.9g", ",", header=header, comments="")
 
 
-def test_the_sentence_of_the_engineer_is_a_spec():
+def test_the_answers_of_an_engineer_become_a_spec():
     spec = draft_of().spec()
     assert spec.uncertainty.intervals["gain"] == (1.4, 2.6)
     assert spec.accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
@@ -70,7 +70,7 @@ def test_answers_come_from_a_file_and_from_options(tmp_path):
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])
-def test_noise_at_rest_is_white_or_not(pole, tmp_path):
+def test_the_variance_and_the_pole_of_noise_at_rest_are_estimated(pole, tmp_path):
     e = 0.2 * np.random.default_rng(1).standard_normal(2000)
     saved(tmp_path / "rest.csv", "y", 20 + lfilter([1], [1, -pole], e))
     noise = draft_of(tmp_path, noise="rest rest.csv").spec().noise
@@ -80,7 +80,7 @@ def test_noise_at_rest_is_white_or_not(pole, tmp_path):
 
 @pytest.mark.parametrize(("head", "unit", "scale"), [("time", "s", 1), ("time_min", "min", 60)])
 def test_a_step_response_gives_the_plant_in_its_own_unit_of_time(head, unit, scale, tmp_path):
-    """What is said of times keeps its meaning, 0.02 rad/s and an hour, whatever the record counts."""
+    """Stated times and frequencies, such as 0.02 rad/s, keep their meaning in any unit of the record."""
     rng, t = np.random.default_rng(2), 5.0 * np.arange(400)
     y = 20 + 10 * 2.0 * np.where(t > 225, 1 - np.exp(-(t - 225) / 180), 0) + 0.2 * rng.standard_normal(400)
     saved(tmp_path / "step.csv", f"{head},u,y", t / scale, np.where(t >= 200, 50.0, 40.0), y)
@@ -123,8 +123,8 @@ def test_a_record_that_is_no_step_response_is_refused(u, y, t, told, tmp_path):
 
 
 @pytest.mark.parametrize("refused", [True, False])
-def test_no_record_that_is_too_short_or_of_few_samples_would_do(refused):
-    """It contains far less than its length says, cannot be designed, or has larger errors than stated."""
+def test_the_length_that_would_do_is_neither_too_short_nor_of_few_samples(refused):
+    """Fewer than 80 samples cannot be designed, or give a note on few samples; 100 samples would do."""
     spec, tried = draft_of().spec(), []
 
     def solve(changed):
@@ -140,7 +140,7 @@ def test_no_record_that_is_too_short_or_of_few_samples_would_do(refused):
     assert f"{lasting(500.0)} would do" in second
 
 
-def test_a_margin_that_is_kept_is_said():
+def test_a_margin_that_is_kept_is_stated_as_gain_and_phase_margin():
     """The gain margin of a peak Ms is Ms / (Ms - 1), its phase margin 2 asin(1 / (2 Ms))."""
     spec = parse_spec(
         "sample_time: 5\nplant: {continuous: {gain: 2, time_constant: 180, dead_time: 25}, sample: zoh}\n"
@@ -164,20 +164,20 @@ FIR, NO_BETTER, ALL = "{type: fir, order: 20}", "no better, as far as was tried"
         ((1.01,), 1.0, (), ALL[:1], FIR, "more than 1 %"),
         ((1.2, 1.015), 1.0, (), ALL[:2], "{type: fir, order: 40}", "more than 1.5 %"),
         ((1.5, 1.3, 1.05, 1.01), 1.0, (), ALL[:4], "{type: multisine, lines: 120}", "1 %"),
-        # No more unknowns help, and the bound leaves limits out.
+        # More unknowns do not help, and the bound neglects limits.
         ((1.0,) * 5, 0.05, (), ALL, FIR, NO_BETTER),
         ((1.0,) * 5, None, (), ALL, FIR, NO_BETTER),
         # Sinusoids begin badly, go on improving, and overtake.
         ((0.5, 0.4, 4.8, 1.7, 0.3), 0.299, (), ALL, "{type: multisine, lines: 240}", "by"),
-        # The first leaves another dead time open.
+        # The first spectrum leaves another dead time open.
         ((1.0, 1.01), 1.0, (0,), ALL[:2], "{type: fir, order: 40}", "more than 1 %"),
         ((1.2, 1.1, 1.05, 1.03, 1.0), 1.0, (3, 4), ALL, "{type: multisine, lines: 60}", "5 %; better"),
         ((1.2, 1.0, 1.0, 1.0, 0.9), 0.05, (4,), ALL, "{type: fir, order: 40}", "other dead times open"),
-        # Without exponents.
+        # The gap is written without exponents.
         ((1.9,) * 5, 1.0, (), ALL, FIR, "more than 90 %"),
     ],
 )
-def test_the_simplest_spectrum_that_is_near_to_every_other(values, bound, rivals, tried, spectrum, told):
+def test_the_simplest_spectrum_near_to_the_best_is_taken(values, bound, rivals, tried, spectrum, told):
     seen = []
 
     def solve(spec):
@@ -203,7 +203,7 @@ def test_the_simplest_spectrum_that_is_near_to_every_other(values, bound, rivals
     ],
 )
 def test_many_plants_each_in_its_loop_do_not_take_minutes(plant, loop, bounded, candidates, samples):
-    """The bound over every spectrum prices each limit at each; every record is fitted to the limits there."""
+    """The bound over all spectra has each limit at each plant, and records are fitted to the limits there."""
     spec = draft_of(plant=plant, loop=loop, time="8 h").spec()
     assert (spec.closed_loop, spec.solver.any_spectrum) == (loop != "open", bounded)
     assert (spec.signal.candidates, spec.experiment.samples) == (candidates, samples)
@@ -211,7 +211,7 @@ def test_many_plants_each_in_its_loop_do_not_take_minutes(plant, loop, bounded, 
 
 
 @pytest.mark.slow
-def test_the_record_does_not_repeat():
+def test_the_record_is_not_periodic():
     """A record that repeats every 120 samples would determine a dead time up to 600 s only."""
     spec = draft_of().spec().with_(uncertainty=None, **{"signal.candidates": 1})
     found = questions.solve(spec)
@@ -223,7 +223,7 @@ def test_the_record_does_not_repeat():
 
 
 @pytest.mark.slow
-def test_a_tank_of_a_log_is_played_without_power_at_frequency_zero(tmp_path):
+def test_a_tank_found_in_a_log_gets_no_power_at_frequency_zero(tmp_path):
     """A tank behind a lagging valve integrates: power there would give unlimited information."""
     rng = np.random.default_rng(3)
     u = np.repeat(rng.choice([-4.0, 4.0], 75), 8)
@@ -243,7 +243,7 @@ def test_a_log_is_explored_and_keeps_its_unit_of_time(tmp_path):
     u = np.repeat(rng.choice([-1.0, 1.0], 50), 6)
     y = lfilter([0, 0, 0.5], [1, -0.8], u) + 0.05 * rng.standard_normal(300)
     saved(tmp_path / "log.csv", "time_min,u,y", np.arange(300) / 12, u, y)
-    # What the log contains is not asked.
+    # The noise is not asked, as the log contains it.
     asked = {key: text for key, text in ENGINEER.items() if key != "noise"}
     wish = "prediction within 5 % up to 0.1"
     draft = compose({**asked, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
@@ -257,7 +257,7 @@ def test_a_log_is_explored_and_keeps_its_unit_of_time(tmp_path):
 
 
 def first_order_log(folder, seed, samples=1200, *, size=1.0, noise):
-    """The plant of the engineer at rest in 60 and 40: gain 2, 180 s, 25 s, with `noise` on the output."""
+    """Write a log of a lag about 40 and 60: gain 2, 180 s, dead time 25 s, with `noise` on the output."""
     rng = np.random.default_rng(seed)
     u, a = np.repeat(rng.choice([-5.0, 5.0], samples // 20), 20), np.exp(-5.0 / 180.0)
     y = lfilter([*np.zeros(6), 2.0 * (1.0 - a)], [1, -a], u) * size + noise(rng, 5.0 * np.arange(samples))
@@ -269,8 +269,8 @@ def white(rng, time):
 
 
 @pytest.mark.slow
-def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
-    """A search over structures takes drift for a second lag and a zero, which no rule of tuning knows."""
+def test_a_drifting_log_of_a_lag_gives_a_plant_that_can_be_tuned(tmp_path):
+    """A search over structures takes drift for a second lag and a zero, which no rule of tuning covers."""
 
     def drifting(rng, time):
         return np.cumsum(0.03 * rng.standard_normal(time.size)) + 0.05 * rng.standard_normal(time.size)
@@ -290,8 +290,8 @@ def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "loop"), [(1.0, "PI Kp 0.5, Ti 180"), (0.0, "open")])
-def test_what_speaks_against_the_model_of_a_log_is_said(size, loop, tmp_path):
-    """A log without a plant has reasons against every model, and determines no lag and dead time."""
+def test_objections_to_the_model_of_a_log_stand_in_the_draft(size, loop, tmp_path):
+    """A log without an effect of the input speaks against every model, and determines no lag."""
     swings = 4.0 * size
     first_order_log(
         tmp_path, 5, 300, size=size, noise=lambda rng, t: white(rng, t) + swings * np.sin(t / 200.0)
@@ -305,7 +305,7 @@ def test_what_speaks_against_the_model_of_a_log_is_said(size, loop, tmp_path):
 
 
 def of_log(plant, noise, text, drift="no"):
-    """The noise beside a log with this model, and that of the log."""
+    """The spec of a log of this model with the stated noise, and the noise of the log."""
     spec = parse_spec(f"sample_time: 5\n{plant}\n{noise}\n", design=False)
     lines = noise_lines(text, drift, Path(), PlantAnswer((), 1.0, sampling=5.0, explored=spec))
     return parse_spec("\n".join(["sample_time: 5", plant, *lines]), design=False), spec.noise
@@ -317,7 +317,7 @@ def of_log(plant, noise, text, drift="no"):
     [("standard deviation 0.2", 0.04), ("resolution 0.1", 0.02), ("resolution 1", 1 / 12)],
 )
 def test_noise_of_a_stated_size_is_correlated_as_in_the_log(plant, text, variance):
-    """A pole at 0.7, whether A or D has it: the variance is that of e over 1 - 0.7^2; 0.02 by the log."""
+    """A pole at 0.7, whether A or D has it: e has 1 - 0.7^2 times the stated variance; 0.02 by the log."""
     D = "" if "A:" in plant else ", D: [1, -0.7]"
     told, _ = of_log(plant, f"noise: {{variance: {0.02 * (1 - 0.49):.6g}{D}}}", text)
     A = getattr(told.plant, "A", None) or (1.0,)
@@ -326,7 +326,7 @@ def test_noise_of_a_stated_size_is_correlated_as_in_the_log(plant, text, varianc
     assert told.noise.variance == pytest.approx(variance * (1 - 0.49), rel=1e-5)
 
 
-def test_noise_of_two_outputs_is_that_of_each():
+def test_a_stated_size_of_noise_holds_for_each_of_two_outputs():
     plant = "plant: {B: [[[0, 1]], [[0, 1]]], F: [[[1, -0.7]], [[1, -0.7]]]}"
     noise = "noise: {variance: [[0.1, 0], [0, 0.1]], D: [[1, -0.6], [1]]}"
     told, logged = of_log(plant, noise, "standard deviation 0.2")
@@ -334,15 +334,15 @@ def test_noise_of_two_outputs_is_that_of_each():
     assert told.noise.D == logged.D
 
 
-def test_noise_that_is_said_to_drift_drifts_beside_a_log_that_does_not():
-    """The variance is that of e over that of e / (1 - 0.7 q^-1)."""
+def test_noise_that_is_stated_to_drift_does_so_although_the_log_does_not():
+    """The stated variance of 0.04 belongs to e / (1 - 0.7 q^-1)."""
     plant = "plant: {A: [1, -0.7], B: [0, 1]}"
     told = of_log(plant, "noise: {variance: 1}", "standard deviation 0.2", "yes")[0].noise
     assert (told.drift, told.C) == (True, (1.0, -0.8))
     assert told.variance == pytest.approx(0.04 * (1 - 0.49), rel=1e-5)
 
 
-def told(ratio=0.5, there=None, solve=None, limits="none", **robust):
+def sentences(ratio=0.5, there=None, solve=None, limits="none", **robust):
     """The sentences about a record of 720 samples, 5 s apart."""
     spec = draft_of(limits=limits).spec()
     peak = 5.0 if limits == "none" else 1.25
@@ -352,7 +352,7 @@ def told(ratio=0.5, there=None, solve=None, limits="none", **robust):
 
 
 def reaching(ratio, **robust):
-    """A design that errs `ratio` times as much as is admitted with 720 samples, and by their root."""
+    """A design whose error with 720 samples is `ratio` times the admitted one, and falls with their root."""
 
     def solve(changed):
         samples = changed.experiment.samples
@@ -399,18 +399,18 @@ ESTIMATES = {"scenarios": 32, "estimates": {"draws": 100, "confidence": 0.95, "l
         # A length that would do is shorter than the record that does.
         ({"ratio": 0.98, "solve": reaching(0.1)}, [], ["would do"]),
         ({"ratio": 0.74, "solve": reaching(0.76)}, [f"{lasting(5.0 * 434)} would do"], []),
-        # Time that is left is used.
+        # The remaining time is used.
         ({"ratio": 1.5, "there": 4 * 3600.0, "solve": reaching(1.5)},
          ["Of the 4 h that there are, 60 min were used",
           f"write duration: {5 * math.ceil(720 * 1.5**2 * 1.1)} into the spec"], []),
         ({"ratio": 1.5, "there": 3600.0, "solve": reaching(1.5)}, [], ["write duration"]),
-        # Other plants, in words of the wish.
+        # Other plants are described in words of the wish.
         ({"scenarios": 30, "fresh": FRESH}, ["Nor is it worse at 200 more of them."], ["drawn afresh"]),
         ({"scenarios": 30, "fresh": FRESH | {"missed": 9, "largest": 1.2}},
          ["up to 0.6 times as much as is admitted, which is enough"], ["drawn afresh"]),
         ({"ratio": 0.9, "scenarios": 30, "fresh": FRESH | {"missed": 9, "largest": 1.2}},
          ["up to 1.08 times as much as is admitted, which is too much"], ["drawn afresh"]),
-        # The data may give a plant at which the error is larger: a length has room for that.
+        # The error may be larger at the estimated plant; the stated length allows for that.
         ({"ratio": 0.95, "solve": reaching(0.95, **ESTIMATES), **ESTIMATES},
          ["60 min at plus/minus 5 is enough", "5 % of experiments would give one at which it errs 1.04 times",
           f"{lasting(5.0 * math.ceil(720 * 1.1 * (0.95 * 1.1) ** 2))} would do"], []),
@@ -426,13 +426,13 @@ ESTIMATES = {"scenarios": 32, "estimates": {"draws": 100, "confidence": 0.95, "l
           "and at 200 more; noise comes on top of that"], []),
     ],
 )  # fmt: skip
-def test_what_a_design_comes_to_is_said(said, parts, never):
-    found = told(**said)
+def test_the_verdict_states_accuracy_length_and_limits(said, parts, never):
+    found = sentences(**said)
     assert [one for one in parts if one not in found] == []
     assert [one for one in never if one in found] == []
 
 
-def test_the_column_says_once_what_can_be_done():
+def test_a_loop_for_the_column_is_refused_with_an_alternative():
     for wish in ("PI loop with 6 dB", "own loop with 6 dB, Kp 1.5, Ti 180"):
         with pytest.raises(SpecError) as caught:
             draft_of(plant="column", wish=wish).validate()
@@ -444,13 +444,13 @@ def test_the_column_says_once_what_can_be_done():
         draft_of(plant="column", loop="PI Kp 1, Ti 60")
 
 
-def test_what_is_not_used_for_a_bode_plot_is_said():
+def test_an_answer_that_a_bode_plot_does_not_use_gives_a_remark():
     draft = draft_of(wish="Bode plot within 5 % from 0.005 to 0.05", time="8 h")
     assert any("how well the plant is known is not used" in one for one in draft.notes)
     assert "# how well the plant is known is not used" in draft.text
 
 
-def test_a_bode_plot_that_is_refused_says_which_time_would_do():
+def test_the_refusal_of_a_bode_plot_states_a_time_that_would_do():
     """Harmonics of a fifth of an hour are 2 pi/720 s = 0.0087 rad/s apart."""
     wish = "Bode plot within 5 % from 0.001 to 0.01"
     with pytest.raises(SpecError) as caught:
@@ -466,7 +466,7 @@ def test_a_bode_plot_that_is_refused_says_which_time_would_do():
 @pytest.mark.parametrize(
     ("said", "sizes"),
     [
-        # A kelvin is a degree, and a millivolt no volt; a share is none.
+        # A kelvin is a degree; millikelvins and millivolts are converted.
         ({"plant": "gain 2 K/V, time constant 180 s", "noise": "200 mK", "range": "4 V +- 500 mV",
           "limits": "rate 10 mV/s"}, {"offset": 4.0, "amplitude": 0.5, "rate": 0.05}),
         ({"plant": "gain 2 K/%, time constant 180 s", "noise": "0.2 °C, white", "range": "40 +- 5 %"},
