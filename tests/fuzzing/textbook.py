@@ -92,7 +92,7 @@ def findings(spec: dict, result: dict, *, slack: float = 1e-6) -> list[str]:
         M = samples * system.information(excitation) + _prior(spec, system.names)
         ratios = dict(system.ratios(spec, M))
     except np.linalg.LinAlgError:
-        return [*told, "some parameter is not told at all, and the accuracy counts as met"]
+        return [*told, "some parameter is not identifiable, and the accuracy counts as met"]
     limit = value if kind == "accuracy_factor" else 1.0
     for name, ratio in ratios.items():
         if not ratio <= limit * (1.0 + slack):

@@ -45,7 +45,7 @@ def text(mark, decimal, moment, names=("Zeit", "valve °C", "level %")):
     return "\n".join(mark.join(row) for row in [names, *numbers]) + "\n"
 
 
-def check(path, prepared=None, *, shown=0.0):
+def check(path, prepared=None):
     """The signals are bit by bit those that were written, at times 2.5 s apart."""
     record = read_log(path, prepared or Preparation(columns=COLUMNS))
     np.testing.assert_array_equal(record.u[:, 0], U)
