@@ -1,4 +1,4 @@
-"""What tests of several tasks share."""
+"""Fixtures shared by the tests of several tasks."""
 
 from importlib import import_module
 
@@ -37,7 +37,7 @@ def heater_record(tmp_path):
 
 
 class Clock:
-    """In place of the module time: it goes on only when told."""
+    """Replaces the module time; only the tests advance it."""
 
     def __init__(self):
         self.now = 100.0
@@ -48,7 +48,7 @@ class Clock:
 
 @pytest.fixture
 def slow_solver(monkeypatch):
-    """Each call of the solver takes three seconds of a clock of its own; the limits that it was given."""
+    """The time limits of the solver's calls, each of which takes three seconds of a simulated clock."""
     clock, given, make = Clock(), [], clarabel.DefaultSolver
 
     def slow(*arguments):

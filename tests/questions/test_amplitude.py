@@ -1,4 +1,4 @@
-"""Records of two levels within an amplitude: their bound, their distance to it, and what no record can."""
+"""Two-level records within an amplitude: lower bound, distance to it, and proofs of infeasibility."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def ratio(u, relative=0.2):
     return float(np.max(3 * np.sqrt(spread) / (relative * np.abs(B * q / (1 + F * q)))))
 
 
-def test_the_record_is_as_near_to_the_bound_as_stated_and_beats_every_pseudo_random_sequence():
+def test_a_binary_record_is_within_8_percent_of_its_bound_and_beats_25_prbs():
     results = solve(asked())
     objective, signal, u = results.result["objective"], results.result["signal"], results.signal[:, 0]
     assert set(np.abs(u)) == {1.0}
@@ -63,7 +63,7 @@ def test_the_record_is_as_near_to_the_bound_as_stated_and_beats_every_pseudo_ran
         assert signal["worst_ratio"] <= ratio(sequence) * (1 + 1e-6)
 
 
-def test_a_record_of_few_held_values_is_the_best_of_all():
+def test_a_record_of_six_held_values_is_the_best_of_all_sign_patterns():
     results = solve(asked(experiment="{samples: 24}", signal="{type: binary, hold: 4, seconds: 0.1}"))
     u = results.signal[:, 0].reshape(-1, 4)
     assert np.all(u == u[:, :1])
@@ -72,7 +72,7 @@ def test_a_record_of_few_held_values_is_the_best_of_all():
     assert results.result["objective"]["any_record_bound"] <= ratio(u.ravel())
 
 
-def test_the_cheapest_record_is_that_of_the_best_shape_at_the_level_that_it_needs():
+def test_the_cheapest_record_just_meets_the_accuracy_and_states_its_distance():
     more = {"experiment": "{samples: 200}", "objective": "least_cost", "cost": "{input_power: 1}"}
     results = solve(asked(**more))
     objective, u = results.result["objective"], results.signal[:, 0]
@@ -94,7 +94,7 @@ def test_the_shortest_record_is_no_shorter_than_the_bound_and_meets_the_accuracy
 
 
 @pytest.mark.slow
-def test_what_no_record_can_is_refused_with_a_proof():
+def test_an_accuracy_that_no_record_reaches_is_refused_with_the_least_length():
     more = {"objective": "least_cost", "cost": "{input_power: 1}", "accuracy": ROUGH}
     with pytest.raises(InfeasibleError) as refused:
         solve(asked(experiment="{samples: 25}", **more))
@@ -117,7 +117,7 @@ def test_what_no_record_can_is_refused_with_a_proof():
         },
     ],
 )
-def test_there_is_no_bound_without_an_amplitude_or_in_a_loop_or_of_an_integrator(more):
+def test_no_record_bound_is_stated_in_loops_for_integrators_or_without_amplitude(more):
     result = solve(asked(**{"signal": "{type: binary}", **more})).result
     assert "any_record_bound" not in result["objective"]
     assert "distance_to_best" not in result["signal"]
@@ -133,7 +133,7 @@ def moves(u):
     ("limit", "most"), [("8", 8), ("{per_hour: 600}", 10), ("{per_hour: 60}", 1), ("200", 200)]
 )
 def test_a_record_has_no_more_moves_than_allowed(limit, most):
-    """60 samples of a second are a minute."""
+    """60 samples of one second last a minute, so 600 moves per hour allow 10."""
     results = solve(asked(limits=f"{{amplitude: 1, moves: {limit}}}", solver="{windows: 4}"))
     u, signal = results.signal[:, 0], results.result["signal"]
     assert moves(u) <= most
@@ -147,8 +147,8 @@ def test_a_record_has_no_more_moves_than_allowed(limit, most):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("returns", [True, False])
-def test_the_best_record_of_few_moves_is_found(returns):
-    """Of 12 samples all records of two levels with at most four moves are looked through."""
+def test_the_best_record_with_at_most_four_moves_is_found(returns):
+    """All two-level records of 12 samples with at most four moves are enumerated."""
     spec = asked(
         experiment="{samples: 12}",
         limits="{amplitude: 1, moves: 4}",
@@ -185,8 +185,8 @@ def test_the_best_record_of_few_moves_is_found(returns):
         ),
     ],
 )
-def test_a_limit_on_moves_that_no_search_keeps_is_refused(more, code):
-    """And one that allows no move, which is no experiment."""
+def test_a_limit_on_moves_is_refused_where_no_search_supports_it(more, code):
+    """Limits that leave no move are out of range."""
     found = refusals(lambda: solve(asked(**{"limits": "{amplitude: 1, moves: 8}", **more})))[0]
     assert (found.code, found.key) == (code, "limits.moves")
 
@@ -214,7 +214,7 @@ def test_a_record_that_returns_ends_at_the_operating_point(kind, rate):
         assert np.max(np.abs(np.diff(u, prepend=0.0))) <= 0.5 + 1e-9
 
 
-def test_the_table_of_steps_gives_back_the_record(tmp_path):
+def test_the_table_of_steps_reproduces_the_record(tmp_path):
     results = solve(
         asked(signal="{type: binary, hold: 3, seconds: 0.1, export: [step_table]}", solver="{windows: 4}")
     )
@@ -227,8 +227,8 @@ def test_the_table_of_steps_gives_back_the_record(tmp_path):
 @pytest.mark.parametrize(
     ("pole", "samples", "hold"), [(0.98, 300, 4), (0.6, 300, 1), (0.99, 60, 1), (0.999, 500, 10)]
 )
-def test_the_hold_that_is_chosen_is_a_tenth_of_the_slowest_time_constant(pole, samples, hold):
-    """It divides the length, and at least fifty values are left."""
+def test_hold_auto_is_a_tenth_of_the_slowest_time_constant_of_the_plant(pole, samples, hold):
+    """The hold leaves at least fifty values; poles of the noise do not count."""
     spec = asked(
         plant=f"{{B: [0, 1], F: [1, -{pole}]}}",
         experiment=f"{{samples: {samples}}}",
@@ -240,7 +240,7 @@ def test_the_hold_that_is_chosen_is_a_tenth_of_the_slowest_time_constant(pole, s
     assert build_convex(coloured).record.settings.hold == hold
 
 
-def test_the_cheapest_record_of_few_moves_is_as_high_as_it_must_be():
+def test_the_cheapest_record_of_few_moves_costs_as_much_as_the_scaled_best_one():
     limits, accuracy = (
         "{amplitude: 3, moves: 12}",
         "{model_error: {relative: 0.4, band: [0.02, 2.5], alpha: 3}}",

@@ -1,4 +1,4 @@
-"""What given excitations buy: Example 1 of the least-costly paper, closed forms, tables, records, limits."""
+"""Accuracy of given excitations: Example 1 of the least-costly paper, closed forms, tables, limits."""
 
 from pathlib import Path
 
@@ -30,8 +30,8 @@ COSINE = "{type: multisine, frequencies: [0.15], amplitudes: [0.75]}"
 SLOW = "{type: multisine, frequencies: [0.05], amplitudes: [0.75]}"
 
 
-def test_example_1_of_the_paper():
-    """The cosine at 0.15 beats white of six times its power everywhere; the one at 0.05 only slowly."""
+def test_example_1_of_the_least_costly_paper():
+    """The cosine at 0.15 beats white noise of six times its power, that at 0.05 at low frequencies only."""
     white, cosine, slow = (analyse(spec_of(given)) for given in (WHITE, COSINE, SLOW))
     assert white.result["power"]["input"][0] / cosine.result["power"]["input"][0] == pytest.approx(6, abs=0.1)
     w, r_white = r_u(white)
@@ -41,8 +41,8 @@ def test_example_1_of_the_paper():
     assert np.all(r_slow[w > 1.0] > 1.3 * r_white[w > 1.0])
 
 
-def test_closed_form_of_one_cosine():
-    """M = N A^2 / 2 Re(F F^*) for b and f; c is known by the noise alone, N / (1 - c^2)."""
+def test_the_information_of_one_cosine_has_its_closed_form():
+    """M = N A^2 / 2 Re(F F^*) for b and f; the noise alone gives N / (1 - c^2) for c."""
     information = analyse(spec_of(COSINE)).result["information"]
     assert information["parameters"] == ["b1", "c1", "f1"]
     q = np.exp(-0.15j)
@@ -55,7 +55,7 @@ def test_closed_form_of_one_cosine():
     np.testing.assert_allclose([sd["b1"], sd["f1"]], np.sqrt(np.diag(np.linalg.inv(expected))), rtol=1e-9)
 
 
-def test_without_a_requirement_there_is_still_an_answer():
+def test_analyse_without_a_requirement_states_the_error_at_95_percent():
     asked = "accuracy: {model_error: {relative: 0.01, alpha: 1}}\n"
     outcome = analyse(spec_of(WHITE, BASE.replace(asked, "")))
     assert outcome.result["status"] == "given"
@@ -63,14 +63,14 @@ def test_without_a_requirement_there_is_still_an_answer():
     assert outcome.result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)))
 
 
-def test_closed_loop_excitation_adds_to_what_the_noise_tells(flexible):
+def test_white_excitation_of_the_flexible_transmission_costs_what_papers_md_lists(flexible):
     spec = load_spec("specs/flexible_transmission.yaml", ["spectrum={given: {type: white, power: 7.663650}}"])
     outcome = analyse(spec)
     assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
     assert outcome.result["cost"] == pytest.approx(21.939919, rel=1e-6)
 
 
-def test_nothing_to_analyse():
+def test_analyse_without_a_given_spectrum_is_refused():
     with pytest.raises(SpecError) as caught:
         analyse(parse_spec(BASE.replace("{given: GIVEN}", "{type: white}")))
     assert caught.value.diagnostics[0].code == "nothing-given"
@@ -120,7 +120,7 @@ def test_a_record_longer_than_allowed_is_found(tmp_path):
 
 
 SPECS = Path(__file__).parents[2] / "specs"
-# Those whose design is a density that just meets what is asked.
+# Shipped specs whose design is a spectral density that just meets the requirement.
 DENSITIES = {
     **{name: [] for name in ("application", "first_order", "weighted_variance", "flexible_transmission")},
     "motor_loop": ["spectrum.order=4", "signal.candidates=1"],
@@ -130,7 +130,7 @@ _OF_THE_DESIGN = ("limits", "simulation", "objective", "solver", "uncertainty", 
 
 
 def given_back(spec, **given):
-    """What analyse says of an excitation in place of the design of a shipped spec."""
+    """The result of analyse for an excitation in place of the design of a shipped spec."""
     stated = {
         key: value for key, value in read(spec.read_text(), "spec").data.items() if key not in _OF_THE_DESIGN
     }
@@ -143,8 +143,8 @@ def given_back(spec, **given):
     "name",
     [n if n in ("application", "motor_loop") else pytest.param(n, marks=pytest.mark.slow) for n in DENSITIES],
 )
-def test_what_solve_wrote_is_met_and_a_thousandth_less_is_missed(name, tmp_path):
-    """By the spectrum, whose powers are those of the design, and by the record, whose are told of it."""
+def test_a_designed_spectrum_is_met_and_missed_at_a_thousandth_less_power(name, tmp_path):
+    """The written spectrum has the powers of the design; the record has the powers stated in the result."""
     spec, path, signal = SPECS / f"{name}.yaml", tmp_path / "spectrum.csv", tmp_path / "signal.csv"
     designed = solve(load_spec(spec, DENSITIES[name]))
     path.write_text(csv_text(designed.tables["spectrum"]))
@@ -184,7 +184,7 @@ spectrum: {given: GIVEN}
 @pytest.mark.first(2)
 @pytest.mark.parametrize("spectrum", ["{type: free}", "{type: multisine, lines: 40}"])
 @pytest.mark.parametrize("base", [INTEGRAL_ACTION, BASE], ids=["integral action", "open loop"])
-def test_the_listed_sinusoids_meet_what_the_design_promises(base, spectrum):
+def test_the_listed_sinusoids_reproduce_cost_and_error_of_the_design(base, spectrum):
     solved = solve(parse_spec(base.replace("{given: GIVEN}", spectrum)))
     designed, table = solved.result, solved.tables["spectrum"].columns
     frequency = table["frequency_rad_per_s"]
@@ -200,8 +200,8 @@ def test_the_listed_sinusoids_meet_what_the_design_promises(base, spectrum):
 
 
 @pytest.mark.parametrize("rows", [40, 41])
-def test_what_a_table_misses_is_of_the_size_of_the_errors_between_its_rows(rows):
-    """Of exp(w) the interpolation misses h^2/8 exp(w) in the middle, every second row four times that."""
+def test_the_margin_of_a_table_has_the_size_of_its_interpolation_error(rows):
+    """Interpolating exp(w) misses h^2/8 exp(w) between rows, and four times that from every second row."""
     w = np.linspace(0.0, 3.0, rows)
     spectrum = TabulatedSpectrum(w, np.exp(w)[:, None, None].astype(complex))
     added = (spectrum.raised(0.25).phi - spectrum.phi)[1:-1, 0, 0].real
@@ -211,7 +211,7 @@ def test_what_a_table_misses_is_of_the_size_of_the_errors_between_its_rows(rows)
     assert np.all(added[inner] <= 2.4 * expected[inner])
 
 
-def test_a_flat_table_is_white_noise(tmp_path):
+def test_a_flat_table_gives_the_information_of_white_noise(tmp_path):
     table = tmp_path / "phi.csv"
     rows = "\n".join(f"{w:.17g},1.7" for w in np.linspace(0.0, np.pi, 40))
     table.write_text("frequency_rad_per_s,phi\n" + rows + "\n", encoding="utf-8")

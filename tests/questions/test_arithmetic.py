@@ -1,4 +1,4 @@
-"""What leaves the range of arithmetic, memory or time is an error with its key; units change nothing."""
+"""Numbers beyond arithmetic, memory or time are refused with their key; results do not depend on units."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def objective(asked, *, variance=1.0, gain=3.6):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("power", [-40, 20])
-def test_designs_follow_their_units_over_eighty_powers_of_ten(power):
+def test_designs_scale_with_their_units_from_1e_minus_40_to_1e20(power):
     unit = 10.0**power
     plain, other = objective(BOUND)["value"], objective(BOUND, variance=unit)["value"]
     assert other / unit == pytest.approx(plain, rel=1e-6)
     half = 10.0 ** (power / 2)
     assert objective(BOUND, gain=3.6 * half)["value"] * unit == pytest.approx(plain, rel=1e-6)
-    # c1 is told by the noise alone, in its own unit; b1 and f1 lose by the variance.
+    # The information on c1 has no unit; that on b1 and f1 is inverse to the variance.
     better = objective(CRITERION, variance=1 / unit)["value"]
     assert better == pytest.approx(objective(CRITERION)["value"] + 2 * math.log(unit), rel=1e-6)
 
@@ -62,21 +62,21 @@ def test_a_number_out_of_range_is_refused_by_its_key(key, text):
 
 
 @pytest.mark.parametrize("fault", [lambda: np.ones(1) / np.zeros(1), lambda: 1.0 / 0.0, lambda: 10.0**400])
-def test_what_arithmetic_cannot_hold_names_the_most_extreme_number(fault):
+def test_an_arithmetic_fault_is_reported_with_the_most_extreme_number(fault):
     with pytest.raises(InaccurateError) as found, sound_arithmetic(("noise.variance", 12.0)):
         fault()
     (diagnostic,) = found.value.diagnostics
     assert (diagnostic.code, diagnostic.key) == ("beyond-precision", "noise.variance")
 
 
-def test_the_most_extreme_number_is_the_farthest_from_one():
+def test_the_most_extreme_number_is_the_farthest_from_one_in_powers_of_ten():
     data = {"a": [1.0, {"b": 1e-9}], "c": 1e7, "d": 0.0, "e": True, "f": "1e99"}
     assert most_extreme(data) == ("a[1].b", pytest.approx(9.0))
     assert most_extreme({}) == ("", 0.0)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_no_result_holds_a_number_that_is_none(value):
+def test_results_with_nan_or_infinity_are_refused(value):
     good = Results(
         typed({"cost": 1.0, "power": {"input": [1.0]}}), "", "s", {"spectrum": Table({"phi": np.ones(2)})}
     )
@@ -90,7 +90,7 @@ def test_no_result_holds_a_number_that_is_none(value):
         assert found.value.diagnostics[0].code == "beyond-precision"
 
 
-def test_an_input_without_power_has_none():
+def test_the_power_of_an_unused_input_is_not_negative():
     text = """
 plant:
   continuous:
@@ -117,27 +117,27 @@ def refused(text):
     return diagnostic
 
 
-def test_samples_scale_information_and_need_no_room():
+def test_cost_is_inverse_to_the_number_of_samples_up_to_1e15():
     few, many = (solve(parse_spec(f"{PLANT}{ASKED}experiment: {{samples: {n}}}")) for n in (500, 10**15))
     assert many.result["cost"] * 10**15 == pytest.approx(few.result["cost"] * 500, rel=1e-6)
     assert "signal" in few.result
     assert "signal" not in many.result
 
 
-def test_a_record_that_is_asked_for_has_to_fit():
+def test_a_requested_record_of_1e15_samples_is_refused():
     found = refused(f"{PLANT}{ASKED}experiment: {{samples: {10**15}}}\nsignal: {{seed: 1}}")
     assert found.key == "experiment.samples"
     assert "signal.samples: 1000000" in found.hint
 
 
-def test_a_model_of_many_parameters_is_refused_with_what_fits():
+def test_a_model_with_too_many_parameters_is_refused_with_the_largest_number():
     zeros = ", ".join(["0"] * 127)
     found = refused(f"plant: {{B: [0, 1], A: [1, {zeros}, 0.5]}}\nnoise: {{variance: 1}}\n{ASKED}")
     assert found.key == "plant"
     assert "127 parameters fit" in found.hint
 
 
-def test_the_solver_is_given_what_is_left(slow_solver):
+def test_each_call_of_the_solver_gets_the_remaining_time_limit(slow_solver):
     text = f"{PLANT}{ASKED}experiment: {{samples: 500}}\n".replace("order: 3", "order: 20")
     solve(parse_spec(text + "solver: {time_limit: 10000}"))
     np.testing.assert_allclose(slow_solver, 10000.0 - 3.0 * np.arange(len(slow_solver)))

@@ -1,4 +1,4 @@
-"""The last check of a design sees each way in which a result could lie, and the textbook agrees."""
+"""The last check of a design detects falsified results, and an independent computation agrees."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def designed(request):
     return done, plain(design_outcome(done))
 
 
-def test_a_right_result_passes(designed):
+def test_a_correct_result_passes_the_last_check(designed):
     done, result = designed
     audit(done, read_plain(Outcome, result), on_grid=False)
 
@@ -104,7 +104,7 @@ BEYOND = [beyond(name) for name in ("lower_bound", "upper_bound", "any_spectrum_
 
 
 @pytest.mark.parametrize("lie", [resized(0.999), resized(1.001), without_a_line, *BEYOND, cheaper])
-def test_every_lie_that_a_result_can_tell_is_seen(designed, lie):
+def test_the_last_check_detects_a_falsified_spectrum_bound_or_cost(designed, lie):
     done, result = designed[0], copy.deepcopy(designed[1])
     if lie(done, result):
         with pytest.raises(InaccurateError) as caught:
@@ -113,7 +113,7 @@ def test_every_lie_that_a_result_can_tell_is_seen(designed, lie):
 
 
 SPECS = {
-    # Many samples: what a line tells of all of them, not of one, decides whether it can go.
+    # Many samples: the information of a line over all samples decides whether it is dropped.
     "zero beside the end of the band": """
 plant: {A: [[1, -0.3], [1]], B: [[[0, 2.3], [0, -0.9, 1.7]], [[0, 18, 18], [0, 1.2]]]}
 noise: {variance: [[1, 0.9], [0.9, 1.0]]}
@@ -139,7 +139,7 @@ signal: {samples: 64}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("text", SPECS.values(), ids=SPECS)
-def test_what_is_claimed_is_so(text):
+def test_an_independent_computation_confirms_the_stated_design(text):
     spec = parse_spec(text)
     result = written(solve(spec))
     assert result["status"] == "optimal"

@@ -1,4 +1,4 @@
-"""The best accuracy within amplitude, rate and duration alone, whatever is required."""
+"""Best accuracy within amplitude, rate and duration alone, for several kinds of requirement."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ accuracy: {frequency_response: {relative: 0.05, band: [0.1, 2], lines: 12, perio
 """
 
 
-def test_limits_on_peaks_and_moves_are_those_of_a_linear_program():
+def test_a_design_within_amplitude_and_rate_is_the_optimum_of_a_linear_program():
     """One parameter: N sum p_k |dG/df|^2 is largest within sum p_k <= 1 and sum p_k |1 - e^-jw|^2 <= 0.04."""
     found = solve(parse_spec(ONE_PARAMETER)).result
     w = np.pi * np.arange(1, 51) / 50
@@ -52,7 +52,7 @@ def test_limits_on_peaks_and_moves_are_those_of_a_linear_program():
     }
 
 
-def test_an_experiment_without_a_length_takes_all_that_it_may():
+def test_an_experiment_without_a_length_lasts_as_long_as_its_limit_allows():
     assert parse_spec(ONE_PARAMETER).experiment.samples == 500
     heater = parse_spec(HEATER % (1, "criterion: D"))
     assert heater.experiment.samples == 720
@@ -69,8 +69,8 @@ def test_an_experiment_without_a_length_takes_all_that_it_may():
         "standard_deviation: {gain: 0.05, time_constant: 6, dead_time: 0.5}",
     ],
 )
-def test_the_record_keeps_them_and_is_near_to_a_design_that_knows_the_rate(asked):
-    """A record has at most twice the error of the design for the rate, which is beyond one without it."""
+def test_a_record_within_amplitude_and_rate_has_at_most_twice_the_designed_error(asked):
+    """The rate limit raises the error of the design by more than a half."""
     found = solve(parse_spec(HEATER % (0.2, asked)))
     u = np.array(found.tables["signal"].columns["u1"])
     assert np.abs(u).max() <= 5.0
@@ -82,8 +82,8 @@ def test_the_record_keeps_them_and_is_near_to_a_design_that_knows_the_rate(asked
 
 
 @pytest.mark.slow
-def test_a_record_keeps_its_weaker_lines():
-    """Clipped until it had the power of this design, the record alternated between two values: 7 times."""
+def test_a_record_of_a_robust_design_has_at_most_twice_the_designed_error():
+    """A record clipped to the power of the design alternates between two values, with 7 times the error."""
     spec = parse_spec(
         (HEATER % (10, "loop: {tuning: {simc: {}}, max_sensitivity_db: 6}")).replace("2.1", "2")
     )
@@ -98,14 +98,14 @@ def test_a_record_keeps_its_weaker_lines():
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("objective", ["best_accuracy", "shortest_experiment"])
-def test_lines_of_a_frequency_response_keep_them(objective):
+def test_a_design_for_a_frequency_response_keeps_amplitude_and_rate(objective):
     found = solve(parse_spec(LINES % objective))
     result, u = found.result, np.array(found.tables["signal"].columns["u1"])
     assert np.abs(u).max() <= 1.0 + 1e-9
     assert np.abs(np.diff(u, prepend=0.0)).max() <= 0.5 + 1e-9
     assert max(np.abs(u).max(), 2 * np.abs(np.diff(u, prepend=0.0)).max()) == pytest.approx(1.0, rel=1e-6)
     assert len(u) <= 10000
-    # What its lines tell, by the transform of a period, with noise that leaks a little.
+    # Standard deviations at the lines from the transform of one period, but for a little leakage.
     w = np.array(result["spectrum"]["frequencies"])
     z = np.exp(-1j * w)
     G = (0.4 * z + 0.1 * z**2) / (1 - 1.5 * z + 0.8 * z**2)
@@ -118,7 +118,7 @@ def test_lines_of_a_frequency_response_keep_them(objective):
         assert result["signal"]["worst_ratio"] <= 1.01
 
 
-def test_lines_that_do_not_fit_are_refused_with_what_does():
+def test_lines_that_amplitude_and_rate_do_not_allow_are_refused():
     with pytest.raises(InfeasibleError) as caught:
         solve(parse_spec(LINES % "least_cost").with_(**{"limits.samples": 2000}))
     (told,) = caught.value.diagnostics
@@ -126,7 +126,7 @@ def test_lines_that_do_not_fit_are_refused_with_what_does():
     assert told.key in ("limits.amplitude", "limits.rate")
 
 
-def test_the_error_of_a_loop_keeps_them():
+def test_a_design_for_the_error_of_a_loop_keeps_amplitude_and_rate():
     column = load_spec(SPECS / "distillation_column.yaml", ["experiment.samples=2000"])
     limits = {"amplitude": [1.0, 2.0], "rate": [0.5, 5.0]}
     found = solve(column.with_(limits=limits))

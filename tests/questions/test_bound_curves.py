@@ -1,4 +1,4 @@
-"""Curves of a design: bound.csv, the loop with its discs, ellipses, equal white, and the expected output."""
+"""Curves of a design: bound.csv, the loop with its discs, ellipses, white noise of equal cost, the output."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def design(request):
     return solve(load_spec(SPECS / f"{request.param}.yaml"))
 
 
-def test_an_entry_is_active_where_its_own_bound_touches(design):
+def test_frequencies_are_marked_active_where_r_u_touches_r_adm(design):
     marked = 0
     for panel in design.curves["bound"].panels:
         ratio = panel.r_u / panel.r_adm
@@ -32,7 +32,7 @@ def test_an_entry_is_active_where_its_own_bound_touches(design):
     assert marked >= 1
 
 
-def test_an_axis_ends_where_the_band_does():
+def test_a_frequency_axis_ends_with_the_band_and_has_no_near_duplicates():
     near = np.pi * (1.0 + np.array([-1e-15, -1e-12]))
     w = axis(0.0, np.pi, np.concatenate([near, [0.5, 0.5 * (1 + 1e-14)]]))
     assert w[-1] == np.pi
@@ -41,13 +41,13 @@ def test_an_axis_ends_where_the_band_does():
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-6, 1e6])
-def test_a_cluster_is_one_frequency_in_any_unit(unit):
+def test_clustered_frequencies_become_one_in_any_unit(unit):
     w = unit * np.array([0.0, 1e-9, 0.2, 0.20001, 3.0])
     assert distinct(w, 3.0 * unit) == pytest.approx(unit * np.array([0.0, 0.2, 3.0]))
 
 
-def test_a_record_stands_beside_a_design_per_sample():
-    """What is known per sample does not shrink with the length of the record that shows it."""
+def test_the_error_of_a_record_is_scaled_to_a_design_per_sample():
+    """The error for one sample does not shrink with the length of the record."""
     text = """
 plant: {B: [0, 1], F: [1, -0.5]}
 noise: {variance: 1}
@@ -66,7 +66,7 @@ MARGIN = [
 ]
 
 
-def test_the_discs_touch_the_circle_that_is_to_be_kept_and_no_more():
+def test_the_uncertainty_discs_touch_the_circle_of_the_required_sensitivity():
     table = solve(parse_spec(SPEC % "", overrides=MARGIN)).tables["nyquist"].columns
     z = np.exp(-1j * table["frequency_rad_per_s"])
     loop = 0.2 / (1 - z) * z / (1 - 0.5 * z)
@@ -80,7 +80,7 @@ def shown(outcome):
     return [pair.names for pair in outcome.curves["ellipses"].pairs]
 
 
-def test_chosen_pairs_have_the_blocks_of_the_covariance():
+def test_ellipses_of_chosen_pairs_have_the_blocks_of_the_covariance():
     pairs = 'report={ellipses: [["b2[2,1]", "a1[2]"], ["b1[1,1]", "b1[2,2]"]]}'
     outcome = analyse(load_spec(SPECS / "two_by_two_given.yaml", [pairs]))
     assert shown(outcome) == [("b2[2,1]", "a1[2]"), ("b1[1,1]", "b1[2,2]")]
@@ -96,8 +96,8 @@ def test_chosen_pairs_have_the_blocks_of_the_covariance():
 
 @pytest.mark.parametrize("apart", [1.0, 1e-9, 0.0, -1e-17])
 @pytest.mark.parametrize("scale", [1.0, 1e-12, 1e9])
-def test_the_boundary_is_that_of_the_region_though_parameters_are_told_together(apart, scale):
-    """Points on it have the chi-squared quantile in the covariance; a singular one leaves a line."""
+def test_an_ellipse_has_the_chi_squared_radius_even_for_a_singular_covariance(apart, scale):
+    """Its points x have x^T C^-1 x = the 95 % quantile of chi-squared; a singular C gives a line."""
     C = np.array([[1.0, scale], [scale, scale**2 * (1.0 + apart)]])
     points = boundary(np.zeros(2), C, 0.95)
     assert np.all(np.isfinite(points))
@@ -117,7 +117,7 @@ SHORTEST = ["objective=shortest_experiment", "limits={input_power: 0.7}"]
 
 
 @pytest.mark.parametrize(("more", "asked"), [("", []), (LOOP, []), (PRIOR, []), ("", SHORTEST)])
-def test_white_beside_a_design_has_its_cost_or_its_length(more, asked):
+def test_the_curve_of_white_noise_has_the_cost_or_the_length_of_the_design(more, asked):
     found = solve(parse_spec(SPEC % more, overrides=asked))
     white, samples = found.result["baseline"]["white"], found.result["samples"]
     power = white["power"]["excitation"][0] / (1.0 if asked else white["ratio"])
@@ -145,14 +145,14 @@ LEFT = scipy.signal.lfilter(np.convolve([1, -0.5], [1, -0.4]), np.convolve([1, -
     ],
     ids=["settled", "in a loop", "drifting"],
 )
-def test_the_output_is_that_of_the_plant_from_rest_with_noise_about_it(more, noise, pole, expected, rtol):
-    """In a loop it is what r causes, and the noise is what is left of it."""
+def test_the_predicted_output_is_the_response_from_rest_with_its_deviation(more, noise, pole, expected, rtol):
+    """In a loop y is the response to r, and the noise is S H e."""
     found = solve(parse_spec(SPEC % more, overrides=[noise]))
     table, u = found.tables["predicted_output"], found.signal[:, 0]
     assert csv_text(table).startswith("time_s,y1,y1_noise_deviation")
     np.testing.assert_allclose(table.columns["y1"], scipy.signal.lfilter([0, 1], [1, -pole], u), atol=1e-12)
     deviation = table.columns["y1_noise_deviation"]
-    if more:  # u = r - C y, of the noise too
+    if more:  # u = r - C y holds for the noise as well
         np.testing.assert_allclose(table.columns["u1"], u - 0.1 * table.columns["y1"], atol=1e-12)
         np.testing.assert_allclose(table.columns["u1_noise_deviation"], 0.1 * deviation, rtol=1e-12)
     last = deviation[-1:] if rtol > 0.01 else deviation
@@ -160,8 +160,8 @@ def test_the_output_is_that_of_the_plant_from_rest_with_noise_about_it(more, noi
 
 
 @pytest.mark.parametrize(("offset", "levels"), [("40", True), ("0", False), (None, False)])
-def test_only_an_operating_point_makes_the_input_stand_at_levels(offset, levels):
-    """Nor does a design without a loop or within limits show what it does not have."""
+def test_the_input_is_drawn_at_levels_only_about_an_operating_point(offset, levels):
+    """Without a loop there is no Nyquist curve, and within limits no white noise of equal cost."""
     limited = ["objective=best_accuracy", "limits={input_power: 0.7}"]
     found = solve(
         parse_spec(SPEC % "", overrides=[*limited, *([f"signal.offset={offset}"] if offset else [])])

@@ -1,4 +1,4 @@
-"""Campaigns: how an experiment is divided, what is built on after each part, and what the next one costs."""
+"""Campaigns: the division of an experiment, the model after each part, and the cost of the next part."""
 
 import json
 
@@ -27,12 +27,12 @@ from tests.support.campaigns import SPEC, planner, record, stands
         ("{pilot: {samples: 30, power: 1.0}}", [30] + 10 * [20] + [20, 20]),
     ],
 )
-def test_an_experiment_is_divided_as_the_spec_says(campaign, takes):
+def test_parts_have_the_lengths_of_block_pilot_and_stages(campaign, takes):
     schedule = build_rules(parse_spec(SPEC, overrides=[f"campaign={campaign}"])).schedule
     done, found = 0, []
     for _ in takes:
         found.append(schedule.take(done))
-        # A plan is for all that is left, and never for less than its first part.
+        # A plan covers all remaining samples, and at least its first part.
         assert schedule.rest(done) == max(schedule.samples - done, found[-1])
         done += found[-1]
     assert found == takes
@@ -51,19 +51,19 @@ def test_an_experiment_is_divided_as_the_spec_says(campaign, takes):
         ("{block: 50, max_samples: 201}", 199, 2),
     ],
 )
-def test_a_remainder_is_no_part_of_its_own(campaign, done, take):
-    """One sample would have to carry all that is missing."""
+def test_a_short_remainder_is_added_to_the_next_part(campaign, done, take):
+    """A part of one sample would have to give all the missing information."""
     schedule = build_rules(parse_spec(SPEC, overrides=[f"campaign={campaign}"])).schedule
     assert schedule.take(done) == take <= schedule.rest(done)
 
 
-def test_information_is_that_of_the_samples_at_any_model():
+def test_the_information_of_data_is_the_sum_of_gradient_products_at_any_model():
     u, y = record()
     model = planner().nominal.model
     for theta in ([3.6, -0.7], [3.2, -0.5]):
         at = model.at(np.array(theta), np.array([[1.7]]))
         b, f = theta
-        # y = b u(t-1) / (1 + f q^-1): by hand its derivatives.
+        # The derivatives of y = b u(t-1) / (1 + f q^-1) by hand.
         gradient = np.array(
             [lfilter([0, 1], [1, f], u[:, 0]), lfilter([0, 0, -b], np.convolve([1, f], [1, f]), u[:, 0])]
         )
@@ -99,30 +99,30 @@ def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
         )
     )
     assert np.allclose(by_hand.signal, plan.record)
-    # What is kept of the plan is what the result says, with its bound.
+    # The stored claim of the plan has the bound and the spectrum of the result.
     wanted, kept = by_hand.outcome, plan.claim()
     assert kept.objective.lower_bound == pytest.approx(wanted.objective.lower_bound, rel=1e-9)
     assert kept.objective.lower_bound <= kept.objective.value * (1 + 1e-9)
     coefficients = [one.spectrum.details["coefficients"] for one in (kept, wanted)]
     assert coefficients[0] == pytest.approx(coefficients[1], rel=1e-9)
-    # The ratio is what the design says of the prior alone.
+    # The ratio of the data is that of the design with the prior alone.
     question = at.question(model, known.information)
     assert question.ratio(question.information) == pytest.approx(known.ratio)
 
 
-def test_a_plan_that_ends_with_its_part_is_made_for_what_the_data_leave_open():
+def test_the_last_part_is_planned_robustly_if_campaign_last_is_robust():
     spec = parse_spec(SPEC, overrides=["uncertainty={intervals: {b1: [3, 4]}, scenarios: 10, fresh: 0}"])
     at = build_planner(spec)
     known = stands(at, share=0.2, samples=150)
     costs = {}
     for last in ("robust", "nominal"):
         rules = build_rules(spec.with_(**{"campaign.last": last}))
-        assert at.plan(rules, known, 80, 5, None).kind == "nominal"  # something follows
+        assert at.plan(rules, known, 80, 5, None).kind == "nominal"  # more parts follow
         plan = at.plan(rules, known, 150, 5, None)
         assert plan.kind == last
         costs[last] = plan.cost
     assert costs["robust"] > costs["nominal"]
-    # A plan beyond the cap gets longer, and what follows its part may still be robust.
+    # A plan beyond the cap gets longer, so that a later part may still be robust.
     rules = build_rules(spec.with_(**{"campaign.power_cap": 1.0}))
     plans = [at.plan(rules, known, 150, 5, cap) for cap in (sum(costs.values()) / 2, costs["nominal"] / 2)]
     assert [(plan.kind, len(plan.record) > plan.take, plan.fragile) for plan in plans] == [
@@ -143,8 +143,8 @@ campaign: {stages: [100, 200], max_samples: 500}
 
 
 @pytest.mark.slow
-def test_where_no_power_is_enough_the_campaign_goes_on():
-    """var c1 = (1 - c1^2) / N by the noise alone: with c1 = 0 it takes 1111 samples, whatever is applied."""
+def test_a_stopgap_part_is_planned_where_no_power_is_enough():
+    """The noise alone gives var c1 = (1 - c1^2) / N: with c1 = 0 it takes 1111 samples at any power."""
     at, rules = planner(COLOURED), build_rules(parse_spec(COLOURED))
     first = at.plan(rules, None, 0, 5, None)
     assert first.kind == "nominal"
@@ -153,14 +153,14 @@ def test_where_no_power_is_enough_the_campaign_goes_on():
     assert (plan.kind, plan.claim, plan.take) == ("stopgap", None, 200)
     assert "no power is enough" in plan.why
     assert plan.cost == pytest.approx(first.cost)
-    assert np.mean(plan.record**2) == pytest.approx(first.cost, rel=1e-9)  # the power of the input is paid
+    assert np.mean(plan.record**2) == pytest.approx(first.cost, rel=1e-9)  # the cost is the input power
     half = at.plan(
         build_rules(parse_spec(COLOURED, overrides=["campaign.power_cap=0.5"])), known, 100, 5, 2.0
     )
     assert half.cost == pytest.approx(1.0)
 
 
-def test_an_unstable_estimate_is_shrunk_to_the_last_stable_one():
+def test_an_unstable_estimate_is_shrunk_towards_the_last_stable_one():
     u, y = record()
     at = planner()
     last = at.nominal.model
@@ -170,10 +170,10 @@ def test_an_unstable_estimate_is_shrunk_to_the_last_stable_one():
     assert found.model.radius <= at.farthest
     expected = last.theta + found.share * (wild.theta - last.theta)
     assert np.allclose(found.model.theta, expected)
-    assert not Standing(found.model, found.information, 0.5, found.share).met  # it decides nothing
+    assert not Standing(found.model, found.information, 0.5, found.share).met  # it never counts as met
 
 
-def test_records_whose_times_go_on_are_one():
+def test_records_with_consecutive_times_are_joined():
     units = Units("s", 0.5, True, False, 1, 1)
     times = np.concatenate([0.5 * np.arange(4), 0.5 * np.arange(4, 7), 0.5 * np.arange(3)])
     signal = np.zeros((10, 1))
@@ -182,7 +182,7 @@ def test_records_whose_times_go_on_are_one():
 
 
 @pytest.mark.slow
-def test_whole_campaigns_are_simulated():
+def test_simulated_campaigns_are_compared_with_one_shot_white_and_oracle():
     text = SPEC + "simulation: {runs: 2, seed: 2, compare: [white], plant: {B: [0, 3.2], F: [1, -0.75]}}\n"
     overrides = [
         "signal.candidates=1",
@@ -206,22 +206,22 @@ def test_whole_campaigns_are_simulated():
     assert campaign["cost_over_oracle"]["mean"] == pytest.approx(
         campaign["energy"]["mean"] / (200 * truth["cost"]), rel=1e-6
     )
-    # Who knows the plant applies a record, too, and one that was chosen.
+    # The oracle also has a record, whose cost is its mean square.
     assert told["oracle_record_cost"] == pytest.approx(np.mean(applied**2), rel=1e-9)
     assert campaign["cost_over_oracle_record"]["mean"] == pytest.approx(
         campaign["energy"]["mean"] / np.sum(applied**2), rel=1e-9
     )
-    # The first part has 60 samples and others 140, the last one perhaps less; in one shot there is one.
+    # The first part has 60 samples, later ones 140 or less; an experiment in one shot is one part.
     later = (campaign["samples"]["mean"] - 60) / 140
     assert later <= campaign["parts"]["mean"] - 1.0 < later + 1.0
     assert [told["inputs"][way]["parts"]["mean"] for way in ("one_shot", "white")] == [1.0, 1.0]
-    # The names of the numbers in campaigns.csv.
+    # The numbers in campaigns.csv have these names.
     table, numbers = results.tables["campaigns"].columns, told["numbers"]
     for way, name in enumerate(numbers["way"]):
         ended = table["status"][table["way"] == way]
         for status, ending in enumerate(numbers["status"]):
             assert np.sum(ended == status) == told["inputs"][name][ending]
-    # Without anything to learn from, the experiment in one shot costs what its design costs.
+    # An experiment in one shot costs about as much as its design states.
     shot = told["inputs"]["one_shot"]
     assert shot["samples"]["mean"] == 200
     assert shot["energy"]["mean"] == pytest.approx(200 * results.result["cost"], rel=0.3)
@@ -229,7 +229,7 @@ def test_whole_campaigns_are_simulated():
     assert {"true_ratio.png", "cost_coverage.png"} <= figures.keys()
 
 
-def test_ways_have_the_same_pilot():
+def test_one_shot_and_campaign_begin_with_the_same_pilot():
     spec = parse_spec(SPEC, overrides=["campaign={block: 50, pilot: {samples: 30, power: 0.1}}"])
     ways = build_campaign(spec).ways
     assert ways["one_shot"].schedule.parts == (30, 200)
@@ -237,8 +237,8 @@ def test_ways_have_the_same_pilot():
 
 
 @pytest.mark.slow
-def test_campaigns_keep_what_is_asked_from_a_wrong_model():
-    """A pole at 0.5 for 0.7: in one shot the money is lost; in parts it is not."""
+def test_campaigns_from_a_wrong_nominal_model_keep_their_coverage_at_less_cost():
+    """The spec has a pole at 0.5 instead of 0.7; an experiment in one shot costs more."""
     text = SPEC.replace("-0.7", "-0.5") + "simulation: {runs: 40, plant: {B: [0, 3.6], F: [1, -0.7]}}\n"
     told = simulate(parse_spec(text, overrides=["campaign={block: 20, last: nominal}"])).result["simulation"]
     campaign, shot = told["inputs"]["campaign"], told["inputs"]["one_shot"]
@@ -246,7 +246,7 @@ def test_campaigns_keep_what_is_asked_from_a_wrong_model():
     assert campaign["cost_over_oracle"]["mean"] < shot["cost_over_oracle"]["mean"]
 
 
-def test_a_plan_beyond_the_cap_is_longer_and_at_last_weaker():
+def test_a_plan_beyond_the_power_cap_is_made_longer_and_finally_weaker():
     at = planner()
     known = stands(at, share=0.01)
     rules = build_rules(parse_spec(SPEC, overrides=["campaign.power_cap=0.5"]))
@@ -255,7 +255,7 @@ def test_a_plan_beyond_the_cap_is_longer_and_at_last_weaker():
     longer = at.plan(rules, known, 60, 5, free.cost)
     assert not longer.capped
     assert longer.cost <= 0.5 * free.cost * (1 + 1e-6)
-    # Of white noise at the output energy alone counts.
+    # With white noise at the output only the energy counts.
     assert len(longer.record) * longer.cost == pytest.approx(140 * free.cost, rel=0.03)
     weaker = at.plan(rules, known, 60, 5, 0.1 * free.cost)
     assert weaker.capped
@@ -278,8 +278,8 @@ WILD = {
     [(5, "{input_power: 1}"), (60, "{output_power: 1}"), (5, "{input_power: 1, output_power: 1}")],
 )
 @pytest.mark.parametrize("name", WILD)
-def test_no_estimate_makes_a_part_dearer_than_the_cap(name, block, cost):
-    """At the plant of the spec: the cap times the first plan, ten times that where outputs are paid for."""
+def test_no_estimate_makes_a_part_cost_more_than_the_cap(name, block, cost):
+    """At the plant of the spec a part costs at most 0.7 times the first plan; 7 times with output power."""
     text = ["campaign.power_cap=0.7", f"campaign.block={block}", f"cost={cost}", "campaign.pilot=20"]
     spec = parse_spec(SPEC, overrides=text)
     at, rules = planner(SPEC, *text), build_rules(spec)
@@ -307,7 +307,7 @@ campaign: {block: 20, max_samples: 200, power_cap: 0.4, last: nominal}
 
 
 def spent_in_the_loop(r, a, b, start):
-    """A sample from `start` on of u = r - C y, y = -a y(t-1) + b u(t-1), by hand."""
+    """Mean of u^2 + 2 y^2 from `start` on for u = r - C y, y = -a y(t-1) + b u(t-1), by hand."""
     u, y, v = np.zeros(len(r)), np.zeros(len(r)), 0.0
     for t in range(len(r)):
         if t:
@@ -317,8 +317,8 @@ def spent_in_the_loop(r, a, b, start):
     return np.mean(u[start:] ** 2 + 2.0 * y[start:] ** 2)
 
 
-def test_each_part_in_a_loop_keeps_the_cap_at_its_estimate_and_at_the_plant_of_the_spec():
-    """With what the parts before have left, which moves on in the plant."""
+def test_parts_in_a_loop_keep_the_power_cap_at_the_estimate_and_tenfold_at_the_spec():
+    """The cost includes the transients of earlier parts."""
     at, rules = planner(IN_A_LOOP), build_rules(parse_spec(IN_A_LOOP))
     known, first, r, binding = None, None, np.zeros((0, 1)), 0
     for number, theta in enumerate([[-0.9, 0.5], [-0.85, 0.55], [-0.92, 0.45], [-0.8, 0.4], [-0.9, 0.6]]):
@@ -336,7 +336,7 @@ def test_each_part_in_a_loop_keeps_the_cap_at_its_estimate_and_at_the_plant_of_t
     assert binding >= 2
 
 
-def test_what_earlier_parts_have_left_beyond_the_cap_is_told():
+def test_transients_of_earlier_parts_beyond_the_cap_are_reported():
     at, rules = planner(IN_A_LOOP), build_rules(parse_spec(IN_A_LOOP))
     first = at.plan(rules, None, 0, 1, None)
     before = np.full((40, 1), 20.0 * np.sqrt(first.cost))
@@ -347,7 +347,7 @@ def test_what_earlier_parts_have_left_beyond_the_cap_is_told():
     assert spent_in_the_loop(plan.applied[:, 0], -0.9, 0.5, 0) <= 0.4 * first.cost * (1 + 1e-9)
 
 
-def test_the_first_plan_after_a_pilot_is_bounded_by_that_of_the_spec():
+def test_the_first_plan_after_a_pilot_has_at_most_ten_times_the_nominal_cost():
     at, text = planner(), "campaign={block: 60, pilot: {samples: 30, power: 0.1}}"
     rules = build_rules(parse_spec(SPEC, overrides=[text]))
     plan = at.plan(rules, stands(at, [1e-3, -0.1]), 30, 1, None)

@@ -1,4 +1,4 @@
-"""Bounds on the spectrum of several inputs: plain programs on a frequency grid, and every direction."""
+"""Bounds on the spectrum matrix of several inputs, against semidefinite programs on a frequency grid."""
 
 import warnings
 
@@ -21,8 +21,8 @@ def designed(text, *overrides):
     return build_convex(spec).designed().design
 
 
-def plain_program(design, order, upper, lower, power):
-    """log det M over real Gram matrices, Phi between its bounds as matrices at 41 frequencies."""
+def semidefinite_program(design, order, upper, lower, power):
+    """The largest log det M over real Gram matrices with lower I <= Phi <= upper I at 41 frequencies."""
     problem = design.problem
     Q = cp.Variable((2 * (order + 1), 2 * (order + 1)), PSD=True)
     c = [
@@ -46,7 +46,7 @@ def plain_program(design, order, upper, lower, power):
 
 
 @pytest.mark.slow
-def test_the_best_information_between_two_bounds_is_that_of_a_plain_program():
+def test_the_d_optimum_between_two_bounds_is_that_of_a_semidefinite_program():
     design = designed(FIR, "spectrum={type: fir, order: 2}")
     found = design.result
     assert found.gap < 1e-6
@@ -54,14 +54,14 @@ def test_the_best_information_between_two_bounds_is_that_of_a_plain_program():
     assert eigenvalues.max() <= 5 * (1 + 1e-7)
     assert eigenvalues.max() > 5 * (1 - 1e-4)
     assert eigenvalues.min() >= 3.6 * (1 - 1e-7)
-    expected = plain_program(design, 2, 5.0, 3.6, 8.0)
-    # The grid of the plain program lets a little through between its points.
+    expected = semidefinite_program(design, 2, 5.0, 3.6, 8.0)
+    # Between its 41 frequencies the program may exceed the bounds a little.
     assert np.linalg.slogdet(found.information)[1] == pytest.approx(expected, abs=3e-4)
     free = designed(FIR, "spectrum={type: fir, order: 3}", "limits.spectrum=100")
     assert found.objective > free.result.objective * (1 + 1e-3)
 
 
-def test_one_input_and_a_polynomial_keep_to_their_bounds():
+def test_a_polynomial_density_of_one_input_keeps_and_reaches_its_bounds():
     text = "plant: {B: [[[0, 1, 0.3]]], A: [1, -0.8]}\nnoise: {variance: 0.1}\naccuracy: {criterion: E}\n"
     text += "limits: {input_power: 1, spectrum: {max: 1.15, min: 0.9}}\n"
     design = designed(text, "spectrum={type: polynomial, order: 6, band: [0, 3]}")
@@ -72,7 +72,7 @@ def test_one_input_and_a_polynomial_keep_to_their_bounds():
 
 
 @pytest.mark.slow
-def test_what_white_excitation_at_the_bound_misses_every_spectrum_below_it_misses():
+def test_an_accuracy_that_white_excitation_at_the_bound_misses_is_infeasible():
     """Phi <= level I has no more information than white excitation of that level."""
     asked = ARX + "accuracy: {model_error: {relative: 0.05}}\nspectrum: {type: fir, order: 2}\n"
     level = designed(asked).white_power / 2
@@ -96,7 +96,7 @@ def test_a_directed_functional_is_the_density_along_that_direction(basis):
 
 
 @pytest.mark.slow
-def test_cheapest_experiment_within_a_bound_costs_more_and_is_proved():
+def test_a_bound_on_the_density_raises_the_least_cost_but_not_above_white():
     asked = ARX + "accuracy: {standard_deviation: {'a1[1]': 0.001, 'b2[2,1]': 0.003}}\n"
     asked += "spectrum: {type: fir, order: 2}\n"
     free, bound = designed(asked), designed(asked, "limits.spectrum=600")

@@ -1,4 +1,4 @@
-"""Logs from which no model deserves trust, with the reason and what to do."""
+"""Logs whose identified models deserve no trust, and the findings that state the reason."""
 
 import re
 from functools import partial
@@ -26,7 +26,7 @@ def stored(path, u, y, names="u,y"):
 
 
 def static_gain(theta):
-    """Of a plant of one input by the names of its parameters, whichever structure was taken."""
+    """The static gain of a plant of one input from its named parameters, for any structure."""
     b, below = (sum(x for name, x in theta.items() if name[0] in letters) for letters in ("b", "af"))
     return theta.get("K", b / (1.0 + below))
 
@@ -35,7 +35,7 @@ RNG = np.random.default_rng
 
 
 def lags(u, plants, rng, noise=0.05):
-    """What first-order plants, a gain, a time constant and a whole delay for each input, make of u (n, r)."""
+    """(n,): response of first-order plants (gain, time constant, whole delay) to u (n, r), with noise."""
     y = noise * rng.standard_normal(len(u))
     for x, (gain, constant, delay) in zip(u.T, plants, strict=True):
         pole = np.exp(-1.0 / constant)
@@ -44,7 +44,7 @@ def lags(u, plants, rng, noise=0.05):
 
 
 def in_control(integral):
-    """Control without a reference: u = -C y + dither, and y moves by its own noise."""
+    """u and y (400,) of a regulator without a reference: u = -C y + dither; y has coloured noise."""
     rng = RNG(1)
     u, y, v, total, x = np.zeros(400), np.zeros(400), 0.0, 0.0, 0.0
     for t in range(400):
@@ -56,7 +56,7 @@ def in_control(integral):
     return u, y
 
 
-def together():
+def proportional_inputs():
     """The second input is twice the first."""
     rng = RNG(2)
     u = np.repeat(rng.choice([-1.0, 1.0], 30), 5)
@@ -64,36 +64,36 @@ def together():
     return np.column_stack([u, 2.0 * u]), y
 
 
-def exchangeable():
-    """The second input is half of the first but for little."""
+def nearly_proportional_inputs():
+    """The second input is half of the first, up to a deviation of 0.003."""
     rng = RNG(0)
     one = np.repeat(rng.choice([-1.0, 1.0], 40), 8)
     u = np.column_stack([one, 0.5 * one + 0.003 * rng.standard_normal(320)])
     return u, lags(u, [(1.0, 8.0, 3), (2.0, 15.0, 1)], rng)
 
 
-def a_share():
-    """u = -0.6 y explains y to the last digit: not for want of noise."""
+def input_proportional_to_output():
+    """The input is exactly -0.6 y, although y has noise."""
     y = scipy.signal.lfilter([1.0], [1.0, -0.66], RNG(0).standard_normal(200))  # 0.9 y - 0.4 * 0.6 y
     return -0.6 * y, y
 
 
 def a_sinusoid():
-    """Amplitude and phase at 0.3 rad/sample are all that the record has, for three parameters."""
+    """The record has only amplitude and phase at 0.3 rad/sample, for three parameters."""
     u = np.sin(0.3 * np.arange(1400.0))
     y = scipy.signal.lfilter([0, 0, 0, 0.06], [1, -1.5, 0.56], u) + 0.05 * RNG(21).standard_normal(1400)
     return u[600:], y[600:]
 
 
 LOGS = {
-    "of a P controller": (partial(in_control, 0.0), "like-inverse-controller"),
-    "of a PI controller": (partial(in_control, 0.1), "like-inverse-controller"),
-    # What moves the reference are eight steps; they look like spikes to a model of -1/C.
-    "of a reference that hardly moves": (partial(loop, 2, LAWS["PI"], steps=0.3), "input-only-answers"),
-    "of inputs that move together": (together, "excitation-too-simple"),
-    "of inputs that may be exchanged": (exchangeable, "excitation-too-simple"),
-    "of an input that is a share of the output": (a_share, "input-only-answers"),
-    "of a steady sinusoid": (a_sinusoid, "excitation-too-simple"),
+    "P control without reference": (partial(in_control, 0.0), "like-inverse-controller"),
+    "PI control without reference": (partial(in_control, 0.1), "like-inverse-controller"),
+    # The reference has eight steps, which look like spikes to a model of -1/C.
+    "small steps of the reference": (partial(loop, 2, LAWS["PI"], steps=0.3), "input-only-answers"),
+    "proportional inputs": (proportional_inputs, "excitation-too-simple"),
+    "nearly proportional inputs": (nearly_proportional_inputs, "excitation-too-simple"),
+    "input proportional to the output": (input_proportional_to_output, "input-only-answers"),
+    "steady sinusoid": (a_sinusoid, "excitation-too-simple"),
 }
 
 
@@ -101,8 +101,8 @@ STEPS = np.repeat(np.random.default_rng(5).choice([-1.0, 0.0, 1.0, 2.0], 20), 12
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_steps_of_a_coarse_sensor_are_said_to_decide_and_fine_ones_are_not(seed, tmp_path):
-    """Noise of less than half a step leaves levels off by a share of it, and the gain by many deviations."""
+def test_a_sensor_resolution_far_above_the_noise_is_reported_and_a_fine_one_is_not(seed, tmp_path):
+    """Noise below half a quantisation step leaves levels biased and the gain off by many deviations."""
     rng = RNG(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], 15), 40)
     y = scipy.signal.lfilter([0, 0.2], [1, -0.9], u) + 0.1 * rng.standard_normal(600)
@@ -112,15 +112,15 @@ def test_the_steps_of_a_coarse_sensor_are_said_to_decide_and_fine_ones_are_not(s
         assert ("sensor-too-coarse" in codes, bool(found.reasons)) == (blamed, blamed)
 
 
-def test_an_input_that_is_a_share_of_the_output_says_only_that(tmp_path):
-    """Neither the fit nor the noise of such a model says anything."""
-    found = explore(stored(tmp_path / "log.csv", *a_share()))
+def test_an_input_proportional_to_the_output_is_the_only_reason_given(tmp_path):
+    """The fit and the noise of such a model mean nothing."""
+    found = explore(stored(tmp_path / "log.csv", *input_proportional_to_output()))
     (reason,) = found.reasons
     assert "follows from the outputs alone" in reason
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_double_integrator_is_no_error_of_a_spec_that_nobody_wrote(seed, tmp_path):
+def test_a_log_of_a_double_integrator_ends_with_reasons_or_no_structure(seed, tmp_path):
     rng = RNG(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], 12), 50)
     y = scipy.signal.lfilter([0, 0.001], [1, -2, 1], u) + 0.1 * rng.standard_normal(600)
@@ -133,7 +133,7 @@ def test_a_double_integrator_is_no_error_of_a_spec_that_nobody_wrote(seed, tmp_p
 
 
 @pytest.mark.parametrize("swapped", [True, False])
-def test_columns_that_are_perhaps_swapped_are_said_to_be(swapped, tmp_path):
+def test_swapped_input_and_output_columns_are_reported(swapped, tmp_path):
     rng = RNG(3)
     u = np.repeat(rng.choice([-1.0, 0.0, 1.0, 2.0], 8), 50)
     y = scipy.signal.lfilter([0, 0.2], [1, -0.9], u) + 0.1 * rng.standard_normal(400)
@@ -143,15 +143,15 @@ def test_columns_that_are_perhaps_swapped_are_said_to_be(swapped, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("samples", [60, 120, 200, 240])
-def test_a_static_gain_without_noise_ends_in_an_answer(samples, tmp_path):
-    """Which of the two is the input no regression shows."""
+def test_a_static_gain_without_noise_ends_with_the_finding_input_only_answers(samples, tmp_path):
+    """No regression shows which of the two signals is the input."""
     found = explore(stored(tmp_path / "log.csv", STEPS[:samples], 2.0 * STEPS[:samples]))
     assert "input-only-answers" in [one.code for one in found.results.outcome.findings]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
-def test_a_log_earns_no_trust_and_its_code_says_why(name, tmp_path):
+def test_a_log_without_a_trustworthy_model_has_the_finding_that_says_why(name, tmp_path):
     made, code = LOGS[name]
     u, y = made()
     names = "u,y" if np.ndim(u) == 1 or u.shape[1] == 1 else "u1,u2,y"
@@ -162,7 +162,7 @@ def test_a_log_earns_no_trust_and_its_code_says_why(name, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
+def test_an_unstable_plant_is_reported_with_a_spec_that_identifies_it(tmp_path):
     rng = np.random.default_rng(4)
     r, y, u, x = np.repeat(rng.choice([-1.0, 1.0], 20), 12), np.zeros(240), np.zeros(240), 0.0
     for t in range(240):
@@ -181,7 +181,7 @@ def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
+def test_an_input_without_effect_on_the_output_is_named(tmp_path):
     rng = np.random.default_rng(2)
     u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 50), 8), np.repeat(rng.uniform(-1, 1, 40), 10)])
     y = lags(u, [(1.0, 8.0, 3), (0.0, 8.0, 1)], rng)
@@ -191,8 +191,8 @@ def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_clipped_output_earns_no_trust_and_emptied_cells_bring_its_gain_back(tmp_path):
-    """A lag of ten samples, gain one, cut at 0.5: a third of the gain is lost, and comes back."""
+def test_a_clipped_output_is_distrusted_and_emptying_its_cells_restores_the_gain(tmp_path):
+    """The output of a lag with gain one is clipped at 0.5, which loses a third of the gain."""
     rng = np.random.default_rng(1)
     u = np.repeat(rng.choice([-1.0, 0.0, 1.0], 30), 15)
     y = np.minimum(scipy.signal.lfilter([0, 0, 0.1], [1, -0.9], u) + 0.02 * rng.standard_normal(450), 0.5)
@@ -202,8 +202,8 @@ def test_a_clipped_output_earns_no_trust_and_emptied_cells_bring_its_gain_back(t
     assert static_gain(found.results.result["identification"]["theta"]) == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_model_far_from_what_the_data_say_without_one_earns_no_trust():
-    """Of a lag with a gain of one: half of it more is too far, a tenth more is not."""
+def test_a_model_far_from_the_nonparametric_frequency_response_is_contradicted():
+    """In open loop a gain 50 % too large is contradicted; one 10 % too large is not."""
     rng = np.random.default_rng(1)
     u = np.repeat(rng.choice([-1.0, 1.0], 500), 4)[:, None]
     y = scipy.signal.lfilter([0, 0.3], [1, -0.7], u, axis=0) + 1e-3 * rng.standard_normal(u.shape)
@@ -218,8 +218,8 @@ def test_a_model_far_from_what_the_data_say_without_one_earns_no_trust():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("delay", "held", "samples"), [(150, 4, 500), (120, 20, 600)])
-def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples):
-    """Longer than delays are looked for where nothing says that one is there; also by few jumps."""
+def test_a_dead_time_of_a_fifth_of_the_record_or_more_is_found(delay, held, samples):
+    """The search goes beyond its usual delays if the data show a longer one, even with few steps."""
     rng = np.random.default_rng(3)
     u = np.repeat(rng.choice([-1.0, 1.0], samples // held), held)
     y = scipy.signal.lfilter(np.append(np.zeros(delay), 0.2), [1, -0.8], u)
@@ -231,8 +231,8 @@ def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples)
 
 
 @pytest.mark.slow
-def test_a_walk_that_hides_the_gain_earns_no_trust(tmp_path):
-    """The output wanders as a random walk; a lag of nine samples is 2.3 samples late, on a finer grid."""
+def test_a_random_walk_that_hides_the_gain_earns_no_trust(tmp_path):
+    """The noise is a random walk; a lag of nine samples has a dead time of 2.3 samples."""
     rng, pole = RNG(1), np.exp(-1.0 / 20 / 9.0)
     u = np.resize(np.repeat([0.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0], 35), 300)
     fine = np.concatenate([np.zeros(46), np.repeat(u, 20)])[:6000]
@@ -245,8 +245,8 @@ def test_a_walk_that_hides_the_gain_earns_no_trust(tmp_path):
 
 
 @pytest.mark.parametrize("radius", [1.0, 1.0 - 1e-9, 0.9995, 0.99, 0.5])
-def test_the_noise_of_the_next_experiment_fades_as_fast_as_the_record_tells(radius):
-    """Estimates may have poles of the noise on the circle: there, information has no end."""
+def test_noise_poles_for_the_next_experiment_stay_within_radius_1_minus_1_over_n(radius):
+    """Estimated noise poles may lie on the unit circle, where the information is infinite."""
     D = np.real(np.poly([radius * np.exp(0.04j), radius * np.exp(-0.04j), 0.3])).tolist()
     noise = {"C": [1.0, -0.2], "D": D, "variance": 2.0, "drift": False}
     inside, drawn = _inside(noise, 200)
@@ -257,7 +257,7 @@ def test_the_noise_of_the_next_experiment_fades_as_fast_as_the_record_tells(radi
     else:
         assert drawn == ["D"]
         assert {**inside, "D": D} == noise
-        # Frequencies stay; a root is moved by a two-hundredth at most.
+        # The angles of the poles stay, and radii move by at most 1/200.
         np.testing.assert_allclose(np.angle(np.roots(inside["D"])[:2]), np.angle(np.roots(D)[:2]), atol=1e-9)
         assert np.abs(np.sort(roots) - np.sort(np.abs(np.roots(D)))).max() <= 1.0 / 200 + 1e-12
     several, _ = _inside({"C": [[1.0, -0.2], [1.0]], "D": [D, [1.0, -0.5]]}, 200)

@@ -1,4 +1,4 @@
-"""Durations in place of samples, and what channels are called."""
+"""Durations in place of samples, and names and units of channels."""
 
 import re
 
@@ -33,7 +33,7 @@ def test_a_duration_is_as_many_samples_as_fit():
     assert costs[0] == costs[1]
 
 
-def test_names_and_units_are_shown(tmp_path):
+def test_names_and_units_of_channels_appear_in_headers_and_labels(tmp_path):
     spec = parse_spec(f"{HEATER}{CHANNELS}experiment: {{samples: 120}}\n")
     found = solve(spec)
     assert list(found.tables["signal"].columns) == ["time_s", "u1 heating (%)"]
@@ -54,8 +54,8 @@ def test_an_excitation_has_the_unit_of_its_input():
 
 
 @pytest.mark.parametrize("lengths", [("duration", 0.5), pytest.param(("samples", 1), marks=pytest.mark.slow)])
-def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
-    """With the length of the hint a spectrum suffices, and with a seventh more a record."""
+def test_a_hint_states_the_sufficient_length_under_the_key_of_the_spec(lengths):
+    """The length of the hint suffices for a spectrum; a record needs up to 15 % more."""
     word, unit = lengths
     text = (
         "sample_time: 0.5\nplant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {variance: 1}\n"

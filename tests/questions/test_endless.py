@@ -1,4 +1,4 @@
-"""Where excitation is neither paid for nor limited it is refused, or no bound is told that is none."""
+"""Designs with free and unlimited excitation are refused, or have no any-spectrum bound."""
 
 import warnings
 
@@ -46,7 +46,7 @@ signal: {{samples: 100, seed: 1, candidates: 1}}
         return A, B, A + self.K * B
 
     def informations(self, lines, shares):
-        """Of two lines (n, 2) that have these shares (2,) of an input of power one, beside the noise."""
+        """(n, 4, 4): information of lines (n, 2) with shares (2,) of an input power of one, and noise."""
         w = 2.0 * np.pi * (np.arange(NODES) + 0.5) / NODES
         A, B, below = self._loop(w)
         y = np.sqrt(VARIANCE) / below
@@ -77,7 +77,7 @@ FAMILIES = ["{type: fir, order: 4}", "{type: white}", "{type: multisine, lines: 
 @pytest.mark.first(4)
 @pytest.mark.parametrize(("seed", "criterion"), [(1, "D"), (2, "A"), (3, "E"), (1, "T")])
 @pytest.mark.parametrize("spectrum", FAMILIES)
-def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spectrum):
+def test_the_any_spectrum_bound_holds_for_pairs_of_lines_or_is_not_stated(seed, criterion, spectrum):
     plant = Plant(seed)
     result = solve(
         parse_spec(plant.text(criterion, f"limits: {{input_power: 1}}\nspectrum: {spectrum}"))
@@ -101,7 +101,7 @@ def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spe
         "{input_power: 1, band: [0.0314, 3.14159]}",
     ],
 )
-def test_the_remedies_give_a_bound(criterion, limits):
+def test_a_second_limit_or_a_band_gives_a_finite_optimum(criterion, limits):
     text = Plant(1).text(criterion, f"limits: {limits}\nspectrum: {{type: free}}")
     found = solve(parse_spec(text)).result
     assert found["status"] == "optimal"
@@ -113,7 +113,7 @@ def test_the_remedies_give_a_bound(criterion, limits):
 
 
 @pytest.mark.parametrize(("seed", "criterion"), [(2, "A"), (3, "E")])
-def test_a_best_that_is_only_approached_is_told_as_such(seed, criterion):
+def test_an_optimum_that_is_only_approached_is_reported(seed, criterion):
     plant = Plant(seed)
     text = plant.text(criterion, "limits: {input_power: 1}\nspectrum: {type: free}")
     found = solve(parse_spec(text)).result
@@ -146,8 +146,8 @@ spectrum: {type: free}
         ("cost: {input_power: 0, output_power: 1}\naccuracy: {standard_deviation: {b1: 0.1}}", None),
     ],
 )
-def test_a_zero_on_the_circle_hides_power_from_the_output(rest, code):
-    """b1 + b2 alone is told there, and b1 not better than b1 - b2 is."""
+def test_a_zero_on_the_unit_circle_hides_input_power_from_the_output(rest, code):
+    """Power at the zero informs on b1 + b2 alone, so the accuracy of b1 is limited by b1 - b2."""
     if code is None:
         assert solve(parse_spec(OPEN + rest)).result["status"] == "optimal"
     else:
@@ -165,7 +165,7 @@ signal: {samples: 100, seed: 1, candidates: 1}
 
 
 @pytest.mark.parametrize("criterion", "DAET")
-def test_a_pole_inside_the_band_is_found(criterion):
+def test_free_power_at_a_pole_on_the_unit_circle_within_the_band_is_refused(criterion):
     text = f"{INSIDE}accuracy: {{criterion: {criterion}}}\n"
     assert refused(text, "spectrum={type: free}") == "needs-limits"
     on_it = f"spectrum={{type: multisine, frequencies: [0.4, {float(np.arccos(0.25))!r}, 2.0]}}"
@@ -185,8 +185,8 @@ signal: {samples: 100, seed: 1, candidates: 1}
 """
 
 
-def test_a_gain_that_costs_as_little_as_you_like():
-    """The information in k for a unit of the input is N / variance over |1 - q|^2."""
+def test_the_gain_of_an_integrator_at_vanishing_cost_is_refused():
+    """A unit of input power gives the information N / (variance |1 - q|^2) on k."""
     assert refused(GAIN, "cost={input_power: 1, output_power: 0}", "spectrum={type: free}") == "no-cost"
     fir = solve(parse_spec(GAIN, overrides=["cost={input_power: 1, output_power: 0}"])).result
     assert "any_spectrum_bound" not in fir["objective"]
@@ -194,7 +194,7 @@ def test_a_gain_that_costs_as_little_as_you_like():
     assert refused(GAIN, *limited) == "needs-limits"
 
 
-def test_lines_on_the_pole_are_refused():
+def test_lines_at_a_pole_on_the_unit_circle_are_refused():
     spectrum = "spectrum={type: multisine, frequencies: [0, 0.5, 1.0]}"
     assert refused(Plant(1).text("D", "limits: {input_power: 1}"), spectrum) == "needs-limits"
 
@@ -210,8 +210,8 @@ spectrum: {type: free}
 """
 
 
-def test_what_is_only_approached_is_said_also_where_digits_end_on_the_way(monkeypatch):
-    """Power ever nearer to frequency zero is free of charge."""
+def test_an_approached_optimum_is_reported_also_after_a_loss_of_precision(monkeypatch):
+    """Power costs less and less towards frequency zero."""
     found = solve(parse_spec(APPROACHED)).result
     assert ("optimum-only-approached", "doubt") in {(f["code"], f["severity"]) for f in found["findings"]}
 
@@ -227,8 +227,8 @@ def test_what_is_only_approached_is_said_also_where_digits_end_on_the_way(monkey
 
 
 @pytest.mark.slow
-def test_a_band_that_leaves_out_what_is_only_approached_has_an_optimum():
-    """It costs a little more than what no design gets below."""
+def test_a_band_without_frequency_zero_has_an_optimum():
+    """Its cost is less than 0.1 % above the lower bound without the band."""
     bound = solve(parse_spec(APPROACHED)).result["objective"]["lower_bound"]
     found = solve(parse_spec(APPROACHED + "limits: {band: [0.0314, 3.14159]}\n")).result
     assert found["status"] == "optimal"
@@ -258,8 +258,8 @@ def codes(text, *overrides):
 
 
 @pytest.mark.parametrize("spectrum", ["{type: fir, order: 4}", "{type: free}", "{type: multisine, lines: 9}"])
-def test_what_no_power_notices_is_refused(spectrum):
-    """One output cannot tell what two inputs do together: they may cancel."""
+def test_combinations_of_inputs_without_output_power_are_refused(spectrum):
+    """The effects of two inputs may cancel at one output."""
     asked = (TWO_INPUTS + ERROR, f"spectrum={spectrum}")
     assert codes(*asked, "cost={output_power: 1}") == ["no-cost"]
     assert codes(*asked, "cost={output_power: 1, input_power: [0, 0.1]}") == []
@@ -271,22 +271,22 @@ def test_an_input_without_a_price_is_refused():
     assert codes(TWO_OUTPUTS + ERROR, "cost={input_power: [1, 0]}") == ["no-cost"]
 
 
-def test_as_many_outputs_as_inputs_notice_everything():
+def test_output_power_prices_as_many_inputs_as_there_are_independent_outputs():
     assert codes(TWO_OUTPUTS + ERROR, "cost={output_power: 1}") == []
     assert codes(TWO_OUTPUTS + "accuracy: {criterion: T}\n", "limits={output_power: [1, 2]}") == []
     parallel = "plant.B=[[[0, 1, 0.4], [0, 2, 0.8]], [[0, 0.3], [0, 0.6]]]"
     assert codes(TWO_OUTPUTS + ERROR, "cost={output_power: 1}", parallel) == ["no-cost"]
 
 
-def test_a_limit_on_the_density_counts_every_direction():
+def test_a_limit_on_the_density_limits_every_combination_of_inputs():
     criterion = TWO_INPUTS + "accuracy: {criterion: D}\nspectrum: {type: fir, order: 4}\n"
     assert codes(criterion, "limits={output_power: 9}") == ["needs-limits"]
     assert codes(criterion, "limits={output_power: 9, spectrum: 4}") == []
 
 
 @pytest.mark.slow
-def test_a_limit_may_leave_combinations_that_the_cost_counts():
-    """The cheapest design puts little into y; a limit on y that it keeps costs a little, without warnings."""
+def test_an_output_limit_need_not_limit_combinations_that_the_cost_counts():
+    """A limit 2 % below the output power of the cheapest design raises its cost by at most 1 %."""
     free = {"cost": "{input_power: 1}", "spectrum": "{type: fir, order: 3}", "signal": "{candidates: 1}"}
     overrides = [f"{key}={value}" for key, value in free.items()]
     least = solve(parse_spec(TWO_INPUTS + ERROR, overrides=overrides)).result
@@ -299,7 +299,7 @@ def test_a_limit_may_leave_combinations_that_the_cost_counts():
     assert least["cost"] * (1.0 - 1e-7) <= result["cost"] <= 1.01 * least["cost"]
 
 
-# A pole of this loop has an angle of rounding, so that the grid of frequencies has a point next to zero.
+# Rounding gives a pole of this loop a tiny angle, so that the frequency grid has a point next to zero.
 INTEGRATING = """
 plant:
   parameters: {a: 3.21, k: 0.9362, m: 1.865}
@@ -317,11 +317,11 @@ signal: {seed: 81, type: multisine}
 """
 
 
-def test_the_proof_closes_for_a_very_slow_input():
-    """To a very slow input the gain alone matters: var(k) <= v C(1)^2 / (N p), for G(0) = k."""
+def test_the_gap_closes_for_power_next_to_frequency_zero():
+    """With a very slow input only the gain matters: var(k) <= v C(1)^2 / (N p), for G(0) = k."""
     found = solve(parse_spec(INTEGRATING)).result["objective"]
     assert found["relative_gap"] < 1e-7
     slow = np.sqrt(0.02358 / (1000 * 0.2527)) * (1 + 0.23507 - 0.52711)
-    # What the noise adds around the loop only helps, and is little.
+    # The noise in the loop adds a little information.
     assert 0.99 * slow < found["value"] * 0.1024 < slow
     assert found["value"] == pytest.approx(found["any_spectrum_bound"], rel=1e-7)

@@ -70,7 +70,7 @@ def first_order_errors(result, w):
 W = np.linspace(0.0, np.pi, 2001)
 
 
-def test_each_entry_has_its_own_column(tmp_path):
+def test_a_table_bounds_each_entry_of_g_by_its_own_column(tmp_path):
     table = tmp_path / "r.csv"
     rows = "0,0.4,0.1,0.2,0.1\n1,0.4,0.1,0.2,0.1\n3.2,0.1,0.1,0.2,0.1\n"
     table.write_text("frequency,r_adm_11,r_adm_12,r_adm_21,r_adm_22\n" + rows, encoding="utf-8")
@@ -86,7 +86,7 @@ def test_each_entry_has_its_own_column(tmp_path):
     assert outcome.tables["bound"].columns["r_adm_21"] == pytest.approx(0.2)
 
 
-def test_a_weight_holds_for_every_entry():
+def test_a_weight_multiplies_the_error_of_every_entry():
     result = arx(f"relative: 0.05, weight: {WEIGHT}").result
     nominal = by_name(result)
     G = np.array([[np.abs(arx_entry(nominal, i, j, W)) for j in (1, 2)] for i in (1, 2)])
@@ -125,7 +125,7 @@ def test_no_model_of_the_ellipsoid_breaks_the_bound_and_one_reaches_it(error, bo
     assert worst == pytest.approx(bound, rel=2e-4)
 
 
-def test_what_is_no_fraction_is_refused():
+def test_ellipsoid_regions_are_refused_for_entries_that_are_no_linear_fractions():
     error = "accuracy.model_error={relative: 0.1, region: ellipsoid}"
     both = ["plant.F=[[[1, 0.1], [1]], [[1], [1]]]"]
     (told,) = refused(validate, load_spec(SPECS / "two_by_two_arx.yaml", [error, *both]))
@@ -135,7 +135,7 @@ def test_what_is_no_fraction_is_refused():
 
 
 @pytest.mark.slow
-def test_ellipsoid_in_continuous_time():
+def test_an_ellipsoid_region_in_continuous_time_reaches_its_relative_bound():
     error = "accuracy: {model_error: {relative: 0.3, region: ellipsoid}}\n"
     result = solve(parse_spec(CONTINUOUS + error)).result
     names = result["information"]["parameters"]

@@ -1,4 +1,4 @@
-"""From a raw log to a model and a spec that solves, and verdicts on models by other data."""
+"""`explore`: from a raw log to a model and a spec that solves, and validation of models on other data."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ PLANT = "plant: {B: [0, 1], F: [1, -0.7]}\n"
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """What the command writes, of a log whose columns it finds by itself."""
+    """The folder that `idesign explore` writes for a log whose columns it finds by itself."""
     folder = tmp_path_factory.mktemp("log")
     log = lag_log(folder / "log.csv", samples=200)
     done = CliRunner().invoke(app, ["explore", str(log), "-o", str(folder / "run")])
@@ -50,7 +50,7 @@ def test_the_plant_of_a_log_is_found_and_trusted(run):
     assert result["validation"]["simulation_fit_percent"] > 60.0
 
 
-def test_the_spec_that_is_written_solves_at_once(run):
+def test_the_written_spec_solves_within_the_range_of_the_log(run):
     text = (run / "spec.yaml").read_text()
     spec = parse_spec(text, overrides=["signal=null", "spectrum.order=5"])
     assert {channel: one.name for channel, one in (spec.channels or {}).items()} == {
@@ -59,7 +59,7 @@ def test_the_spec_that_is_written_solves_at_once(run):
     }
     results = solve(parse_spec(text, overrides=["experiment.samples=60", "spectrum.order=5"]))
     assert results.result["status"] == "optimal"
-    # The actuator has been where the signal goes: it lies within the range of the log.
+    # The signal lies within the range of the input in the log.
     low, high = (
         end(np.loadtxt(run.parent / "log.csv", delimiter=",", skiprows=1)[:, 1]) for end in (np.min, np.max)
     )
@@ -67,7 +67,7 @@ def test_the_spec_that_is_written_solves_at_once(run):
     assert low - 1e-9 <= np.min(played) < np.max(played) <= high + 1e-9
 
 
-def test_the_model_is_judged_on_other_data(run, tmp_path):
+def test_validation_on_other_data_has_the_fit_of_the_true_plant(run, tmp_path):
     other = lag_log(tmp_path / "other.csv", seed=1)
     judged = explore(other, model=load_spec(run / "model.yaml", design=False))
     validation = judged.results.result["validation"]
@@ -79,8 +79,8 @@ def test_the_model_is_judged_on_other_data(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_real_record_without_a_header_whose_times_jitter():
-    """Its noise integrates: D comes out on the unit circle, as near as a spec may have it."""
+def test_a_real_record_with_jittering_times_and_no_header_is_explored():
+    """Its noise integrates: a pole of D is as near to the unit circle as a spec allows."""
     found = explore(STEP, Preparation(columns={"time": "1", "u1": "2", "y1": "3"}))
     assert "jitter-evened-out" in [one["code"] for one in found.results.result["findings"]]
     assert found.results.result["validation"]["simulation_fit_percent"] > 90.0
@@ -109,8 +109,8 @@ def integrating(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_integrator_earns_no_trust_until_somebody_says_that_it_is_one(integrating):
-    """Only the slope follows from the record: a long time constant would explain it as well."""
+def test_an_integrator_is_trusted_only_if_it_is_stated_as_the_structure(integrating):
+    """The record determines only the slope: a long time constant explains it as well."""
     prepared = Preparation(sample_time=1.0)
     found = explore(integrating, prepared)
     assert [one.code for one in found.results.outcome.findings if one.message.startswith("no trust")] == [
@@ -150,7 +150,7 @@ def test_times_that_do_not_increase_are_named_by_every_command(times, tmp_path):
         assert "sample_time" not in told.hint
 
 
-def test_a_sample_time_of_the_file_is_positive(tmp_path):
+def test_a_negative_sample_time_of_a_file_is_refused(tmp_path):
     path = tmp_path / "log.npz"
     np.savez(path, u=np.arange(40.0), y=np.arange(40.0), Ts=-1.0)
     for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
@@ -159,7 +159,7 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
 
 @pytest.fixture(scope="module")
 def rows():
-    """A lag of gain 2 and 6 samples with strong noise, in a loop with u = 0.8 (r - y)."""
+    """(900, 3): u, y and r of a lag with gain 2 and 6 samples, strong noise, and u = 0.8 (r - y)."""
     rng = np.random.default_rng(5)
     r = np.repeat(rng.choice([-1.0, 1.0], 200), rng.integers(4, 20, 200))[:900]
     y, u, x, pole = np.zeros(900), np.zeros(900), 0.0, np.exp(-1.0 / 6.0)
@@ -176,7 +176,7 @@ def saved(path, rows, header):
 
 
 @pytest.mark.slow
-def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_path):
+def test_the_frequency_response_from_the_reference_is_not_biased_by_feedback(rows, tmp_path):
     named = saved(tmp_path / "named.csv", rows, "u,y,SP")
     plain = saved(tmp_path / "plain.csv", rows, "u,y,r")
     by_name = explore([named], Preparation(columns={"r1": "SP"})).results
@@ -192,7 +192,7 @@ def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_pa
     assert read_log(named, Preparation()).r is None
 
 
-def test_a_column_called_r_that_holds_no_reference_is_left_alone(rows, tmp_path):
+def test_a_column_r_that_holds_text_is_not_taken_as_the_reference(rows, tmp_path):
     text = saved(tmp_path / "log.csv", rows, "u,y,r").read_text().splitlines()
     text[5] = text[5].rpartition(",")[0] + ",good"
     (tmp_path / "log.csv").write_text("\n".join(text))
@@ -224,8 +224,8 @@ FOUND = SimpleNamespace(
 )
 
 
-def test_what_another_spec_asks_for_is_kept():
-    """But for information on its own parameters, and only in the unit of its times."""
+def test_the_written_spec_keeps_requirements_and_limits_of_a_given_one():
+    """It drops the prior on the parameters of the given spec; another time unit is refused."""
     wishes = "title: a loop\nchannels: {u1: {unit: V}, y1: {name: speed, unit: rpm}}\n"
     wishes += "accuracy: {loop: {max_sensitivity_db: 6}}\nlimits: {amplitude: 3, duration: 4e-3}\n"
     held = (
@@ -247,7 +247,7 @@ def test_what_another_spec_asks_for_is_kept():
     assert code_of(Asked.of(spec).check_unit, "min") == "data-wrong-unit"
 
 
-def test_a_spec_that_does_not_fit_the_model_of_the_log_is_said_so(tmp_path):
+def test_a_given_spec_that_does_not_fit_the_model_of_the_log_is_reported(tmp_path):
     """The plant of the spec has other parameters, and the log another unit."""
     log = lag_log(tmp_path / "log.csv", samples=200)
     log.write_text(log.read_text().replace("output", "output (cm)", 1))
@@ -264,7 +264,7 @@ def test_a_spec_that_does_not_fit_the_model_of_the_log_is_said_so(tmp_path):
     assert found["unit-not-converted"]["figures"] == {"found": "cm", "stated": "m"}
 
 
-def test_a_written_spec_keeps_the_files_of_the_given_one(tmp_path):
+def test_a_written_spec_finds_the_files_of_the_given_one(tmp_path):
     log, folder = lag_log(tmp_path / "log.csv", samples=200), tmp_path / "specs"
     folder.mkdir()
     (folder / "adm.csv").write_text("frequency,r_adm\n0.001,0.2\n6,0.2\n")
@@ -280,7 +280,7 @@ def test_a_written_spec_keeps_the_files_of_the_given_one(tmp_path):
 @pytest.mark.parametrize(
     ("head", "stated"), [("Valve [%]", ("Valve", "%")), ("u", None), ("level " * 8, None)]
 )
-def test_the_spec_calls_its_channels_as_the_log_does(head, stated):
+def test_channels_of_the_written_spec_are_named_as_in_the_log(head, stated):
     log = SimpleNamespace(**{**vars(LOG), "names": {"u1": head, "y1": "y"}})
     channels = parse_spec(spec_text(log, FOUND, [Path("a.csv")])).channels or {}
     assert [(one.name, one.unit) for one in channels.values()] == ([stated] if stated else [])
@@ -302,7 +302,7 @@ def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
 
 @pytest.mark.parametrize("loop", [False, True])
 @pytest.mark.parametrize("reasons", [(), ("the record\nis too short: see #3", "y wanders " * 30)])
-def test_reasons_stand_at_the_head_and_in_the_title(reasons, loop):
+def test_reasons_for_distrust_stand_in_head_and_title_of_the_written_spec(reasons, loop):
     text = spec_text(LOG, FOUND, [Path('title: "odd".csv')], reasons, loop=loop)
     spec = parse_spec(text)
     doubted = "On a model that deserves no trust: " if reasons else ""
@@ -326,13 +326,13 @@ noise: {variance: 1}
 
 
 def stored(folder, text=MODEL):
-    """A model as a file; as it stands, it is the plant of the logs."""
+    """A file with a model; the default is the plant of the logs."""
     path = folder / "model.yaml"
     path.write_text(text)
     return path
 
 
-def test_times_of_the_record_stay_under_a_verdict(tmp_path):
+def test_the_fit_of_a_validated_model_keeps_the_times_of_the_record(tmp_path):
     path = lag_log(tmp_path / "late.csv")
     lines = path.read_text().splitlines()
     head, *rows = (line.split(",") for line in lines)
@@ -342,7 +342,7 @@ def test_times_of_the_record_stay_under_a_verdict(tmp_path):
     assert found.tables["fit"].columns["time_min"][[0, -1]].tolist() == [1000.0, 1149.5]
 
 
-def test_files_that_a_model_is_judged_by_follow_each_other(tmp_path):
+def test_several_validation_files_are_placed_one_after_the_other(tmp_path):
     files = [lag_log(tmp_path / f"{seed}.csv", seed=seed, samples=100) for seed in (1, 2)]
     judged = explore(files, model=load_spec(stored(tmp_path), design=False)).results
     assert judged.curves["fit"].lengths == (100, 100)
@@ -350,8 +350,8 @@ def test_files_that_a_model_is_judged_by_follow_each_other(tmp_path):
     np.testing.assert_array_equal(judged.tables["fit"].columns["record"], np.repeat([1.0, 2.0], 100))
 
 
-def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
-    """Its simulation is worse than a level: -100 % where the model is the plant with its sign changed."""
+def test_validating_a_model_of_the_wrong_sign_exits_with_one_and_a_reason(tmp_path):
+    """The simulation is worse than a constant: the fit is -100 % for the plant with its sign changed."""
     log = lag_log(tmp_path / "log.csv", seed=1)
     model = stored(tmp_path, MODEL.replace("0.2", "-0.2"))
     told = CliRunner().invoke(app, ["explore", str(log), "--validate", str(model), "--no-output"])
@@ -362,8 +362,8 @@ def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
 
 
 @pytest.mark.parametrize(("noise", "explained"), [(0.1, 100.0), (1.5, 50.0)])
-def test_a_poor_fit_is_held_against_a_model_where_inputs_explain_the_rest(noise, explained, tmp_path):
-    """A lag in place of a resonance; and the plant itself in noise that hides most of it."""
+def test_a_poor_fit_counts_against_a_model_only_if_the_input_explains_residuals(noise, explained, tmp_path):
+    """A lag in place of a resonance is doubted; the true plant in strong noise is not."""
     rng = np.random.default_rng(5)
     u, B, F = np.repeat(rng.choice([-1.0, 1.0], 60), 10), [0, 0, 0, 0.09], [1, -1.85, 0.94]
     y = scipy.signal.lfilter(B, F, u) + noise * rng.standard_normal(600)
@@ -380,14 +380,14 @@ def test_a_poor_fit_is_held_against_a_model_where_inputs_explain_the_rest(noise,
     assert len(lag.reasons) == 1
 
 
-def test_a_model_without_a_sample_time_is_named(tmp_path):
+def test_a_model_without_a_sample_time_is_refused_with_that_of_the_log(tmp_path):
     model = stored(tmp_path, MODEL.replace("sample_time: 0.5\n", ""))
     log = lag_log(tmp_path / "log.csv", seed=1)
     (told,) = refused(explore, log, model=load_spec(model, design=False), kind=DataError)
     assert (told.code, told.key, "sample_time: 0.5" in told.hint) == ("data-not-uniform", "sample_time", True)
 
 
-def test_an_output_that_never_changes_is_refused_as_without_a_model(tmp_path):
+def test_a_constant_output_is_refused_alike_with_and_without_a_model(tmp_path):
     path = lag_log(tmp_path / "stuck.csv")
     head, *rows = path.read_text().splitlines()
     path.write_text("\n".join([head, *(f"{row.rsplit(',', 1)[0]},5" for row in rows)]))
@@ -401,7 +401,7 @@ def test_an_output_that_never_changes_is_refused_as_without_a_model(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
+def test_a_vanishing_dead_time_is_zero_with_a_95_percent_upper_limit(tmp_path):
     rng = np.random.default_rng(2)
     u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)
     pole = np.exp(-0.1)

@@ -1,4 +1,4 @@
-"""Faults of a record leave the verdict open by their code; without the fault the same record is judged."""
+"""A faulty record leaves the verdict undecided, with the code of its fault; without the fault it is met."""
 
 from functools import partial
 
@@ -55,7 +55,7 @@ accuracy: {model_error: {relative: 0.5}}
 
 
 def arx(seed, *, gain=3.6, late=0):
-    """600 samples of the first plant, perhaps of another gain or with an input that was logged late."""
+    """600 samples of the plant of ARX, optionally with another gain or an input that is logged late."""
     rng = np.random.default_rng(seed)
     u, e = rng.choice([-1.0, 1.0], 620), rng.standard_normal(620)
     y = scipy.signal.lfilter([0.0, gain], [1.0, -0.7], u) + scipy.signal.lfilter([1.0], [1.0, -0.7], e)
@@ -63,7 +63,7 @@ def arx(seed, *, gain=3.6, late=0):
 
 
 def lag(seed, samples=500, *, still=None, spikes=0):
-    """The second plant; its sensor may stand still from 200 to 259, or show nothing there, or spikes."""
+    """The plant of LAG; its sensor may stand still or show nothing from 200 to 259, or have spikes."""
     rng = np.random.default_rng(seed)
     u = 0.3 * np.sign(rng.standard_normal(samples))
     y = scipy.signal.lfilter([0, 3.6], [1, -0.7], u)
@@ -77,7 +77,7 @@ def lag(seed, samples=500, *, still=None, spikes=0):
 
 
 def spiked(size):
-    """The third plant with spikes of this size in three samples, or without these samples."""
+    """The plant of QUIET with spikes of this size in three samples; NaN leaves these samples out."""
     rng = np.random.default_rng(1)
     u = rng.standard_normal(500)
     y = scipy.signal.lfilter([0, 0.5], [1, -0.7], u) + 0.1 * rng.standard_normal(500)
@@ -86,7 +86,7 @@ def spiked(size):
 
 
 def rising(half):
-    """The fourth plant with a gain that rises by this share before and after the middle."""
+    """The plant of RISING with a gain that rises from 1 - half to 1 + half times its value."""
     rng = np.random.default_rng(1)
     u, e = rng.standard_normal(400), 0.3 * rng.standard_normal(400)
     return {
@@ -96,7 +96,7 @@ def rising(half):
 
 
 def in_loop(late, *columns):
-    """The last plant in its loop, with an input that was logged late, and columns of `u,y,r`."""
+    """Some columns of `u,y,r` of the plant of LOOP, with an input that is logged late."""
     signals = dict(zip("uyr", (x.ravel() for x in loop(GAIN, samples=1000)), strict=True))
     signals["u"] = np.roll(signals["u"], late)
     return {name: signals[name][5:] for name in columns}
@@ -122,15 +122,15 @@ FIGURES = {
 }
 
 
-# What lighter ones cover.
+# Faster cases cover these faults.
 AS_WELL = ("a still sensor", "spikes in a twentieth", "logged 3 samples late", "logged 6 samples late")
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(one, marks=pytest.mark.slow) if one in AS_WELL else one for one in FAULTS]
 )
-def test_a_fault_is_named_and_leaves_the_verdict_open(name, write):
-    """It alone is told of a verdict; whoever only identifies is told as well."""
+def test_a_fault_of_a_record_is_named_and_leaves_the_verdict_undecided(name, write):
+    """The fault is the only stated reason; `identify` reports it as well."""
     text, made, code = FAULTS[name]
     spec, path = parse_spec(text), write(made())
     judged = assess(spec, path)
@@ -159,7 +159,7 @@ SOUND = {
 
 @pytest.mark.parametrize("name", SOUND)
 def test_a_record_without_the_fault_is_met(name, write):
-    """And the estimate is that of the plant of the spec, which is the true one."""
+    """The estimate agrees with the plant of the spec, which is the true one."""
     text, made, code = SOUND[name]
     judged = assess(parse_spec(text), write(made()))
     found, true = judged.results.outcome, build_model(parse_spec(text))
@@ -175,14 +175,14 @@ def codes(results):
     return {one.code for one in results.outcome.findings or ()}
 
 
-def test_without_the_reference_a_late_input_of_a_loop_is_not_seen(write):
+def test_without_the_reference_a_late_input_of_a_loop_is_not_detected(write):
     assert "columns-misaligned" not in codes(identify(parse_spec(LOOP), write(in_loop(1, "u", "y"))))
 
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("u", ["held", "sines", "drifting"])
-def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, write):
-    """Of three short records of right models none is blamed, whatever moves the plant, after a dead time."""
+def test_predictable_inputs_of_right_models_are_not_reported_as_logged_late(u, write):
+    """The plant has a dead time of ten samples; each kind of input has three short records."""
     zeros = "[" + "0, " * 10 + "3.6]"
     spec = parse_spec(ARX.replace("[0, 3.6]", zeros).replace("b1", "b10"))
     for seed in range(3):
@@ -200,8 +200,8 @@ def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, write):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("gain", "share"), [(0.0, 1.0), (1.0, 0.0)])
-def test_an_output_that_no_input_moves_is_told_from_one_that_some_moves(gain, share):
-    """By the statistic of Wald, at one in a thousand; the first of two inputs has the gain."""
+def test_a_wald_test_finds_outputs_that_no_input_moves(gain, share):
+    """The level of the Wald test is 0.001; the first of two inputs has the gain."""
     ones = np.ones(1)
     B = (np.array([0.0, 0.1]), np.array([0.0, 0.1]))
     F = (np.array([1.0, -0.5]), np.array([1.0, -0.5]))
@@ -234,7 +234,7 @@ COPIES = {
     ("name", "options"),
     [*((one, {}) for one in COPIES), ("with empty cells", {"preparation": Preparation(detrend="constant")})],
 )
-def test_a_record_counts_once(name, options, write):
+def test_a_copy_of_a_record_is_refused(name, options, write):
     files = [write(lag(3), "a.csv"), write(COPIES[name](lag(3)), "b.csv")]
     for given in (files, files[::-1]):
         refused = partial(assess, parse_spec(LAG), given, **options)
@@ -243,7 +243,7 @@ def test_a_record_counts_once(name, options, write):
 
 
 @pytest.mark.slow
-def test_a_part_with_empty_cells_leaves_the_verdict_open(write):
+def test_a_copied_part_with_empty_cells_leaves_the_verdict_undecided(write):
     first, second = lag(3), lag(4)
     for name, copied in emptied(first, 25).items():
         second[name][200:400] = copied[100:300]
@@ -252,8 +252,8 @@ def test_a_part_with_empty_cells_leaves_the_verdict_open(write):
     assert "samples-repeated" in codes(judged.results)
 
 
-def test_rests_and_coarse_steps_come_again_by_themselves():
-    """Rows that are alike by rounding, and an input that is applied twice, make no copy."""
+def test_rests_and_rounded_outputs_of_a_repeated_input_are_no_copies():
+    """Two records have the same input and coarse rounding, but different noise."""
     rng = np.random.default_rng(8)
     u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)[:, None]
     y = scipy.signal.lfilter([0.2], [1, -0.8], u, axis=0)

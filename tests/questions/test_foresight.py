@@ -1,4 +1,4 @@
-"""Other minima that a record leaves are foreseen, and ruled out by what the spec says of the plant."""
+"""Other minima of the likelihood are predicted, and ruled out by the uncertainty stated in the spec."""
 
 from types import SimpleNamespace
 
@@ -23,8 +23,8 @@ RICHER = "{type: fir, order: 12}"
 LIMIT = 2.0 * np.log(1000.0)
 
 
-def plainly(T, L, u):
-    """e^(-Ls) / (T s + 1) on held inputs."""
+def held_response(T, L, u):
+    """The response of e^(-Ls) / (T s + 1) to a held input u (n,)."""
     whole, part = divmod(L, H)
     a, first = np.exp(-H / T), 1.0 - np.exp(-(H - part) / T)
     taps = np.concatenate([np.zeros(int(whole) + 1), [first, 1.0 - a - first]])
@@ -32,18 +32,18 @@ def plainly(T, L, u):
 
 
 def excess(L, u):
-    """The least sum of squares over K and T of what another dead time leaves, over the variance: expected."""
-    y = HEATER[0] * plainly(*HEATER[1:], u)
+    """Expected excess in -2 log likelihood of the dead time L with the best K and T."""
+    y = HEATER[0] * held_response(*HEATER[1:], u)
 
     def left(T):
-        shape = plainly(T, L, u)
+        shape = held_response(T, L, u)
         return float(y @ y - (y @ shape) ** 2 / (shape @ shape))
 
     return scipy.optimize.minimize_scalar(left, bounds=(40.0, 600.0), method="bounded").fun / VARIANCE
 
 
-def valleys(u):
-    """The dead times of the minima that a record leaves within the limit, the true one left out."""
+def minima_by_scan(u):
+    """Dead times of the minima with an excess below LIMIT, by a scan, without the true one."""
     grid = np.arange(0.5, 100.0, 1.0)
     found = np.array([excess(L, u) for L in grid])
     inner = np.flatnonzero((found[1:-1] < found[:-2]) & (found[1:-1] < found[2:])) + 1
@@ -56,9 +56,9 @@ def solved(*overrides):
     return found.result, next(values for name, values in columns.items() if name[0] in "ur")
 
 
-def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
+def test_predicted_minima_are_those_of_a_scan_over_the_dead_time():
     result, u = solved()
-    scan, rivals = valleys(u), result["foreseen"]["rivals"]
+    scan, rivals = minima_by_scan(u), result["foreseen"]["rivals"]
     assert scan
     assert rivals
     for rival in rivals:
@@ -71,9 +71,9 @@ def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
 @pytest.mark.parametrize(
     ("spectrum", "undecided"), [("{type: multisine, lines: 120}", True), (RICHER, False)]
 )
-def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undecided, tmp_path):
+def test_assess_is_undecided_for_a_lines_spectrum_and_decides_for_a_richer_one(spectrum, undecided, tmp_path):
     _, u = solved(f"spectrum={spectrum}")
-    y = HEATER[0] * plainly(*HEATER[1:], u)
+    y = HEATER[0] * held_response(*HEATER[1:], u)
     y += np.sqrt(VARIANCE) * np.random.default_rng(5).standard_normal(u.size)
     path = tmp_path / "record.csv"
     columns = np.column_stack([H * np.arange(u.size), u, y])
@@ -87,14 +87,14 @@ def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undeci
 
 @pytest.mark.slow
 @pytest.mark.parametrize("spectrum", [RICHER, "{type: multisine, lines: 40}"])
-def test_where_a_plain_scan_finds_none_none_is_told(spectrum):
+def test_no_minima_are_predicted_where_a_scan_finds_none(spectrum):
     result, u = solved(f"spectrum={spectrum}")
-    assert valleys(u) == []
+    assert minima_by_scan(u) == []
     assert result["foreseen"] == {"rivals": []}
     assert "other-minimum-foreseen" not in {one["code"] for one in result.get("findings", [])}
 
 
-def test_what_is_known_leaves_nothing_to_look_for():
+def test_no_other_minima_are_sought_with_a_known_dead_time():
     result, _ = solved("plant.known=[L]", "accuracy={standard_deviation: {K: 0.05, T: 6}}")
     assert "foreseen" not in result
 
@@ -103,7 +103,7 @@ def test_what_is_known_leaves_nothing_to_look_for():
     ("override", "longest", "reason"),
     [("solver.any_spectrum=false", 20.0, "--fast"), ("title=a", 0.01, "the record is long")],
 )
-def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
+def test_a_skipped_search_for_other_minima_is_reported_with_a_reason(override, longest, reason, monkeypatch):
     monkeypatch.setattr(foresight, "_LONGEST", longest)
     result, _ = solved(override)
     assert "foreseen" not in result
@@ -111,7 +111,7 @@ def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
     assert reason in found["message"]
 
 
-def test_without_time_nothing_is_begun():
+def test_the_search_for_other_minima_is_skipped_without_time_left():
     asked = build_convex(load_spec("specs/heater.yaml"))
     with time_limit(0.01):
         entry, (found,) = asked.foresight.foreseen(np.ones((SAMPLES, 1)), ())
@@ -121,14 +121,14 @@ def test_without_time_nothing_is_begun():
 
 
 @pytest.mark.slow
-def test_runs_that_begin_at_the_truth_say_how_many_would_end_elsewhere(monkeypatch):
+def test_simulated_runs_state_how_many_full_searches_end_in_another_minimum(monkeypatch):
     monkeypatch.setattr(simulation, "_SEARCHED", 5)
     spec = load_spec(
         "specs/heater.yaml", ["simulation.runs=3", "experiment.samples=240", "signal.samples=240"]
     )
     result = simulate(spec).result
     searched = result["simulation"]["inputs"]["design"]["searched"]
-    # The others are as likely, to a few tenths: nearly all records leave several, and some end there.
+    # Other minima are nearly as likely: almost all records have several, and some searches end there.
     assert searched["runs"] == 5
     assert searched["rivals"] >= 4
     assert 1 <= searched["elsewhere"] <= 4
@@ -145,7 +145,7 @@ OTHERS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", OTHERS)
-def test_all_kinds_of_experiments_are_foreseen(kind):
+def test_other_minima_are_sought_for_all_kinds_of_experiments(kind):
     assert "rivals" in solved(OTHERS[kind])[0]["foreseen"]
 
 
@@ -168,15 +168,15 @@ COVARIANCE = (
     ("stated", "theta", "missed"),
     [
         (INTERVALS, {"gain": 2.4, "time_constant": 143.0}, None),
-        (INTERVALS, {"gain": 2.62}, None),  # by its own deviation of 0.01
+        (INTERVALS, {"gain": 2.62}, None),  # beyond 2.6 by two standard deviations of 0.01
         (INTERVALS, {"gain": 2.7}, ["gain"]),
-        (INTERVALS, {"dead_time": 30.0}, ["dead_time"]),  # is not drawn
+        (INTERVALS, {"dead_time": 30.0}, ["dead_time"]),  # has no interval
         (COVARIANCE, {"gain": 2.4, "time_constant": 200.0}, None),
         (COVARIANCE, {"gain": 3.2}, ["gain", "time_constant", "dead_time"]),
         (COVARIANCE, {"gain": -2.0}, ["gain", "time_constant", "dead_time"]),
     ],
 )
-def test_estimates_within_the_stated_uncertainty_are_foreseen(stated, theta, missed):
+def test_parameters_outside_the_stated_uncertainty_are_listed(stated, theta, missed):
     spec = parse_spec(UNCERTAIN + stated)
     nominal = build_model(spec)
     values = dict(zip(nominal.names, nominal.theta.tolist(), strict=True)) | theta
@@ -188,7 +188,7 @@ def test_estimates_within_the_stated_uncertainty_are_foreseen(stated, theta, mis
 
 
 PERIOD = 60
-# The same every 60 samples: a dead time of a period more differs in the first of 25 periods only.
+# The input has a period of 60: a dead time longer by a period differs in the first of 25 periods only.
 ONCE = np.repeat(np.random.default_rng(8).choice([-1.0, 1.0], PERIOD // 2), 2)
 WITHIN = "uncertainty={intervals: {K: [1.5, 2.7], T: [120, 240], L: [15, 35]}, scenarios: 3, fresh: 0}"
 SPREAD = (
@@ -203,9 +203,9 @@ def heater(*overrides):
 
 
 def record(seed, folder):
-    """A record of the true heater that begins at rest, and its expected excess in -2 log likelihood."""
+    """A record of the heater from rest, and the expected excess of the later dead time."""
     u = np.tile(0.17 * ONCE, 25)
-    y, late = (HEATER[0] * plainly(HEATER[1], L, u) for L in (HEATER[2], HEATER[2] + PERIOD * H))
+    y, late = (HEATER[0] * held_response(HEATER[1], L, u) for L in (HEATER[2], HEATER[2] + PERIOD * H))
     noise = np.sqrt(VARIANCE) * np.random.default_rng(seed).standard_normal(u.size)
     path = folder / "record.csv"
     rows = np.column_stack([H * np.arange(u.size), u, y + noise])
@@ -216,15 +216,15 @@ def record(seed, folder):
 @pytest.mark.parametrize(
     ("admitted", "home", "rivals", "ruled_out"),
     [
-        ("abc", "a", None, {}),  # as it was
+        ("abc", "a", None, {}),  # all are admitted
         ("ac", "a", {"c": 9.0}, {"b": 5.0}),
         ("bc", "b", {"c": 4.0}, {"a": -5.0}),
         ("c", "c", {}, {"a": -9.0, "b": -4.0}),
-        ("", "a", None, {}),  # the data refute it
+        ("", "a", None, {}),  # none is admitted
     ],
 )
-def test_the_likeliest_that_is_admitted_is_taken(admitted, home, rivals, ruled_out):
-    """Of three minima; excesses count from the one that is taken."""
+def test_the_most_likely_admitted_minimum_is_taken(admitted, home, rivals, ruled_out):
+    """There are three minima; excesses are relative to the one that is taken."""
 
     def estimate(theta, others=()):
         def with_rivals(rivals):
@@ -242,7 +242,7 @@ def test_the_likeliest_that_is_admitted_is_taken(admitted, home, rivals, ruled_o
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [WITHIN, pytest.param(SPREAD, marks=pytest.mark.slow)])
-def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
+def test_a_minimum_outside_the_stated_uncertainty_does_not_affect_the_verdict(known, tmp_path):
     path, excess = record(5, tmp_path)
     assert excess < 2.0 * np.log(1000.0)
     assert assess(heater(), path).verdict == "undecided"
@@ -255,7 +255,7 @@ def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_likeliest_of_all_is_not_taken_where_the_plant_cannot_be_that(tmp_path):
+def test_the_most_likely_minimum_is_not_taken_outside_the_stated_uncertainty(tmp_path):
     astray = 0
     for seed in range(3):
         path, _ = record(seed, tmp_path)
@@ -268,7 +268,7 @@ def test_the_likeliest_of_all_is_not_taken_where_the_plant_cannot_be_that(tmp_pa
 
 
 @pytest.mark.slow
-def test_knowledge_that_the_data_refute_rules_nothing_out(tmp_path):
+def test_a_stated_uncertainty_that_the_data_refute_rules_nothing_out(tmp_path):
     wrong = ["plant.parameters.L=100", "uncertainty={intervals: {L: [95, 105]}, scenarios: 3, fresh: 0}"]
     path, _ = record(6, tmp_path)
     identification = identify(heater(*wrong), path).result["identification"]
@@ -278,7 +278,7 @@ def test_knowledge_that_the_data_refute_rules_nothing_out(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_foreseen_heeds_it_too(tmp_path):
+def test_minima_outside_the_stated_uncertainty_are_not_predicted(tmp_path):
     u = np.tile(0.17 * ONCE, 25)
     path = tmp_path / "u.csv"
     np.savetxt(path, np.column_stack([H * np.arange(u.size), u]), delimiter=",", header="t,u", comments="")

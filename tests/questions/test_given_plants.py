@@ -1,4 +1,4 @@
-"""The plants that `uncertainty` draws or lists, and a given excitation at them, each as if alone."""
+"""Plants that `uncertainty` draws or lists, and the accuracy of a given excitation at each of them."""
 
 import itertools
 
@@ -11,7 +11,7 @@ from inputdesign_cli.questions.least_cost.build import build_convex
 from tests.support.refusals import code_of, refusal
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS as EVERYWHERE
 
-# Between samples a dead time brings a zero near -1, where r_adm would be that of `uncertainty.floor`.
+# A dead time between samples gives a zero near -1, where `uncertainty.floor` would set r_adm.
 PROCESS = EVERYWHERE.replace("relative: 0.1", "relative: 0.1, band: [0, 0.5]")
 
 WHITE = "spectrum={given: {type: white, power: 3}}"
@@ -23,7 +23,7 @@ def analysed(text, *overrides):
 
 
 def alone(text, values, *overrides):
-    """The ratio where a plant of other parameters is that of the spec."""
+    """The worst ratio of the spec with other parameters of its plant."""
     plants = {
         FIRST: lambda b1=3.6, f1=-0.7: f"plant={{B: [0, {b1}], F: [1, {f1}]}}",
         LOOP: lambda b1=0.5, f1=-0.8: f"plant={{B: [0, {b1}], F: [1, {f1}]}}",
@@ -43,7 +43,7 @@ def alone(text, values, *overrides):
         pytest.param(PROCESS, WHITE, marks=pytest.mark.slow),
     ],
 )
-def test_every_plant_has_the_ratio_that_it_has_alone(text, given, tmp_path):
+def test_each_scenario_has_the_worst_ratio_of_a_spec_with_this_plant(text, given, tmp_path):
     if given == "signal":
         name = "r1" if text == LOOP else "u1"
         record = np.random.default_rng(0).choice([-1.0, 1.0], 400)
@@ -64,7 +64,7 @@ def test_every_plant_has_the_ratio_that_it_has_alone(text, given, tmp_path):
     )
 
 
-def test_the_worst_plant_of_a_box_is_searched():
+def test_the_search_over_a_box_finds_its_worst_corner():
     box = {"b1": [3.0, 4.0], "f1": [-0.75, -0.65]}
     stated = f"uncertainty={{intervals: {box}, worst_case: 0.95, scenarios: 5, fresh: 20}}"
     robust = analysed(FIRST, stated).result["robust"]
@@ -76,7 +76,7 @@ def test_the_worst_plant_of_a_box_is_searched():
     assert robust["fresh"]["largest"] <= robust["searched"]["share"]
 
 
-def test_the_worst_plants_are_left_out():
+def test_discard_leaves_out_the_worst_scenarios():
     stated = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 20, fresh: 0%s}}"
     every = np.sort(analysed(FIRST, stated % "").tables["scenarios"].columns["share"])
     fewer = analysed(FIRST, stated % ", discard: 0.2")
@@ -84,16 +84,16 @@ def test_the_worst_plants_are_left_out():
     assert fewer.result["robust"]["discarded"] == 4
 
 
-def test_a_risk_takes_as_many_plants_as_a_series_of_trials():
+def test_a_risk_takes_the_fewest_plants_that_detect_it_with_probability_0_999():
     robust = analysed(FIRST, f"uncertainty={{covariance: {COVARIANCE}, risk: 0.2, fresh: 0}}").result[
         "robust"
     ]
     assert 0.8 ** robust["scenarios"] <= 1e-3 < 0.8 ** (robust["scenarios"] - 1)
 
 
-def test_fresh_plants_are_counted():
+def test_fresh_plants_that_miss_the_accuracy_are_counted():
     ratio = analysed(FIRST).result["model_error"]["worst_ratio"]
-    asked = f"accuracy.model_error.relative={0.02 * ratio}"  # that of the spec is just served
+    asked = f"accuracy.model_error.relative={0.02 * ratio}"  # the nominal plant just meets it
     found = analysed(FIRST, asked, "uncertainty={intervals: {b1: [3.0, 4.2]}, scenarios: 2, fresh: 60}")
     fresh = found.result["robust"]["fresh"]
     assert fresh["draws"] == 60
@@ -101,15 +101,15 @@ def test_fresh_plants_are_counted():
 
 
 @pytest.mark.parametrize("verb", [analyse, solve, simulate])
-def test_other_commands_look_at_the_plants_too(verb):
+def test_analyse_solve_and_simulate_evaluate_the_scenarios(verb):
     overrides = [WHITE, "signal=null", "uncertainty={scenarios: [{b1: 3}]}", "simulation={runs: 4, seed: 1}"]
     found = verb(parse_spec(FIRST, overrides=overrides)).result
     assert found["robust"]["scenarios"] == 1
     assert ("simulation" in found) == (verb is simulate)
 
 
-def test_a_plant_whose_parameters_are_not_told_is_an_error():
-    """Two sinusoids of which one is at the zero of the other plant."""
+def test_an_excitation_without_information_on_a_plant_with_scenarios_is_refused():
+    """One sinusoid does not determine three coefficients."""
     zero = "plant={B: [0, 1, 1.0, 0.5]}"
     sine = "spectrum={given: {type: multisine, frequencies: [0.3], amplitudes: [1]}}"
     assert (
@@ -118,8 +118,8 @@ def test_a_plant_whose_parameters_are_not_told_is_an_error():
     )
 
 
-def test_the_plant_that_a_sinusoid_at_its_zero_leaves_open_is_named():
-    """G vanishes at pi/2, and with it what the output tells of f1; all of the plant of the spec is known."""
+def test_a_scenario_with_a_zero_at_the_given_sinusoid_is_named():
+    """With b2 = 0, G and the information on f1 vanish at pi/2; the nominal plant is identifiable."""
     text = "plant: {B: [0, 1, 1, 1], F: [1, -0.5], known: [b1, b3]}\nnoise: {variance: 1}\n"
     text += "experiment: {samples: 500}\naccuracy: {standard_deviation: {f1: 0.1}}\n"
     sine = f"spectrum={{given: {{type: multisine, frequencies: [{np.pi / 2}], amplitudes: [1]}}}}"
@@ -128,7 +128,7 @@ def test_the_plant_that_a_sinusoid_at_its_zero_leaves_open_is_named():
     assert "b2 = 0, f1 = -0.5" in found.message
 
 
-def test_the_criterion_of_a_given_excitation_is_told():
+def test_the_criterion_of_a_given_excitation_has_its_closed_form():
     """White noise of power 3 into b1 q^-1 without dynamics: M = 3 N / variance."""
     overrides = ["plant={B: [0, 2]}", "noise={variance: 0.5}", "experiment={samples: 50}"]
     for letter, value in {"D": np.log(300.0), "A": -1 / 300, "E": 300.0, "T": 300.0}.items():
@@ -146,7 +146,7 @@ def test_the_criterion_of_a_given_excitation_is_told():
         "intervals: {b1: [3.3, 3.9], f1: [-0.75, -0.65]}",
     ],
 )
-def test_plants_are_drawn_from_what_is_known(prior):
+def test_plants_are_drawn_with_the_stated_mean_and_spread(prior):
     spec = parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, scenarios: 150}}"])
     thetas = build_convex(spec).asked.plants.batch.thetas
     assert thetas.shape == (150, 3)
@@ -158,7 +158,7 @@ def test_plants_are_drawn_from_what_is_known(prior):
     np.testing.assert_array_equal(thetas, again)
 
 
-def test_a_record_and_a_model_file_tell_how_well_the_plant_is_known(tmp_path):
+def test_a_record_or_a_model_file_sets_the_spread_of_the_plants(tmp_path):
     rng = np.random.default_rng(1)
     np.savetxt(tmp_path / "first.csv", rng.normal(size=400), header="u", comments="")
     (tmp_path / "model.yaml").write_text(
@@ -170,7 +170,7 @@ def test_a_record_and_a_model_file_tell_how_well_the_plant_is_known(tmp_path):
         if "model" in asked:
             assert thetas.std(axis=0) == pytest.approx([0.1, 0.0316, 0.02], rel=0.2)
         else:
-            # White input of power one: the variance of b1 is about that of a mean of 400 samples or more.
+            # White input of power one: the deviation of b1 is of the order of 1 / sqrt(400).
             assert 0.02 < thetas[:, 0].std() < 0.2
     moved = "estimate: {parameters: {b1: 4.6, c1: -0.9, f1: -0.7}, covariance: " + COVARIANCE + "}"
     (tmp_path / "model.yaml").write_text(moved)
@@ -191,8 +191,8 @@ def test_the_risk_sets_the_number_of_plants(order, risk, number):
     ("text", "intervals", "name"),
     [(EVERYWHERE, "dead_time: [-1, 4]", "dead_time"), (PHYSICAL, "K: [-1, 3]", "K")],
 )
-def test_what_is_no_plant_is_drawn_again_and_counted(text, intervals, name):
-    """A fifth of the interval is a negative dead time; the root of a negative number is no gain."""
+def test_draws_that_are_no_plants_are_replaced_and_counted(text, intervals, name):
+    """A fifth of the interval has a negative dead time; a gain of sqrt(K) needs K >= 0."""
     prior = f"uncertainty={{intervals: {{{intervals}}}, scenarios: 40, seed: 1}}"
     batch = build_convex(parse_spec(text, overrides=[prior])).asked.plants.batch
     assert len(batch.plants) == 40
@@ -201,8 +201,8 @@ def test_what_is_no_plant_is_drawn_again_and_counted(text, intervals, name):
     assert np.all(batch.thetas[:, index] >= 0.0)
 
 
-def test_unstable_loops_are_drawn_again_and_counted():
-    """In this loop f1 < -1.02 or so is unstable."""
+def test_draws_with_unstable_loops_are_replaced_and_counted():
+    """This loop is unstable for f1 below about -1.02."""
     prior = "intervals: {f1: [-1.2, -0.6]}, scenarios: 60, seed: 3"
     batch = build_convex(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}}}"])).asked.plants.batch
     assert len(batch.plants) == 60

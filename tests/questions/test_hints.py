@@ -1,4 +1,4 @@
-"""What a hint says would do does: specs that are refused, changed as they are told to be."""
+"""Remedies of hints work: refused specs succeed once they are changed as the hint proposes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ accuracy: {model_error: {relative: 0.1}}
 
 
 @pytest.mark.parametrize("spectrum", [[], ["spectrum={type: fir, order: 6}"], ["spectrum={type: free}"]])
-def test_both_ways_around_a_pole_at_zero_can_be_gone(spectrum):
+def test_both_remedies_for_a_pole_at_frequency_zero_work(spectrum):
     told = refusal(lambda: solve(parse_spec(INTEGRATING, overrides=spectrum)))
     assert told.code == "infinite-information"
     found = re.findall(r"(limits|spectrum): (\{[^}]*\})", told.hint)
@@ -31,7 +31,7 @@ def test_both_ways_around_a_pole_at_zero_can_be_gone(spectrum):
 
 
 @pytest.mark.parametrize(("relative", "told"), [(0.1, False), (0.99, False), (1.0, True), (10, True)])
-def test_an_error_as_large_as_the_plant_is_remarked_upon(relative, told):
+def test_an_admissible_error_as_large_as_the_plant_is_reported(relative, told):
     spec = parse_spec(
         INTEGRATING.replace("-1]", "-0.5]"), overrides=[f"accuracy.model_error.relative={relative}"]
     )
@@ -51,8 +51,8 @@ solver: {any_spectrum: false}
 
 @pytest.mark.parametrize("late", [20, 52, 56, 57, 57.5, 59.9])
 @pytest.mark.parametrize("held", [True, False], ids=["held", "in q^-1"])
-def test_no_record_is_handed_over_that_costs_a_thousand_times_the_design(late, held):
-    """Few samples lie behind the dead time, down to one, which tells two or three parameters at no power."""
+def test_no_record_costs_a_thousand_times_its_design(late, held):
+    """Few samples follow the dead time; a single one cannot determine two or three parameters."""
     words = "parameters: {K: 2, T: 6, L: %g}, continuous: {numerator: [K], denominator: [T, 1], delay: L}, "
     zeros = ", ".join(["0"] * int(late + 1))
     text = (words % late + "sample: zoh", "K") if held else (f"B: [{zeros}, 0.3], F: [1, -0.8]", "f1")
@@ -68,8 +68,8 @@ def test_no_record_is_handed_over_that_costs_a_thousand_times_the_design(late, h
         assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
-def test_what_would_do_is_looked_for_within_seconds(monkeypatch):
-    """That nothing meets the accuracy is proved before, with the same numbers."""
+def test_the_search_for_a_remedy_is_limited_in_time(monkeypatch):
+    """The proof of infeasibility comes first and has the same numbers."""
     text = (
         PLANT.replace("500", "100") + "accuracy: {model_error: {relative: 0.05}}\nspectrum: {type: white}\n"
     )
@@ -120,7 +120,7 @@ def text_of(name):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_key_that_was_forgotten_is_named_and_helps(name):
+def test_a_forgotten_sample_zoh_is_named_and_makes_the_spec_valid(name):
     overrides = CASES[name]
     found = complaint(text_of(name), overrides)
     assert "sample: zoh" in found.hint
@@ -132,7 +132,7 @@ def test_the_key_that_was_forgotten_is_named_and_helps(name):
 
 @pytest.mark.parametrize("sample_time", [0.01, 4.76, 300])
 @pytest.mark.parametrize("name", ["lines", "no spectrum"])
-def test_the_band_that_is_proposed_can_be_kept(name, sample_time):
+def test_the_band_that_a_hint_proposes_is_valid(name, sample_time):
     own = [f"sample_time={sample_time}", "plant.continuous.dead_time=0"]
     overrides = [*own, *(["limits={band: [0, 1.0e-9]}"] if name == "no spectrum" else [])]
     hint = complaint(text_of(name), overrides).hint

@@ -1,4 +1,4 @@
-"""Estimates from records: they come back from what is written, and records that tell nothing are refused."""
+"""Estimates from records: written models reproduce them, and records without information are refused."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def record(spec, samples=500, seed=0, power=1.0):
 
 
 def recorded_in_s(spec, samples, seed):
-    """The same for a plant in s, held inputs or their band-limited interpolation, by scipy's simulation."""
+    """Columns for a plant in s with held or band-limited white inputs, by scipy's simulation."""
     rng, matrix, hold = np.random.default_rng(seed), spec.plant.continuous, spec.plant.sample == "zoh"
     step, finer = spec.sample_time, 1 if hold else 40
     u = rng.standard_normal((samples, 2))
@@ -58,7 +58,7 @@ def recorded_in_s(spec, samples, seed):
 
 
 def recorded_in_loop(spec, samples, power):
-    """u and y of the loop of a spec, under white r; what it is made of is tested with the loop."""
+    """u and y of the loop of a spec under white r; other tests check the loop itself."""
     experiment, rng = build_experiment(spec), np.random.default_rng(1)
     model = experiment.model
     e = rng.standard_normal((samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
@@ -71,7 +71,7 @@ def codes(results):
 
 
 def check_truth(found, model, deviations=4.5):
-    """The estimate is that of this model."""
+    """Asserts that the estimate is within some standard deviations of this model."""
     for name, true in zip(model.names, model.theta, strict=True):
         assert abs(found["theta"][name] - true) < deviations * found["standard_deviation"][name]
 
@@ -92,8 +92,8 @@ PASTED = {
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("name", PASTED)
-def test_the_blocks_can_be_pasted(name, write):
-    """What is estimated is true, and the spec with the blocks has just this model, and can be solved."""
+def test_the_blocks_of_model_yaml_give_a_spec_with_the_estimated_model(name, write):
+    """The estimate is near the true model, and the spec with the blocks has it as its plant and is valid."""
     spec, made = PASTED[name]
     model = build_model(spec)
     outcome = identify(spec, write(made(spec)))
@@ -112,8 +112,8 @@ def test_the_blocks_can_be_pasted(name, write):
     np.testing.assert_allclose(product, np.eye(len(product)), atol=1e-6)
 
 
-def test_a_top_up_makes_up_for_what_is_missing(write):
-    """Cheaper than the experiment from scratch on the same model."""
+def test_a_top_up_just_meets_the_accuracy_that_the_data_miss(write):
+    """It is cheaper than an experiment from scratch for the same model."""
     spec = load_spec(SPEC, ["spectrum.order=5", "accuracy.model_error={relative: 0.03, alpha: 2.45}"])
     short = assess(spec, write(record(spec, seed=2, power=0.09)))
     assert not short.met
@@ -127,7 +127,7 @@ def test_a_top_up_makes_up_for_what_is_missing(write):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("relative", "enough"), [(2.0, True), (0.1, False)])
-def test_plants_in_s_are_assessed(relative, enough, write):
+def test_assess_gives_met_or_missed_for_a_plant_in_continuous_time(relative, enough, write):
     spec = parse_spec(COMMON, overrides=[*HELD, f"accuracy.model_error.relative={relative}"])
     found = assess(spec, write(recorded_in_s(spec, 500, 1)))
     assert found.met == enough
@@ -136,7 +136,7 @@ def test_plants_in_s_are_assessed(relative, enough, write):
 
 
 @pytest.mark.slow
-def test_a_held_input_taken_for_its_interpolation_is_told(write):
+def test_a_held_input_in_a_band_limited_model_is_reported(write):
     held = recorded_in_s(parse_spec(EACH, overrides=HELD), 1500, 1)
     assert "input-taken-as-band-limited" in codes(identify(parse_spec(EACH), write(held)))
 
@@ -155,7 +155,7 @@ LOOPS = {
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", LOOPS)
 def test_a_loop_is_identified_directly_and_topped_up(name, write):
-    """u(t) answers e(t), which is no fault of the model; the plant alone may be unstable."""
+    """u(t) depends on e(t), which fails no test of the model; the plant alone may be unstable."""
     path, samples, power, overrides = LOOPS[name]
     spec = load_spec(path, overrides)
     data = write(recorded_in_loop(spec, samples, power))
@@ -172,7 +172,7 @@ def test_a_loop_is_identified_directly_and_topped_up(name, write):
         assert assess(load_spec(path, ["accuracy={model_error: {relative: 5}}"]), data).met
 
 
-def test_the_files_hold_what_they_say(write):
+def test_written_predictions_simulations_and_residuals_agree_with_the_model(write):
     outcome = identify(load_spec(ARX), write(record(load_spec(ARX))))
     columns = {name: np.asarray(values) for name, values in outcome.tables["fit"].columns.items()}
     model = build_model(load_spec(ARX)).at(list(outcome.result["identification"]["theta"].values()))
@@ -186,7 +186,7 @@ def test_the_files_hold_what_they_say(write):
         off = np.linalg.norm(columns[f"y{i}"] - expected)
         share = 100 * (1 - off / np.linalg.norm(columns[f"y{i}"] - columns[f"y{i}"].mean()))
         assert outcome.result["identification"]["fit_percent"][i - 1] == pytest.approx(share)
-    # What the estimate leaves unexplained, sent through its noise model, is the rest of the output.
+    # The residuals through the noise model are the output minus the simulation.
     rest = np.stack([columns["y1"], columns["y2"]], axis=1) - caused
     np.testing.assert_allclose(noise, rest, atol=1e-8)
     assert {f"cross_correlation_{i}{j}" for i in (1, 2) for j in (1, 2)} < set(
@@ -196,7 +196,7 @@ def test_the_files_hold_what_they_say(write):
 
 
 @pytest.mark.slow
-def test_offsets_and_outliers_are_told(write):
+def test_offsets_and_outliers_are_reported(write):
     columns = record(load_spec(SPEC), seed=3)
     columns["y1"] = columns["y1"] + 100.0
     columns["u1"][40] = 60.0
@@ -211,10 +211,10 @@ def test_offsets_and_outliers_are_told(write):
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("samples", "before", "zero"), [(150, 1000, 0.93), (50, 0, 0.9)])
 @pytest.mark.parametrize("seed", [2, 3])
-def test_noise_from_before_the_record_is_no_start_in_motion(write, seed, samples, before, zero):
-    """A zero of C is remembered beyond the first tenth of a record; the plant was at rest.
+def test_noise_from_before_the_record_is_not_taken_for_a_start_in_motion(write, seed, samples, before, zero):
+    """A zero of C has effects beyond the first tenth of a record; the plant was at rest.
 
-    Nor does the estimate of C run to the unit circle, which would remember for ever what was before it.
+    The estimate of C does not reach the unit circle, where such effects would never fade.
     """
     u, e = np.random.default_rng(seed).standard_normal((2, before + samples))
     u = 0.3 * u if before == 0 else u
@@ -225,7 +225,7 @@ def test_noise_from_before_the_record_is_no_start_in_motion(write, seed, samples
     assert not found.result["identification"]["free_start"]
     assert abs(found.result["identification"]["theta"]["c1"]) < 1 - 1 / samples
     assert "start-estimated" not in codes(found)
-    if before == 0:  # where the first residual leaves no doubt it is said
+    if before == 0:  # a first residual of many deviations is reported
         columns["y1"] = columns["y1"] + 100.0
         start = codes(identify(load_spec(SPEC), write(columns)))["start-estimated"]
         assert abs(start.figures["first_residual"]) > 3.0 * start.figures["noise"]
@@ -233,7 +233,7 @@ def test_noise_from_before_the_record_is_no_start_in_motion(write, seed, samples
 
 @pytest.mark.parametrize("others", [(), pytest.param((False, True), marks=pytest.mark.slow)])
 def test_an_operating_point_does_not_move_the_estimate(write, others):
-    """Known, unknown, or its means removed: the same model, within a standard deviation."""
+    """A known point, an unknown one and removed means give the same model within a standard deviation."""
     columns = record(load_spec(SPEC), seed=3)
     plain = identify(load_spec(SPEC), write(columns)).result["identification"]
     gain = 3.6 / 0.3
@@ -278,7 +278,7 @@ def test_an_unknown_channel_is_refused(data):
 @pytest.mark.parametrize("first", [[1.0], [1.0, 0.5], None])
 @pytest.mark.parametrize("samples", [20, 200])
 def test_an_output_without_noise_is_refused(samples, first, plant, write):
-    """The start alone explains it, or the input, to the last digit: nothing to gain, nothing to divide by."""
+    """The start or the input explains the output to the last digit, so the variance of the noise is zero."""
     spec = parse_spec(f"plant: {plant}\nnoise: {{variance: 1}}\nexperiment: {{samples: 200}}\n", design=False)
     u, y = np.eye(1, samples)[0], np.zeros(samples)
     if first is None:
@@ -291,7 +291,7 @@ def test_an_output_without_noise_is_refused(samples, first, plant, write):
     assert caught.value.diagnostics[0].code == "noise-free-data"
 
 
-def test_there_must_be_a_target(data):
+def test_assess_without_an_accuracy_to_meet_is_refused(data):
     spec = load_spec(SPEC, ["accuracy={criterion: D}", "limits={input_power: 1}"])
     with pytest.raises(SpecError) as caught:
         assess(spec, data)

@@ -1,4 +1,4 @@
-"""Plants that integrate, in a loop: what cannot be promised at the pole is refused, the rest holds."""
+"""Plants that integrate: bounds on the error at the pole are refused, and other designs hold."""
 
 import re
 
@@ -39,13 +39,13 @@ ACCURACY = [
 
 
 def refused(text: str, *overrides: str) -> Diagnostic:
-    """The one complaint about a spec that cannot be solved."""
+    """The only diagnostic of a spec that cannot be solved."""
     return refusal(lambda: solve(parse_spec(text, overrides=list(overrides))))
 
 
 @pytest.mark.parametrize("accuracy", ACCURACY)
 @pytest.mark.parametrize("plant", [INTEGRATOR, TWO], ids=["one", "two"])
-def test_no_bound_at_the_estimated_pole(plant, accuracy):
+def test_a_bound_on_the_error_at_an_estimated_pole_is_refused_with_a_band(plant, accuracy):
     found = refused(f"{plant}accuracy: {accuracy}\n")
     assert found.code == "unbounded-error"
     assert "at 0 rad/s" in found.message
@@ -55,7 +55,7 @@ def test_no_bound_at_the_estimated_pole(plant, accuracy):
 
 
 @pytest.mark.parametrize("bound", ["relative: 0.1", "absolute: 0.1"])
-def test_the_band_that_is_proposed_can_be_kept(bound):
+def test_a_design_for_the_proposed_band_just_meets_its_bound(bound):
     """r_u by central differences of G and the printed covariance, on a fine grid of the band."""
     accuracy = f"{{model_error: {{{bound}, alpha: 2, band: [0.03142, 3.1415]}}}}"
     result = solve(parse_spec(f"{INTEGRATOR}accuracy: {accuracy}\n")).result
@@ -79,15 +79,15 @@ def test_the_band_that_is_proposed_can_be_kept(bound):
     assert np.max(r_u / r_adm) == pytest.approx(1.0, abs=1e-4)
 
 
-def test_a_criterion_does_not_ask_for_the_pole():
+def test_a_criterion_for_an_integrator_needs_no_band():
     result = solve(parse_spec(f"{INTEGRATOR}accuracy: {{criterion: D}}\nlimits: {{excitation_power: 1}}\n"))
     assert result.result["status"] == "optimal"
     assert np.all(np.isfinite(result.tables["bound"].columns["r_u"]))
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0], ids=["at zero", "at the Nyquist frequency"])
-def test_a_pole_that_the_weight_hides_is_no_pole(sign):
-    """W (G' / G) in closed form, -+q and W / b, with the printed covariance and over the whole band."""
+def test_a_weight_with_a_zero_at_the_pole_keeps_the_error_bounded(sign):
+    """W G' / G is -q and W / b in closed form, taken with the printed covariance over the whole band."""
     spec = f"""
 plant: {{A: [1, {-sign}], B: [0, 0.5]}}
 noise: {{variance: 0.1}}
@@ -124,7 +124,7 @@ IN_WORDS = [
     "{parameters: {k: 0.05, T: 10}, sample: zoh, "
     "continuous: {numerator: [k], denominator: [[1, 0], [T, 1]]}}",
     "{continuous: {numerator: [0.005], denominator: [1, 0.1, 0]}, sample: zoh, known: [a0]}",
-    # behind the hold, with E = exp(-2/T): poles 1 and E, and the numerator of the response to a step
+    # the plant behind the hold, with E = exp(-2/T): poles 1 and E, numerator from the step response
     "{parameters: {k: 0.05, E: 0.8187307530779818}, F: [1, -1 - E, E], "
     "B: [0, k*(2 + 2/log(E)*(1 - E)), -k*(2*E + 2/log(E)*(1 - E))]}",
 ]
@@ -135,7 +135,7 @@ PI = "experiment: {samples: 600, controller: {numerator: [0.5, -0.48], denominat
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("loop", [None, PI], ids=["open loop", "PI"])
-def test_one_tank_in_three_words_is_one_design(loop):
+def test_three_parametrisations_of_one_tank_have_the_same_cost(loop):
     rest = TANK if loop is None else TANK.replace("experiment: {samples: 600}", loop)
     costs = [solve(parse_spec(f"plant: {plant}{rest}")).result["cost"] for plant in IN_WORDS]
     np.testing.assert_allclose(costs, costs[0], rtol=1e-9)
@@ -174,21 +174,21 @@ HIDDEN = [
 
 @pytest.mark.parametrize("plant", HIDDEN, ids=["states", "in s", "in q^-1"])
 @pytest.mark.parametrize("share", ["1", "1e-3", "1e-5", "1e-8"])
-def test_an_integrator_however_weak_has_no_finite_information(plant, share):
+def test_an_integrator_of_any_strength_has_infinite_information_in_open_loop(plant, share):
     """The derivative with respect to k has the residue k * share at frequency zero."""
     found = refused(f"plant: {plant.replace('%s', share)}{WEAK}")
     assert found.code == "infinite-information"
     assert "about k" in found.message
 
 
-def test_an_integrator_that_no_input_reaches_tells_nothing():
+def test_an_integrator_that_no_input_reaches_does_not_change_the_cost():
     plain = "{parameters: {k: 0.1, a: 0.2}, sample: zoh, state_space: {A: [[-a]], B: [[k]], C: [[1]]}}"
     costs = [solve(parse_spec(f"plant: {p}{WEAK}")).result["cost"] for p in (HIDDEN[0] % "0", plain)]
     assert costs[0] == pytest.approx(costs[1], rel=1e-6)
 
 
-def test_noise_whose_free_pole_integrates_is_told_with_remedies_that_work():
-    """D with its root on the circle, known, is the integrator of drift: true."""
+def test_a_free_integrating_pole_of_the_noise_is_refused_with_remedies_that_work():
+    """A known root of D on the unit circle is the integrator of drift: true."""
     text = """
 plant: {B: [0, 1], F: [1, -0.7]}
 noise: {variance: 1, D: [1, -0.99999999]}
@@ -205,8 +205,8 @@ experiment: {samples: 500}
     assert known["cost"] == pytest.approx(drifting["cost"], rel=1e-5)
 
 
-def test_a_plant_in_continuous_time_that_integrates():
-    """Lines off zero; the record's own information is that of its samples, by the closed form of a sum."""
+def test_lines_for_an_integrator_in_continuous_time_have_the_closed_form_cost():
+    """The lines are off frequency zero; the record meets the accuracy by the information of its samples."""
     text = """
 sample_time: 0.5
 plant: {parameters: {k: 0.05}, continuous: {numerator: [k], denominator: [1, 0]}}
@@ -218,14 +218,14 @@ spectrum: {type: multisine, frequencies: [0.0837758, 0.335103]}
 signal: {type: multisine, samples: 600, seed: 1}
 """
     found = solve(parse_spec(text)).result
-    # N / sigma^2 sum |1 / jw|^2 p: the lower line tells more
+    # N / sigma^2 sum |1 / jw|^2 p: the lower line informs more
     assert found["cost"] == pytest.approx(0.04 / 600 / 0.001**2 * 0.0837758**2, rel=1e-6)
     assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
 @pytest.mark.parametrize("last", [0.0, -1.0], ids=["proportional", "integrates"])
 @pytest.mark.parametrize("drift", ["[true, false]", "[false, true]"])
-def test_drift_of_one_output_reaches_the_other_through_any_controller(drift, last):
+def test_drift_of_only_one_output_in_a_loop_is_refused_with_any_controller(drift, last):
     text = f"""
 plant:
   {{B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1, -0.2], [1, -0.8]]]}}
@@ -250,7 +250,7 @@ DRIFTING = "noise: {drift: true, variance: 0.04}\nexperiment: {samples: 300}\n"
 
 
 @pytest.mark.parametrize("plant", SUMS)
-def test_an_integrator_beside_noise_that_drifts_tells_as_much_everywhere(plant):
+def test_an_integrator_with_drifting_noise_has_equal_information_at_all_frequencies(plant):
     """(1 - q^-1) G = k q^-1: the information in k is N power / variance, whatever the spectrum."""
     asked = "accuracy: {standard_deviation: {k: 0.01}}\nspectrum: {type: multisine, lines: 20}\n"
     spec = parse_spec(f"plant: {plant}\n{DRIFTING}{asked}")
@@ -261,7 +261,7 @@ def test_an_integrator_beside_noise_that_drifts_tells_as_much_everywhere(plant):
 
 
 @pytest.mark.parametrize("plant", SUMS)
-def test_outputs_that_wander_without_end_are_refused(plant):
+def test_designs_with_infinite_output_power_are_refused(plant):
     found = refused(f"plant: {plant}\n{DRIFTING}accuracy: {{standard_deviation: {{k: 0.01}}}}\n")
     assert found.code == "infinite-output"
     assert "multisine" in found.hint

@@ -1,4 +1,4 @@
-"""Changes of load that no input shows, and lines in the data, from the file to the estimate."""
+"""Unmeasured load changes and linear trends in a record, from the file to the estimate."""
 
 import re
 from types import SimpleNamespace
@@ -27,7 +27,7 @@ accuracy: {{model_error: {{relative: 0.2, band: [0.001, 0.1]}}}}
 
 
 def rows_of(samples, at, seed):
-    """K/(T s + 1) e^-2s, inputs held for 15 to 45 samples, and from `at` on a load that acts with a lag."""
+    """(n, 3): time, u, y of K/(T s + 1) e^-2s, u held for 15 to 45 samples, a lagged load from `at`."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], samples), rng.integers(15, 46, samples))[:samples]
     pole = np.exp(-1.0 / T)
@@ -43,7 +43,7 @@ def saved(path, rows):
 
 
 def option_in(note):
-    """The rows that a note would leave out."""
+    """File, first and last of the rows that a note proposes to leave out."""
     name, first, last = re.search(r"--without (?:(\S+):)?(\d+)-(\d+)", note).groups("")
     return (name, int(first), int(last))
 
@@ -54,7 +54,7 @@ def shifts_in(notes):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [150, 260])
-def test_explore_leaves_it_out_and_finds_the_plant(at, tmp_path):
+def test_explore_leaves_out_a_level_shift_and_finds_the_plant(at, tmp_path):
     log = saved(tmp_path / "log.csv", rows_of(400, at, 2))
     found = explore([log], Preparation())
     assert not found.reasons
@@ -69,14 +69,14 @@ def test_explore_leaves_it_out_and_finds_the_plant(at, tmp_path):
     assert theta["K"] == pytest.approx(K, rel=0.03)
     assert abs(theta["K"] - K) < 3.5 * deviation["K"]
     assert abs(theta["T"] - T) < 3.5 * deviation["T"]
-    # The option does the same.
+    # The option --without gives the same estimate.
     again = explore([log], Preparation(without=((name, first, last),))).results.result
     assert again["identification"]["theta"] == pytest.approx(theta, rel=1e-6)
     assert not shifts_in(again["notes"])
 
 
 @pytest.mark.slow
-def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
+def test_identify_reports_a_level_shift_and_leaving_it_out_decides_the_verdict(tmp_path):
     log, spec = saved(tmp_path / "log.csv", rows_of(400, 200, 3)), parse_spec(SPEC)
     (told,) = shifts_in(identify(spec, log).result["notes"])
     judged = assess(spec, log)
@@ -89,7 +89,7 @@ def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
 
 
 def found_with(samples, places, split="halves"):
-    """What an exploration of so many samples would return that finds steps at these places."""
+    """A stand-in for an exploration of some samples that finds level shifts at these places."""
     shifts = tuple(
         LevelShift(
             0,
@@ -125,8 +125,8 @@ def found_with(samples, places, split="halves"):
         ([found_with(100, [40]), found_with(97, [70]), found_with(94, [20])], (100,), 0),
     ],
 )
-def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths, taken):
-    """Shifts that overlap, leave too little beside them, alone determine the plant, or have no end."""
+def test_level_shifts_are_left_out_if_the_rest_suffices(monkeypatch, tmp_path, answers, lengths, taken):
+    """Shifts overlap, leave too few samples, are all that determines the plant, or recur without end."""
     log = read_log(saved(tmp_path / "log.csv", rows_of(100, None, 1)), Preparation())
     given = iter(answers)
 
@@ -158,8 +158,8 @@ def log(path, slope, seed=4, samples=400):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("detrend", ["linear", "auto"])
-def test_a_line_that_is_taken_away_does_not_move_the_estimate(tmp_path, detrend):
-    """The plant makes a line of that of the input, which is not that through the output."""
+def test_removing_a_linear_trend_does_not_move_the_estimate(tmp_path, detrend):
+    """The removed trend of the input passes the plant; it is not the trend fitted to the output."""
     spec, told = parse_spec(LINEAR, design=False), []
     for slope in (0.01, 0.03):
         data = log(tmp_path / f"{slope}.csv", slope)
@@ -170,8 +170,8 @@ def test_a_line_that_is_taken_away_does_not_move_the_estimate(tmp_path, detrend)
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("gain", "code"), [(0.3, "noise-prevails"), (0.0, "output-unexplained")])
-def test_noise_that_wanders_farther_than_the_plant_does_not_hide_it(tmp_path, gain, code):
-    """The likelihood ratio of least squares on differences with the noise known: beyond chance, or not."""
+def test_random_walk_noise_larger_than_the_response_does_not_hide_the_gain(tmp_path, gain, code):
+    """Reference: the likelihood ratio by least squares on differences, with known noise."""
     rng = np.random.default_rng(11)
     samples, deviation = 600, 0.3
     u = np.repeat(rng.choice([-1.0, 1.0], samples // 10), 10)

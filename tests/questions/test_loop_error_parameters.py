@@ -1,4 +1,4 @@
-"""The closed-loop error: one design in all words of a plant, and controllers on simulated estimates."""
+"""The closed-loop error: equal designs for all parametrisations, and controllers from simulated estimates."""
 
 import numpy as np
 import pytest
@@ -31,35 +31,35 @@ EXACT = "accuracy.closed_loop_error.covariance=parametric"
 
 
 def losses(plant, *overrides, rest=REST):
-    """The value of the design, and what the model structure makes of white input."""
+    """The value of the design, and that of white input with the parametric covariance."""
     found = solve(parse_spec(f"plant: {plant}\n{rest}", overrides=overrides)).result
     return found["objective"]["value"], found["closed_loop_error"]["parametric"]["white"]["value"]
 
 
 def assert_same(found, within=1e-9):
-    """A design is as good as its tolerance; white input has the power that the design was given."""
+    """Asserts equal values, for designs within the solver's tolerance and for white input within `within`."""
     designs, white = np.array(found).T
     np.testing.assert_allclose(designs, designs[0], rtol=1e-7)
     np.testing.assert_allclose(white, white[0], rtol=within)
 
 
 def sampled(K, T, L, w):
-    """K exp(-L s) / (T s + 1) behind a hold over one, 2 < L < 3, by its response to a step."""
+    """K exp(-L s) / (T s + 1) behind a hold with sample time one, 2 < L < 3, by its step response."""
     q, E = np.exp(-1j * w), np.exp(-1 / T)
     late = np.exp(-(3 - L) / T)
     return K * q**3 * (1 - late + (late - E) * q) / (1 - E * q)
 
 
 @pytest.mark.parametrize("exact", [[], [EXACT]], ids=["asymptotic", "parametric"])
-def test_one_plant_in_five_words_is_one_design(exact):
+def test_five_parametrisations_of_one_plant_have_the_same_design(exact):
     assert_same([losses(plant, *exact) for plant in (WORDS[::2] if exact else WORDS)])
 
 
 @pytest.mark.parametrize(
     ("known", "free"), [("", [0, 1, 2]), (", known: [L]", [0, 1]), (", known: [K, T]", [2])]
 )
-def test_what_is_known_leaves_no_error(known, free):
-    """tr(W P) from differences of G, and means over a circle of 4096 points."""
+def test_known_parameters_add_nothing_to_the_parametric_error(known, free):
+    """Reference: tr(W P) from finite differences of G and means over 4096 points of the unit circle."""
     w = 2 * np.pi * (np.arange(4096) + 0.5) / 4096
     nominal, step = np.array([2.0, 5.0, 2.3]), 1e-5
     slopes = [
@@ -74,8 +74,8 @@ def test_what_is_known_leaves_no_error(known, free):
     assert losses(f"{{{PARAMETERS}{known}, {IN_S}}}")[1] == pytest.approx(expected, rel=1e-8)
 
 
-def test_the_asymptotic_design_does_not_ask_what_is_known():
-    """The covariance of a model of high order knows no parameters."""
+def test_the_asymptotic_design_does_not_depend_on_known_parameters():
+    """The asymptotic covariance is that of a model of high order."""
     free, known = (losses(f"{{{PARAMETERS}{words}, {IN_S}}}") for words in ("", ", known: [L]"))
     assert known[0] == pytest.approx(free[0], rel=1e-12)
     assert known[1] < 0.6 * free[1]
@@ -84,8 +84,8 @@ def test_the_asymptotic_design_does_not_ask_what_is_known():
 @pytest.mark.parametrize(
     "law", ["{minimum_variance: true}", "{internal_model: {numerator: [0.5], denominator: [1, -0.5]}}"]
 )
-def test_a_gain_is_coloured_noise(law):
-    """x+ = a x + b u + k e is ARMAX with C = 1 + (k - a) q^-1, whose coefficients are as many."""
+def test_a_kalman_gain_has_the_design_of_an_armax_model(law):
+    """x+ = a x + b u + k e is ARMAX with C = 1 + (k - a) q^-1 and as many coefficients."""
     rest = REST.replace("{model_reference: {numerator: [0, 0, 0, 0, 0.2], denominator: [1, -0.8]}}", law)
     states = (
         "{parameters: {a: 0.8, b: 0.5, k: 0.3}, "
@@ -111,8 +111,8 @@ def simulated(*overrides):
 
 
 @pytest.mark.parametrize("true", ["{A: [1, -0.8], B: [0, 1, -1.5]}", "{A: [1, -0.7], B: [0, 1, -2.5]}"])
-def test_runs_with_a_zero_outside_are_stable_and_as_theory_says(true):
-    """The second plant is not the one of the spec: its own zero is kept, by both controllers."""
+def test_simulated_non_minimum_phase_plants_are_stable_and_agree_with_theory(true):
+    """The second plant differs from the spec; both controllers keep its own zero."""
     found = simulated(f"simulation.plant={true}")
     for entry in found["simulation"]["inputs"].values():
         assert entry["unstable"] == 0
@@ -121,7 +121,7 @@ def test_runs_with_a_zero_outside_are_stable_and_as_theory_says(true):
     assert "notes" not in found
 
 
-def test_unstable_loops_are_said():
+def test_unstable_simulated_loops_are_counted_and_reported():
     found = simulated("noise.variance=10", "experiment.samples=60")
     inputs = found["simulation"]["inputs"]
     counts = [entry["unstable"] for entry in inputs.values()]
@@ -139,13 +139,13 @@ NAMED = ("plant={parameters: {b: 0.5}, A: [1, -0.8], B: [0, b, -0.75]}",)
     ("overrides", "code", "key"),
     [(UNSTABLE, "non-minimum-phase", "simulation.plant"), (NAMED, "not-supported", "plant")],
 )
-def test_what_cannot_be_simulated_is_refused(overrides, code, key):
+def test_plants_that_cannot_be_simulated_are_refused(overrides, code, key):
     found = refusal(lambda: simulated(*overrides))
     assert (found.code, found.key) == (code, key)
 
 
-def test_records_are_as_long_as_the_signal():
-    """A design without a length counts per sample; the signal has one."""
+def test_simulated_records_are_as_long_as_the_signal():
+    """The design without a length is per sample; the signal has 1000 samples."""
     long, found = simulated(), simulated("experiment=null", "signal.samples=1000")
     assert (found["samples"], found["simulation"]["samples"]) == (1, 1000)
     for name, entry in found["simulation"]["inputs"].items():
@@ -164,8 +164,8 @@ signal: {samples: 100, candidates: 1}
 
 
 @pytest.mark.parametrize("exact", [[], pytest.param([EXACT], marks=pytest.mark.slow)])
-def test_states_of_several_channels(exact):
-    """One input of two acts late; the same entries in s."""
+def test_states_and_transfer_functions_of_two_channels_have_the_same_design(exact):
+    """The entries in s are the transfer functions of the states."""
     parameters = "parameters: {k: 1.5, T: 4.0, c: 0.4}"
     words = [
         f"{{{parameters}, sample: zoh, state_space: {{A: [['-1/T', 0], [0, -0.5]], B: [[k/T, 0], [0, 1]], "
@@ -173,5 +173,5 @@ def test_states_of_several_channels(exact):
         f"{{{parameters}, sample: zoh, continuous: {{numerator: [[[k], [c]], [[0.3*k], [1]]], "
         "denominator: [[[T, 1], [1, 0.5]], [[T, 1], [1, 0.5]]]}}",
     ]
-    # The power of lines is that of the solver, which is known to the tolerance of designs.
+    # The powers of lines come from the solver and agree within its tolerance only.
     assert_same([losses(plant, *exact, rest=MATRIX) for plant in words], 1e-7 if exact else 1e-9)

@@ -27,7 +27,7 @@ signal: {candidates: 1}
 
 
 def peak(process, pid, *, period=1e-3):
-    """Of |S| without sampling, by the formula of the loop."""
+    """The peak of |S| in continuous time, by the formula of the loop."""
     w = np.geomspace(1e-3, 30.0, 20001) / process.dead_time
     s = 1j * w
     below = s if process.time_constant is None else process.time_constant * s + 1.0
@@ -40,7 +40,7 @@ def peak(process, pid, *, period=1e-3):
 @pytest.mark.parametrize(
     ("lag", "published"), [(1.0, 1.59), (8.0, 1.59), (None, 1.70)], ids=["lag", "slow", "integrator"]
 )
-def test_simc_has_the_peaks_that_its_author_prints(lag, published):
+def test_simc_has_the_sensitivity_peaks_that_skogestad_prints(lag, published):
     """Skogestad (2003), Table 1 for tau_c = theta: M_s = 1.59 where the lag is cancelled, 1.70 for k'/s."""
     process = Process(3.0, lag, 1.0)
     assert peak(process, tuned(process, Tuning(simc=Simc()))) == pytest.approx(published, abs=0.006)
@@ -48,7 +48,7 @@ def test_simc_has_the_peaks_that_its_author_prints(lag, published):
 
 @pytest.mark.parametrize("kind", ["pi", "pid"])
 @pytest.mark.parametrize("lag", [0.3, 1.0, 3.0, 10.0])
-def test_amigo_keeps_about_the_peak_that_it_is_made_for(lag, kind):
+def test_amigo_has_about_the_sensitivity_peak_that_it_is_fitted_for(lag, kind):
     """The rules were fitted for M = 1.4."""
     process = Process(-2.0, lag, 1.0)
     assert 1.2 < peak(process, tuned(process, Tuning(amigo=Amigo(type=kind)))) < 1.65
@@ -73,7 +73,7 @@ def test_settings_scale_with_gain_and_time():
         ("{numerator: [2], denominator: [4, 1, 0], delay: 1}", (2.0, None, 4.0)),
     ],
 )
-def test_a_second_lag_and_half_a_sample_count_as_the_half_rule_has_it(plant, expected):
+def test_a_second_lag_and_half_a_sample_are_reduced_by_the_half_rule(plant, expected):
     text = f"sample_time: 2\nplant: {{continuous: {plant}, sample: zoh}}\nnoise: {{variance: 1}}\n"
     found = process_of(parse_spec(text, design=False))
     assert (found.gain, found.dead_time) == pytest.approx((expected[0], expected[2]))
@@ -90,13 +90,13 @@ def sampled(theta, w):
 
 
 def pi(settings, w):
-    """Kp (1 + 1/(Ti s)) by trapezoids."""
+    """Kp (1 + 1/(Ti s)) by the trapezoidal rule."""
     q = np.exp(-1j * w)
     return settings["Kp"] * (1.0 + H / (2.0 * settings["Ti"]) * (1.0 + q) / (1.0 - q))
 
 
-def test_the_margin_is_kept_by_the_plants_that_the_data_leave_over():
-    """Draws of the estimate; margins of gain and phase read off each response."""
+def test_drawn_plants_within_the_admissible_error_keep_the_margins_of_the_loop():
+    """Plants are drawn from the estimate; gain and phase margins are read off each response."""
     found = solve(parse_spec(TEXT, overrides=["solver.any_spectrum=false"])).result
     (asked,) = found["requirements"]
     loop = asked["loop"]
@@ -119,7 +119,7 @@ def test_the_margin_is_kept_by_the_plants_that_the_data_leave_over():
         L = other * C
         peak_of = np.max(np.abs(1.0 / (1.0 + L)))
         kept += peak_of <= loop["max_sensitivity"]
-        if np.all(np.abs(other - G) <= admitted):  # that is a proof
+        if np.all(np.abs(other - G) <= admitted):  # then the margins are guaranteed
             assert peak_of <= loop["max_sensitivity"] * (1.0 + 1e-9)
             crossing = np.flatnonzero(np.diff(np.sign(np.abs(L) - 1.0)))
             turning = np.flatnonzero((np.diff(np.sign(L.imag)) != 0.0) & (L.real[1:] < 0.0))
@@ -129,14 +129,14 @@ def test_the_margin_is_kept_by_the_plants_that_the_data_leave_over():
 
 
 @pytest.mark.slow
-def test_the_cost_is_that_of_a_plain_program():
-    """r_adm by the formula of the loop, lines by cvxpy; alpha for three parameters."""
+def test_the_least_cost_for_a_loop_is_that_of_a_program_in_cvxpy():
+    """r_adm follows from the formula of the loop, and alpha from three parameters."""
     found = solve(load_spec("specs/heater_loop.yaml")).result
     lines, w = np.arange(1, 121) * np.pi / 120, np.geomspace(0.03, 1.5, 90)
     theta, step = np.array([GAIN, LAG, DEAD]), 1e-6
 
     def gradient(w):
-        # The dead time lies on a boundary between samples: towards longer ones.
+        # The dead time is a multiple of the sample time: one-sided differences towards longer ones.
         moves = step * np.eye(3)
         K, T = ((sampled(theta + m, w) - sampled(theta - m, w)) / (2 * step) for m in moves[:2])
         later = [sampled(theta + k * moves[2], w) for k in (0, 1, 2)]
@@ -159,20 +159,20 @@ def test_the_cost_is_that_of_a_plain_program():
     plain = cp.Problem(cp.Minimize(cp.sum(powers)), asked)
     plain.solve(solver="CLARABEL", tol_gap_rel=1e-7, tol_gap_abs=1e-7, tol_feas=1e-7)
     assert found["cost"] == pytest.approx(1e-3 * plain.value, rel=1e-3)
-    assert found["cost"] >= 1e-3 * plain.value * (1.0 - 1e-6)  # it looks at 90 frequencies
+    assert found["cost"] >= 1e-3 * plain.value * (1.0 - 1e-6)  # the program has 90 frequencies only
 
 
 @pytest.mark.parametrize(
     ("margin", "expected"),
     [("max_sensitivity_db: 6.0206", 2.0), ("gain_margin: 2", 2.0), ("phase_margin: 28.955", 2.0)],
 )
-def test_margins_are_told_as_the_peak_that_keeps_them(margin, expected):
+def test_gain_and_phase_margins_are_converted_to_the_peak_that_ensures_them(margin, expected):
     key, value = margin.split(": ")
     assert LoopMargin(**{key: float(value)}).peak == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.slow
-def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
+def test_assess_tunes_the_controller_for_the_estimated_plant(tmp_path):
     rng = np.random.default_rng(2)
     u = 2.0 * np.sign(rng.standard_normal(72)).repeat(10)
     y, a = np.zeros(720), np.exp(-H / 200.0)
@@ -200,8 +200,8 @@ def refusal(margin):
 
 
 @MARGINS
-def test_a_margin_that_the_loop_lacks_is_refused_with_what_it_has_as_stated(margin):
-    """The first value is one at which the nominal plant just keeps it, the second is one to work with."""
+def test_a_margin_that_the_loop_lacks_is_refused_with_values_of_the_same_kind(margin):
+    """The nominal plant just keeps the first value; the second allows a peak larger by a factor of 1.2."""
     _, refused = refusal(margin)
     key = margin.partition(":")[0]
     edge, roomy = (
@@ -219,13 +219,13 @@ def test_a_margin_that_the_loop_lacks_is_refused_with_what_it_has_as_stated(marg
 
 @pytest.mark.slow
 @MARGINS
-def test_the_margin_to_work_with_has_a_design(margin):
+def test_the_larger_peak_that_the_hint_proposes_has_a_design(margin):
     stated, refused = refusal(margin)
     roomy = re.search(r"example (\w+: [\d.]+)", refused.hint)[1]
     assert solve(parse_spec(TEXT, overrides=[stated.replace(margin, roomy)])).result["status"] == "optimal"
 
 
-def test_where_noise_drifts_the_input_follows_it_without_end():
-    """As 1/G: no deviation is stated."""
+def test_no_deviation_of_the_input_is_stated_for_drifting_noise():
+    """The controlled input follows the drift without bound."""
     found = solve(parse_spec(TEXT, overrides=["noise.drift=true", "solver.any_spectrum=false"])).result
     assert "input_deviation" not in found["requirements"][0]["loop"]

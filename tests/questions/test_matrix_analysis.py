@@ -1,4 +1,4 @@
-"""What given excitations of several channels and in continuous time buy: closed forms, simulation, tables."""
+"""Given excitations of several channels and in continuous time: closed forms, simulation, tables."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def changed(*overrides):
 
 
 def by_simulation(u, length):
-    """M of the ARX plant of the spec from samples; parameters in the order of NAMES."""
+    """M (10, 10) of the ARX plant of the spec from samples u (n, 2), in the order of NAMES."""
     y = np.stack(
         [
             scipy.signal.lfilter(
@@ -61,7 +61,7 @@ def record(tmp_path_factory):
     return path, u
 
 
-def test_samples_give_the_information_of_their_regressors(record):
+def test_a_record_has_the_information_of_its_regressors(record):
     path, u = record
     outcome = analyse(changed(f"spectrum={{given: {{signal: {path}}}}}"))
     result = outcome.result
@@ -71,7 +71,7 @@ def test_samples_give_the_information_of_their_regressors(record):
     assert result["signal"]["worst_ratio"] == pytest.approx(result["model_error"]["worst_ratio"], rel=1e-9)
 
 
-def test_sinusoids_are_in_phase_and_give_what_a_long_record_gives():
+def test_sinusoids_in_phase_have_the_information_of_a_long_record():
     spec = changed("signal.samples=100000")
     outcome = analyse(spec)
     assert outcome.result["power"]["input"] == pytest.approx([22.5, 22.5])
@@ -82,7 +82,7 @@ def test_sinusoids_are_in_phase_and_give_what_a_long_record_gives():
     assert np.abs((outcome.result["information"]["matrix"] - M) / scale).max() < 2e-3
 
 
-def test_white_of_each_channel_is_a_sum_over_the_circle():
+def test_white_noise_has_the_information_of_a_sum_over_the_unit_circle():
     """M = N/L sum over L points of the circle: exact for an ARX plant."""
     result = analyse(changed("spectrum={given: {type: white, power: [3.0, 5.0]}}")).result
     assert result["information"]["parameters"] == NAMES
@@ -135,7 +135,7 @@ def by_finite_differences(names, lines):
     return M
 
 
-def test_lines_in_continuous_time_by_finite_differences():
+def test_lines_in_continuous_time_have_the_information_by_finite_differences():
     given = "{given: {type: multisine, frequencies: [0.2, 0.7, 1.3], amplitudes: [[3, 3, 3], [2, -2, 1]]}}"
     result = analyse(
         parse_spec(CONTINUOUS, overrides=[f"spectrum={given}", "experiment={samples: 50}"])
@@ -145,7 +145,7 @@ def test_lines_in_continuous_time_by_finite_differences():
     np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
 
 
-def test_sinusoids_of_several_inputs_given_as_a_table(tmp_path):
+def test_a_table_of_power_matrices_has_the_information_by_finite_differences(tmp_path):
     """Power matrices of every rank and phase, as `spectrum.csv` of a design holds them."""
     lines = [
         (0.2, np.array([[1.0, 0.3 - 0.4j], [0.3 + 0.4j, 0.5]])),
@@ -164,7 +164,7 @@ def test_sinusoids_of_several_inputs_given_as_a_table(tmp_path):
     np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
 
 
-def test_one_sampled_channel_reads_the_column_of_one_channel(tmp_path):
+def test_a_record_of_one_channel_has_the_output_power_of_the_held_plant(tmp_path):
     text = """
 plant: {continuous: {numerator: [2.0], denominator: [1, 0.6, 1]}, sample: zoh}
 noise: {variance: 0.1}
@@ -198,7 +198,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("given", "text", "code"), BAD)
-def test_bad_input(given, text, code):
+def test_unusable_excitations_are_refused(given, text, code):
     with pytest.raises((SpecError, DataError)) as caught:
         analyse(parse_spec(text, overrides=[f"spectrum={given}"]))
     assert caught.value.diagnostics[0].code == code

@@ -1,4 +1,4 @@
-"""Specs with several channels, in continuous time and in loops: against their files, alone, in any units."""
+"""Designs of several channels, in continuous time and in loops: written files, single channels, units."""
 
 import warnings
 from pathlib import Path
@@ -57,7 +57,7 @@ def test_record_has_two_channels_and_keeps_the_smallest_eigenvalue(design):
 
 
 @pytest.mark.slow
-def test_few_columns_have_a_lower_value_under_the_same_bound():
+def test_a_spectral_factor_of_one_column_has_a_lower_value_and_the_same_bound():
     full = solve(changed(CONTINUOUS)).result["objective"]
     few = solve(changed(CONTINUOUS, "spectrum.factor_columns=1")).result
     assert few["objective"]["value"] < full["value"]
@@ -87,7 +87,7 @@ def test_limits_of_each_channel_bind():
         ["accuracy={weighted_variance: {max: 0.01, weight: {numerator: [1, 0.5]}}}"],
     ],
 )
-def test_least_cost_in_every_family_is_proved(overrides):
+def test_least_cost_has_a_proved_gap_for_all_spectra_and_requirements(overrides):
     common = ["spectrum.order=4"] if not overrides[0].startswith("spectrum") else []
     result = solve(load_spec(SPECS / "two_by_two_arx.yaml", [*common, *overrides])).result
     assert result["objective"]["relative_gap"] <= 1e-5
@@ -140,8 +140,8 @@ def test_the_units_of_the_inputs_do_not_matter(spectrum, asked, same):
     assert bounds[1] == pytest.approx(bounds[0], rel=2e-5)
 
 
-def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
-    """Input 1 may have nearly any power: what it is worth is below the accuracy of a solver."""
+def test_a_limit_with_a_tiny_multiplier_does_not_prevent_the_proof():
+    """Input 1 may have nearly any power: the multiplier of its limit is below a solver's accuracy."""
     spec = parse_spec(
         "plant: {A: [[1, -0.35], [1, -0.3]], B: [[[0, 1.4, -0.7], [0, 0.3]], [[0, -0.2], [0, 1.4, -0.2]]]}\n"
         "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
@@ -153,8 +153,8 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
 
 
 @pytest.mark.slow
-def test_a_spectrum_of_order_zero_is_white_in_time():
-    """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
+def test_a_spectrum_of_order_zero_costs_more_than_order_one_and_less_than_white():
+    """White excitation has order zero, and each spectrum of order zero is also one of order one."""
     costs = [
         solve(
             changed(GAINS, f"spectrum={{{kind}}}", "signal.candidates=1", "solver.any_spectrum=false")
@@ -166,7 +166,7 @@ def test_a_spectrum_of_order_zero_is_white_in_time():
 
 @pytest.mark.slow
 def test_free_spectra_of_unequal_limits_are_proved():
-    """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
+    """Many rounds pass before a useful sinusoid is found, which must not end the search."""
     spec = changed(
         "plant: {B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]],\n"
         "  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1, -0.8]]]}\n"
@@ -200,7 +200,7 @@ def in_loop(*overrides):
     return parse_spec(LOOP, overrides=list(overrides))
 
 
-def test_decoupled_loops_cost_as_much_as_each_alone():
+def test_two_decoupled_loops_cost_the_sum_of_both_alone():
     common = "cost: {input_power: 1, output_power: 0.2}\nspectrum: {type: fir, order: 5}\n"
     common += "accuracy: {model_error: {relative: 0.05, alpha: 3}}\n"
     both = parse_spec(TWO_ALONE + common)
@@ -219,7 +219,7 @@ def test_decoupled_loops_cost_as_much_as_each_alone():
     assert design.objective == pytest.approx(sum(costs), rel=2e-6)
 
 
-def test_the_units_of_the_loop_do_not_make_it_algebraic():
+def test_units_of_the_channels_do_not_make_a_loop_algebraic():
     """u1 in millionths, u2 in millions: the gains differ by 1e12, the loop is the same and has its delay."""
     scaled = in_loop(
         "plant.B=[[[0, 1.0e+6, 0.4e+6], [0, -0.3e-6]], [[0, 0.4e+6], [0, 1.2e-6, -0.5e-6]]]",
@@ -228,8 +228,8 @@ def test_the_units_of_the_loop_do_not_make_it_algebraic():
     build_convex(scaled)
 
 
-def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
-    """A plain program on a grid with the binding frequencies: block Toeplitz positivity by a Gram matrix."""
+def test_an_arx_design_with_all_entries_bounded_is_that_of_a_semidefinite_program():
+    """The program has the binding frequencies on its grid, and a Gram matrix for a positive spectrum."""
     order = 2
     spec = load_spec(SPECS / "two_by_two_arx.yaml", [f"spectrum.order={order}", "solver.any_spectrum=false"])
     result = solve(spec).result
@@ -269,14 +269,14 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
             constraints.append(0.5 * (M + M.T) - R >> 0)
     problem = cp.Problem(cp.Minimize(power @ x), constraints)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that it may be inaccurate; four digits are compared
+        warnings.simplefilter("ignore")  # cvxpy warns of inaccuracy; four digits are compared
         problem.solve(solver=cp.CLARABEL)
     assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
 
 
 @pytest.mark.slow
-def test_single_samples_of_u_are_limited():
-    """What r causes at u, by the recursion of the loop, obeys the limits; the accuracy is met still."""
+def test_amplitude_and_rate_of_u_in_a_loop_are_limited():
+    """The response of u to r, by the recursion of the loop, keeps the limits; the accuracy is met."""
     free = solve(in_loop("signal.candidates=2")).result["signal"]
     amplitude, rate = 0.8 * np.array(free["input_peak"]), 0.8 * np.array(free["input_move"])
     limits = f"limits={{amplitude: {{input: {amplitude.tolist()}}}, rate: {rate.tolist()}}}"
@@ -290,7 +290,7 @@ def test_single_samples_of_u_are_limited():
     assert outcome.result["signal"]["input_peak"] == pytest.approx(np.abs(u).max(axis=0))
 
 
-def test_limits_bind_what_r_causes():
+def test_a_limit_on_input_power_binds_the_response_of_u_to_r():
     free = solve(in_loop()).result
     most = 0.99 * free["power"]["input"][1]
     held = solve(in_loop(f"limits.input_power=[1e6, {most}]")).result

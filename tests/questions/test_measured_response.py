@@ -1,4 +1,4 @@
-"""Frequency responses from data: how sure they are, whether they meet the spec, and what else decides."""
+"""Frequency responses from data: confidence discs, verdicts, nonlinearity, drift, spikes, missing lines."""
 
 from functools import cache
 from pathlib import Path
@@ -32,7 +32,7 @@ experiment: {samples: 3200}
 accuracy: {frequency_response: {absolute: 0.05, band: [0.1, 2], lines: 6}}
 """
 SHIPPED = (Path(__file__).parents[2] / "specs" / "frequency_response.yaml").read_text()
-# With optimised phases, and 1.6 times the amplitude, so that what noise leaves is met.
+# Optimised phases; with 1.6 times the amplitude the error by noise alone is admissible.
 FAULTY = f"""{PLANT}
 experiment: {{samples: 3000}}
 accuracy: {{frequency_response: {{relative: 0.05, band: [0.05, 2], lines: 16, detection: 4}}}}
@@ -56,7 +56,7 @@ RELATIVE = "accuracy.frequency_response.relative"
 
 
 def answer(model, u, seed=None, *, size=0.1, before=lambda x: x, behind=lambda x: x):
-    """What a plant between curves answers, with noise of a seed."""
+    """(n, 1): response of a plant between static curves before and behind it; noise by a seed."""
     y = behind(model.simulate(before(u)[None], np.zeros((1, len(u), 1)), 1.0)[0][0])
     e = size * np.random.default_rng(seed).standard_normal((1, len(u), 1)) * (seed is not None)
     return y + model.simulate(np.zeros_like(u)[None], e, 1.0)[1][0]
@@ -64,7 +64,7 @@ def answer(model, u, seed=None, *, size=0.1, before=lambda x: x, behind=lambda x
 
 @cache
 def asked(text, times=1.0):
-    """The spec, its measurement and its record, so many times as large."""
+    """A spec, its measurement, and its record scaled by `times`."""
     spec = parse_spec(text)
     return spec, build_measurement(spec), times * solve(spec).signal
 
@@ -90,7 +90,7 @@ def counted(task, u, y):
 
 
 @pytest.mark.parametrize("text", [TEXT, TWO], ids=["one input", "two inputs"])
-def test_the_discs_hold_the_true_response(write, text):
+def test_most_confidence_discs_contain_the_true_response(write, text):
     spec, u, y = recorded(text, 1)
     results = identify(spec, write(table(u, y)), frequency_response=True)
     model, columns = build_measurement(spec).model, results.tables["frequency_response"].columns
@@ -105,18 +105,18 @@ def test_the_discs_hold_the_true_response(write, text):
     assert not {"samples-before-periods", "inputs-do-not-repeat"} & codes(results).keys()
 
 
-def test_without_lines_in_the_spec_the_data_say_which_they_are(write):
+def test_without_lines_in_the_spec_those_of_the_data_are_measured(write):
     _, u, y = recorded(TEXT, 1)
     plain = parse_spec(TEXT.replace("accuracy", "# accuracy").replace("signal", "# signal"), design=False)
     results = identify(plain, write(table(u, y)), frequency_response=True)
     assert results.result["frequency_response"]["frequencies"] == 12
-    assert summary(results.outcome, "s", []).split()[-2:] == ["12", "frequencies"]  # without a file, too
+    assert summary(results.outcome, "s", []).split()[-2:] == ["12", "frequencies"]  # needs no file
     assert "deviations" not in results.tables
-    found = identify(parse_spec(TEXT), write(table(u, y))).result  # a model, whatever is asked of the lines
+    found = identify(parse_spec(TEXT), write(table(u, y))).result  # without the option: a model
     assert "requirements" not in found
 
 
-def test_records_that_repeat_count_together(write):
+def test_records_of_the_same_input_count_together(write):
     spec, u, first = recorded(TEXT, 1)
     _, _, second = recorded(TEXT, 2)
     files = [write(table(u, first), "1.csv"), write(table(u, second), "2.csv")]
@@ -126,7 +126,7 @@ def test_records_that_repeat_count_together(write):
 
 
 def verdicts(admitted, number):
-    """Of data of the design for 5 %, judged as if so much were admitted."""
+    """Verdicts on data of the design for 5 %, with another admissible relative error."""
     spec, _, u = asked(TEXT)
     task, found = build_measurement(spec.with_(**{RELATIVE: admitted})).terms, []
     for seed in range(number):
@@ -137,15 +137,15 @@ def verdicts(admitted, number):
     return found
 
 
-def test_a_verdict_is_hardly_ever_wrong():
-    # The record leaves 5 % but for rounding: with 4.9 % admitted it misses, with 5.1 % it meets.
+def test_wrong_verdicts_on_a_frequency_response_are_rare():
+    # The expected error is 5 %: with 4.9 % admitted the truth is missed, with 5.1 % met.
     assert verdicts(0.049, 40).count("met") <= 4
     assert verdicts(0.051, 40).count("missed") <= 4
     assert set(verdicts(0.025, 10)) == {"missed"}
     assert set(verdicts(0.1, 10)) == {"met"}
 
 
-def test_assess_tells_how_many_periods_would_do(write):
+def test_assess_states_how_many_periods_a_missed_accuracy_needs(write):
     spec, u, y = recorded(TEXT, 3)
     path = write(table(u, y))
     met = assess(spec.with_(**{RELATIVE: 0.1}), path)
@@ -163,7 +163,7 @@ def test_assess_tells_how_many_periods_would_do(write):
     ("curve", "speaks"),
     [(lambda u: u + 0.1 * u**2, "even"), (lambda u: u + 0.5 * u**3, "odd"), (lambda u: u, "")],
 )
-def test_silent_lines_tell_the_degree_of_a_nonlinearity(write, curve, speaks):
+def test_unexcited_lines_show_whether_a_nonlinearity_is_even_or_odd(write, curve, speaks):
     spec, u, y = recorded(TEXT, 5, before=curve)
     results = identify(spec, write(table(u, y)), frequency_response=True)
     told = results.result["frequency_response"]["nonlinearity"]
@@ -172,8 +172,8 @@ def test_silent_lines_tell_the_degree_of_a_nonlinearity(write, curve, speaks):
     assert found == ([speaks] if speaks else [])
 
 
-def test_of_noise_alone_the_probability_is_uniform():
-    """And a linear plant is hardly ever doubted: four of a hundred are expected."""
+def test_the_probability_of_nonlinearity_is_uniform_under_noise_alone():
+    """A linear plant is rarely doubted: four of a hundred are expected."""
     _, question, u = asked(SHIPPED, 1.6)
     silent = [
         silent_of(question.terms, counted(question.terms, u, answer(question.model, u, seed)))
@@ -196,14 +196,14 @@ def test_of_noise_alone_the_probability_is_uniform():
         (TWO, lambda u, y: (u[:-7], y[:-7]), "bad-period"),
     ],
 )
-def test_data_that_tell_nothing_are_refused(write, text, change, code):
-    """Among them blocks that are cut."""
+def test_data_without_a_measurable_frequency_response_are_refused(write, text, change, code):
+    """The last case cuts off the end of the last block."""
     spec, u, y = recorded(text, 1)
     path = write(table(*change(u, y)))
     assert refusal(lambda: identify(spec, path, frequency_response=True), DataError).code == code
 
 
-def test_what_does_not_repeat_and_what_is_left_out_is_told(write):
+def test_inputs_that_do_not_repeat_and_samples_before_the_periods_are_reported(write):
     spec, u, y = recorded(TEXT, 1)
     short = codes(identify(spec, write(table(u[:2700], y[:2700])), frequency_response=True))
     assert short["samples-before-periods"].figures == {"samples": 200, "period": 500}
@@ -214,7 +214,7 @@ def test_what_does_not_repeat_and_what_is_left_out_is_told(write):
 
 
 def changed(question, u, **curves):
-    """The largest change of the response at the lines without noise, over 5 % of its size."""
+    """The largest relative change of the noise-free response at the lines by curves, in units of 5 %."""
     periods, lines = question.terms.periods, question.terms.grid.excited
     answers = (answer(question.model, u, **curves), answer(question.model, u))
     curved, linear = (periods.means(y, lines)[:, 0, 0] for y in answers)
@@ -254,8 +254,8 @@ def dead(share):
         *((SHIPPED, "behind", one, 0.1) for one in (cubic(0.1), saturating(0.3), clipping(2.0))),
     ],
 )
-def test_a_response_that_a_nonlinearity_changes_is_never_called_met(write, text, where, curve, noise):
-    """Whatever the noise: the response of more periods errs by the same, and so none are offered."""
+def test_a_response_that_a_nonlinearity_changes_by_5_percent_is_never_met(write, text, where, curve, noise):
+    """More periods leave the same error, so none are proposed, at any level of noise."""
     spec, question, u = asked(text, 1.6)
     assert changed(question, u, **{where: curve}) > 1.0
     y = answer(question.model, u, 1, size=noise, **{where: curve})
@@ -267,15 +267,15 @@ def test_a_response_that_a_nonlinearity_changes_is_never_called_met(write, text,
     assert found.verdict == "missed" or "nonlinearity" in assessment["causes"]
 
 
-def test_noise_that_misses_whatever_the_nonlinearity_does_is_a_miss(write):
+def test_noise_that_misses_the_accuracy_is_a_miss_beside_a_nonlinearity(write):
     spec, u, y = recorded(FAULTY, 1, 1.6, size=1.0, before=cubic(0.5))
     found = assess(spec, write(table(u, y)))
     assert found.verdict == "missed"
     assert codes(found.results)["nonlinear-response"].severity == "doubt"
 
 
-def test_a_nonlinearity_that_changes_little_is_told_and_met(write):
-    # As noise is a tenth of what the spec says, it is seen long before it matters.
+def test_a_nonlinearity_of_little_effect_is_noted_and_the_accuracy_met(write):
+    # The noise is a tenth of that in the spec, so the curve is detected long before it matters.
     spec, question, u = asked(SHIPPED, 1.6)
     change = changed(question, u, behind=cubic(0.003))
     assert change < 0.4
@@ -288,7 +288,7 @@ def test_a_nonlinearity_that_changes_little_is_told_and_met(write):
 
 
 @pytest.mark.slow
-def test_of_optimised_phases_the_change_is_told_as_large_as_it_is(write):
+def test_the_estimated_change_by_a_cubic_is_right_for_optimised_phases(write):
     spec, question, u = asked(OPTIMISED)
     u = np.tile(u[:1002], (16, 1))
     scale = 0.001 * 2.5 / changed(question, u, before=lambda x: x + 0.001 * x**3)
@@ -305,7 +305,7 @@ def test_of_optimised_phases_the_change_is_told_as_large_as_it_is(write):
 
 
 def judged(write, y, **more):
-    """The causes of a verdict on another output than that of the record of FAULTY, and the outcome."""
+    """Verdict, causes and results for the input of FAULTY with the output y."""
     spec, _, u = asked(FAULTY, 1.6)
     found = assess(spec, write(table(u, y)), **more)
     return found.verdict, found.results.result["assessment"].get("causes", []), found.results
@@ -313,7 +313,7 @@ def judged(write, y, **more):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("height", "seed"), [(5.0, 1), (-20.0, 2), (200.0, 1)])
-def test_a_drift_is_no_nonlinearity_and_detrending_mends_it(write, height, seed):
+def test_a_linear_drift_is_not_a_nonlinearity_and_detrending_removes_it(write, height, seed):
     _, _, y = recorded(FAULTY, seed, 1.6)
     drifting = y + np.linspace(0.0, height, len(y))[:, None]
     assert judged(write, y)[0] == "met"
@@ -326,7 +326,7 @@ def test_a_drift_is_no_nonlinearity_and_detrending_mends_it(write, height, seed)
     assert judged(write, drifting, preparation=Preparation(detrend="linear"))[0] == "met"
 
 
-def test_a_curved_drift_is_not_mended_by_a_line_and_a_nonlinearity_is_named_too(write):
+def test_a_curved_drift_is_not_straight_and_a_nonlinearity_is_named_beside_a_drift(write):
     _, u, y = recorded(FAULTY, 3, 1.6)
     along = np.linspace(-1.0, 1.0, len(u))[:, None]
     _, causes, results = judged(write, y + 30.0 * along**3)
@@ -336,7 +336,7 @@ def test_a_curved_drift_is_not_mended_by_a_line_and_a_nonlinearity_is_named_too(
     assert judged(write, clipped + 10.0 * (along + 1.0))[1] == ["drift", "nonlinearity"]
 
 
-def test_spikes_of_several_samples_are_named_and_nothing_is_made_of_them(write):
+def test_spikes_of_several_samples_are_named_without_periods_or_nonlinearity(write):
     (_, _, y), samples = recorded(FAULTY, 1, 1.6), [1800, 1801, 1802]
     y[samples] += 60.0
     _, causes, results = judged(write, y)
@@ -349,8 +349,8 @@ def test_spikes_of_several_samples_are_named_and_nothing_is_made_of_them(write):
 
 
 @pytest.mark.parametrize("samples", [[700, 2222], [100]])
-def test_single_spikes_and_those_of_the_transient_decide_nothing(write, samples):
-    """They are replaced as the file is read, which a finding says."""
+def test_single_spikes_and_those_in_the_transient_do_not_change_the_verdict(write, samples):
+    """They are replaced as the file is read, which a finding reports."""
     _, _, y = recorded(FAULTY, 1, 1.6)
     y[samples] += 60.0
     verdict, _, results = judged(write, y)
@@ -360,8 +360,8 @@ def test_single_spikes_and_those_of_the_transient_decide_nothing(write, samples)
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("past", [0.9, 0.99, 0.998])
-def test_slow_noise_that_the_spec_knows_is_neither_drift_nor_spikes(write, past):
-    """Down to a memory of a period, far below the lowest line."""
+def test_slow_noise_as_stated_in_the_spec_is_neither_drift_nor_spikes(write, past):
+    """The slowest noise has a time constant of one period, far below the lowest line in frequency."""
     (spec, question, u), found = asked(FAULTY.replace("-0.9", f"-{past}"), 1.6), []
     for seed in range(4):
         e = 0.1 * np.random.default_rng(seed).standard_normal(len(u) + 3000)
@@ -370,8 +370,8 @@ def test_slow_noise_that_the_spec_knows_is_neither_drift_nor_spikes(write, past)
     assert not {"drift", "spikes"} & set(found)
 
 
-def test_of_two_files_each_drifts_by_itself(write):
-    """One ramp undoes the other in the response, and the scatter has them both."""
+def test_opposite_drifts_of_two_files_are_not_a_nonlinearity(write):
+    """The ramps cancel in the mean response, and both add to the scatter."""
     files = []
     for seed, height in ((1, 20.0), (2, -20.0)):
         spec, u, y = recorded(FAULTY, seed, 1.6)
@@ -388,7 +388,7 @@ SQUARE = np.where(TIMES % 250 < 125, 1.0, -1.0)  # odd harmonics of 250 samples:
 
 
 def excited(u, seed=0):
-    """A record of the plant and the noise of EXCITED, whatever the input (n,)."""
+    """Columns of a record of the plant and the noise of EXCITED with an input u (n,)."""
     return table(u[:, None], answer(build_measurement(parse_spec(EXCITED)).model, u[:, None], seed))
 
 
@@ -410,8 +410,8 @@ def test_only_lines_with_power_are_measured(write, u, lines):
 
 
 @pytest.mark.slow
-def test_the_noise_of_a_line_is_not_that_of_its_unexcited_neighbours(write):
-    # Of |U|^2 = N p / 2 with p = 1/2 and 2000 samples, Phi_v = 0.01 / |1 - 0.9 exp(-jw)|^2.
+def test_the_deviation_at_a_single_excited_line_has_its_closed_form(write):
+    # With |U|^2 = N p / 2, p = 1/2 and N = 2000 samples, Phi_v = 0.01 / |1 - 0.9 exp(-jw)|^2.
     w = 2.0 * np.pi * LINE / PERIOD
     truth = np.sqrt(0.01 / np.abs(1.0 - 0.9 * np.exp(-1j * w)) ** 2 / (2000 * 0.25))
     found = []
@@ -421,7 +421,7 @@ def test_the_noise_of_a_line_is_not_that_of_its_unexcited_neighbours(write):
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(truth, rel=0.3)
 
 
-def test_noise_of_the_inputs_is_no_excitation_and_strong_lines_are_some():
+def test_noise_of_an_input_is_not_taken_for_excitation_and_a_strong_line_is():
     rng = np.random.default_rng(1)
     harmonics = np.arange(1, 200)
     seen = excited_lines((SINE + 0.01 * rng.standard_normal(2500))[:, None], Periods(PERIOD), harmonics)
@@ -429,13 +429,13 @@ def test_noise_of_the_inputs_is_no_excitation_and_strong_lines_are_some():
     assert seen.sum() <= 8  # 2 of 198 are expected by chance
 
 
-def test_data_that_leave_lines_out_have_no_verdict(write):
+def test_assess_refuses_data_that_do_not_excite_every_line(write):
     path = write(excited(SINE))
     assert refusal(lambda: assess(parse_spec(EXCITED), path), DataError).code == "not-exciting"
 
 
 @pytest.mark.slow
-def test_as_many_periods_as_are_told_do(write):
+def test_the_stated_number_of_periods_suffices_and_half_of_it_does_not(write):
     spec = parse_spec(EXCITED).with_(**{RELATIVE: 0.04})
     u = solve(parse_spec(EXCITED)).signal[:, 0]
     first = assess(spec, write(excited(u)))
@@ -453,8 +453,8 @@ WHITE = np.random.default_rng(9).standard_normal(2500)
 
 
 @pytest.mark.parametrize("u", [WHITE, 1e-3 * np.tile(WHITE[:500], 5)], ids=["white", "weak"])
-def test_more_periods_are_not_asked_for_where_they_are_no_remedy(write, u):
-    """The input does not repeat, or is too weak at some lines: the record of the design is named."""
+def test_no_more_periods_are_proposed_for_an_input_that_they_do_not_help(write, u):
+    """The input does not repeat or is too weak at some lines; signal.csv of the design is proposed."""
     told = assess(parse_spec(EXCITED), write(excited(u))).results.result["assessment"]
     assert "periods" not in told
     assert "signal.csv" in told.get("no_top_up", "") + " ".join(told.get("undecided", []))

@@ -1,4 +1,4 @@
-"""model.yaml holds at the sample time of its data: a spec takes it over, says the same, or is refused."""
+"""model.yaml has the sample time of its data: a spec inherits it, states the same one, or is refused."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ signal: {samples: 100, seed: 1, candidates: 1}
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
-    """What B = 1.5 q, F = 1 - 0.7 q answers to white noise, by the recursion."""
+    """A record of B = 1.5 q^-1, F = 1 - 0.7 q^-1 with white input, by the recursion."""
     rng = np.random.default_rng(1)
     u, y = rng.standard_normal(300), np.zeros(300)
     for t in range(1, 300):
@@ -42,7 +42,7 @@ def record(tmp_path_factory):
 
 
 def models(record):
-    """The file of each command that writes one."""
+    """The model.yaml of each command that writes one."""
     yield identify(parse_spec(STRUCTURE, design=False), record).files["model.yaml"]
     yield assess(parse_spec(STRUCTURE + ASKED), record).results.files["model.yaml"]
 
@@ -66,7 +66,7 @@ def test_every_command_writes_the_sample_time_of_the_data(record, tmp_path):
 PRIOR = "\nexperiment: {samples: 200, prior: {information: model.yaml}}\n"
 
 
-def test_a_spec_may_say_the_same_sample_time(model, tmp_path):
+def test_a_spec_may_state_the_same_sample_time(model, tmp_path):
     (tmp_path / "model.yaml").write_text(model)
     prior = ASKED.replace("\nexperiment: {samples: 200}\n", PRIOR)
     texts = [
@@ -107,15 +107,15 @@ def test_another_sample_time_than_that_of_a_prior_is_refused(clock, key, block, 
     assert ("2 min here" if "2" in clock else "s here") in found.message
 
 
-def test_a_model_file_without_a_sample_time_is_taken_as_before(model, tmp_path):
+def test_a_model_file_without_a_sample_time_is_accepted_as_a_prior(model, tmp_path):
     lines = [line for line in model.splitlines() if not line.startswith(("sample_time", "time_unit"))]
     (tmp_path / "model.yaml").write_text("\n".join(lines))
     text = STRUCTURE + ASKED.replace("\nexperiment: {samples: 200}\n", PRIOR)
     assert solve(parse_spec(text, folder=tmp_path)).result["status"] in ("optimal", "nothing_needed")
 
 
-def test_a_covariance_that_is_singular_to_rounding_is_no_prior(model, tmp_path):
-    """Of two directions one has 1e-18 of the information of the other: it is below rounding."""
+def test_a_covariance_that_is_singular_to_rounding_is_neither_written_nor_a_prior(model, tmp_path):
+    """One direction has 1e-18 of the information of the other, which is below rounding."""
     spec = parse_spec(STRUCTURE, design=False)
     plant, rng = build_model(spec), np.random.default_rng(1)
     u = rng.standard_normal((200, 1))
@@ -137,8 +137,8 @@ def test_a_covariance_that_is_singular_to_rounding_is_no_prior(model, tmp_path):
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0), (1e6, 1e-9), (1e-7, 1e7)])
-def test_units_of_the_parameters_leave_a_covariance_a_prior(units):
-    """Its eigenvalues may differ by any power of ten; those of correlations do not."""
+def test_a_covariance_is_a_valid_prior_in_any_units_of_the_parameters(units):
+    """The eigenvalues may differ by any power of ten; eigenvalues of correlations do not."""
     scale = np.array([units[1] / units[0], 1.0])
     covariance = np.array([[1.0, 0.98], [0.98, 1.0]]) * np.outer(scale, scale)
     assert is_prior({"b1": 1.0, "f1": 0.5}, covariance.tolist())

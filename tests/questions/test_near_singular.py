@@ -1,4 +1,4 @@
-"""Parameters that are hard to tell apart: designed where arithmetic can, and no claims where it cannot."""
+"""Nearly unidentifiable parameters: designs where precision suffices, and no claims where it does not."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.support.refusals import code_of, refusals
 
 
 def worst_ratio(B, F, variance, lines, samples, relative, alpha, band):
-    """Of an output-error model by sums over its lines, each parameter in a unit of its own."""
+    """The worst r_u / r_adm of an output-error model by sums over its lines, with scaled parameters."""
     w, powers = np.asarray(lines["frequencies"]), np.asarray(lines["powers"])
 
     def gradients(w):
@@ -36,7 +36,7 @@ def worst_ratio(B, F, variance, lines, samples, relative, alpha, band):
 
 
 @pytest.mark.parametrize("pole", [0.999, 0.9999998, 0.99999999])
-def test_lines_away_from_a_pole_next_to_the_circle_tell_the_parameters_apart(pole):
+def test_lines_determine_a_plant_with_a_pole_next_to_the_unit_circle(pole):
     text = f"""
 plant: {{B: [0, 0.5, 0.2], F: [1, -{pole}]}}
 noise: {{variance: 0.1}}
@@ -78,7 +78,7 @@ accuracy: {model_error: {relative: 0.1, band: [0.01, 3]}}
 """
 
 
-def test_what_another_excitation_could_tell_is_not_called_impossible():
+def test_a_singular_excitation_is_refused_as_such_and_lines_give_an_optimum():
     told = refusals(lambda: solve(parse_spec(NEAR)), InaccurateError)[0]
     assert told.code == "numerically-singular"
     lines = ["limits={band: [0.01, 3.14]}", "spectrum={type: multisine, lines: 20}"]
@@ -90,8 +90,8 @@ def test_what_another_excitation_could_tell_is_not_called_impossible():
 @pytest.mark.parametrize(
     ("pole", "of_noise", "told"), [(0.5, 0, False), (0.99, 0, False), (0.999, 0, True), (0.5, 0.999, False)]
 )
-def test_an_experiment_shorter_than_its_slowest_mode_is_told(pole, of_noise, told):
-    """Noise may fade as slowly as it likes."""
+def test_an_experiment_shorter_than_its_slowest_mode_is_reported(pole, of_noise, told):
+    """Slow modes of the noise are not reported."""
     spec = f"""
 plant: {{B: [0, 1], F: [1, {-pole}]}}
 noise: {{variance: 1, D: [1, {-of_noise}]}}
@@ -124,8 +124,8 @@ signal: {{samples: 100}}
         *[f"damping: 0.5, natural_frequency: {w:.1e}" for w in np.geomspace(1e-2, 1e3, 6)],
     ],
 )
-def test_dynamics_that_samples_do_not_show_are_not_taken_for_poles_on_the_circle(dynamics):
-    """What is left of a mode after a sample is exp(-h/T): below rounding nothing tells it."""
+def test_dynamics_faster_than_the_sampling_are_not_taken_for_poles_on_the_circle(dynamics):
+    """A mode decays by exp(-h/T) within a sample; below rounding no sample shows it."""
     try:
         found = solve(parse_spec(FAST.format(dynamics=dynamics))).result
     except (SpecError, InaccurateError) as error:
@@ -137,7 +137,7 @@ def test_dynamics_that_samples_do_not_show_are_not_taken_for_poles_on_the_circle
         assert found["status"] == "optimal"
 
 
-def test_a_predictor_on_the_circle_is_not_called_a_plant_that_integrates():
+def test_a_predictor_pole_on_the_unit_circle_is_not_called_an_integrating_plant():
     states = "A: [[a]], B: [[1]], C: [[1]], K: [['a - 1']], time: discrete"
     text = f"""
 plant: {{parameters: {{a: 0.9}}, state_space: {{{states}}}}}

@@ -1,4 +1,4 @@
-"""What a record leaves open about the structure of the model, and what is said to mend a refuted one."""
+"""Neglected parameters that a record cannot exclude, and the remedies for a refuted structure."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ signal: {type: binary, seed: 1}
 
 @pytest.fixture(scope="module")
 def narrow(tmp_path_factory):
-    """Writes a record with the narrow-band input that is designed for the model, and perhaps a pole more."""
+    """Writes a record with the designed narrow-band input, of a plant with perhaps one more pole."""
     designed = solve(parse_spec(NARROW)).tables["signal"].columns["u1"]
 
     def written(seed, pole=0.0, amplitude=1.3):
@@ -39,7 +39,7 @@ def narrow(tmp_path_factory):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
-def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow):
+def test_a_neglected_pole_that_a_narrow_band_hardly_shows_leaves_the_verdict_open(seed, narrow):
     found = assess(parse_spec(NARROW), narrow(seed, 0.5))
     assert found.verdict == "undecided"
     outcome = found.results.outcome
@@ -51,10 +51,10 @@ def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("seed", "of_the_pole"), [(1, 0.05), (3, 0.84)])
-def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole, narrow):
-    """No test sees the missing pole; the true error is beyond what the top-up would leave, as is told.
+def test_an_undetected_pole_is_proposed_as_a_parameter_at_odds_above_0_7(seed, of_the_pole, narrow):
+    """No test detects the missing pole, and the true error exceeds the stated worst ratio.
 
-    `of_the_pole` are the odds for it, see `test_directed.py`: what has less than 0.7 is no reason to act.
+    `of_the_pole` are the odds for it, see `test_directed.py`; below 0.7 it is not proposed.
     """
     found = assess(parse_spec(NARROW), narrow(seed, 0.5, 0.8))
     assert (found.verdict, found.results.result["identification"]["failed"]) == ("missed", [])
@@ -70,7 +70,7 @@ def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole
     assert ("Estimate this parameter too" in said(found.results)) == (of_the_pole > 0.7)
 
 
-def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
+def test_a_met_verdict_lists_the_neglected_parameters_that_it_rests_on(narrow):
     path = narrow(1)
     found = assess(parse_spec(NARROW), path)
     assert found.verdict == "met"

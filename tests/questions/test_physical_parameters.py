@@ -1,4 +1,4 @@
-"""Known and named parameters and dead times: one plant in several words is one design."""
+"""Known and named parameters and dead times: closed forms, estimates, domains of expressions."""
 
 import json
 
@@ -32,7 +32,7 @@ def spec_of(plant, rest=REST) -> Spec:
     return parse_spec(f"plant: {plant}\n{rest}")
 
 
-def test_information_of_a_dead_time_is_that_of_the_closed_form():
+def test_the_information_of_a_dead_time_has_its_closed_form():
     """G = e^(-tau s) alone: M = N / sigma^2 (1/2 pi) int w^2 Phi, power P flat over [-W, W]: N P W^2 / 3."""
     text = (
         "plant: {continuous: {numerator: [1], denominator: [1], delay: 0.7}, known: [b0]}\n"
@@ -53,7 +53,7 @@ def record_of(model, samples=600, seed=0):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("nominal", ["[2.0, 3.0, 1.685]", "[1.0, 8.0, 9.0]"])
-def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
+def test_gain_time_constant_and_dead_time_are_found_from_poor_nominal_values(nominal):
     """Within four standard deviations, whatever the nominal values."""
     words = dict(zip(("gain", "time_constant", "dead_time"), json.loads(nominal), strict=True))
     truth = build_model(spec_of(PROCESS))
@@ -76,12 +76,12 @@ COLOURED = (
 @pytest.mark.parametrize(
     ("of_plant", "of_noise"), [((), ()), ((), ("c1",)), (("T",), ("d1",)), (("name",), ())]
 )
-def test_what_is_known_of_one_fixes_nothing_of_the_other(name, of_plant, of_noise):
-    """Whatever the parameter is called, the information is that of a plant with K in its place."""
+def test_known_parameters_of_plant_and_noise_do_not_affect_each_other(name, of_plant, of_noise):
+    """The gradients equal the gradients of a plant whose parameter is called K, whatever its name."""
 
     def model_of(called):
         listed = json.dumps([called if one == "name" else one for one in of_plant])
-        # An empty list is no list of names.
+        # An empty list is not accepted as a list of names.
         text = COLOURED % (json.dumps(of_noise), called, called, listed)
         return build_model(parse_spec(text.replace(", known: []", ""), design=False))
 
@@ -92,8 +92,8 @@ def test_what_is_known_of_one_fixes_nothing_of_the_other(name, of_plant, of_nois
 
 
 @pytest.mark.parametrize(("end", "stopped"), [(22.0, True), (10.0, False)])
-def test_an_estimate_that_the_end_of_an_expression_stops_is_told_and_decides_nothing(end, stopped, tmp_path):
-    """The plant has T = 20; an expression that ends at 22 left an estimate there that met what was asked."""
+def test_an_estimate_stopped_at_the_end_of_an_expression_leaves_the_verdict_open(end, stopped, tmp_path):
+    """The plant has T = 20; an expression that is undefined below 22 stops the estimate there."""
     rng = np.random.default_rng(3)
     u, pole = np.repeat(rng.choice([-1.0, 1.0], 80), 5), np.exp(-5.0 / 20.0)
     y = scipy.signal.lfilter([0.0, 0.0, 2.0 * (1.0 - pole)], [1.0, -pole], u) + 0.2 * rng.standard_normal(400)
@@ -114,7 +114,7 @@ accuracy: {{model_error: {{relative: 0.5}}}}
 
 
 def _held(gain, seed):
-    """Samples of gain/(6 s + 1), held for 3 to 12 samples of one second, with noise."""
+    """(300, 2): u, held for 3 to 11 samples of one second, and y of gain/(6 s + 1) with noise."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], 60), rng.integers(3, 12, 60))[:300]
     pole = np.exp(-1.0 / 6.0)
@@ -131,8 +131,8 @@ experiment: {samples: 300}
 
 
 @pytest.mark.slow
-def test_a_gain_behind_a_pole_of_its_expression_is_told_with_where_the_search_ended(tmp_path):
-    """1/(p - 1) from p = 3 does not get to p = 0.5: p runs off to where it changes nothing."""
+def test_a_search_that_a_pole_of_an_expression_blocks_is_refused_with_where_it_ended(tmp_path):
+    """1/(p - 1) from p = 3 does not reach p = 0.5: p grows until it has no effect."""
     np.savetxt(tmp_path / "log.csv", _held(-2.0, 4), delimiter=",", header="u,y", comments="")
     with pytest.raises(DataError) as caught:
         estimated(parse_spec(_LAG % (3.0, "1/(p - 1)"), design=False), tmp_path / "log.csv")

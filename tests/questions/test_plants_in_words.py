@@ -1,4 +1,4 @@
-"""One plant in several words of a spec is one model, one error, one design, and is written back in words."""
+"""Parametrisations of one plant have one model, one error and one design; written models are read back."""
 
 import json
 
@@ -67,8 +67,8 @@ def spec_of(plant, rest=REST, noise="{variance: 0.1}", **kwargs):
 
 @pytest.mark.parametrize("noise", ["{variance: 0.1}", *NOISES])
 @pytest.mark.parametrize("words", WORDS.values(), ids=WORDS)
-def test_the_error_of_one_spectrum_is_the_same_in_all_words(words, noise):
-    """Without a solver in between."""
+def test_the_error_of_one_spectrum_is_the_same_in_all_parametrisations(words, noise):
+    """The spectrum is given, so no solver is involved."""
     found = [largest_errors(build_experiment(spec_of(plant, noise=noise))) for plant in words]
     np.testing.assert_allclose(found, np.broadcast_to(found[0], np.shape(found)), rtol=1e-9)
 
@@ -78,7 +78,7 @@ def test_the_error_of_one_spectrum_is_the_same_in_all_words(words, noise):
     ("name", "noise", "loop"),
     [("in s and in q", NOISES[1], PI), *((name, "{variance: 0.1}", None) for name in WORDS)],
 )
-def test_one_plant_in_several_words_is_one_design(name, noise, loop):
+def test_all_parametrisations_of_a_plant_have_the_same_design(name, noise, loop):
     rest = REST if loop is None else REST.replace("experiment: {samples: 300}", loop)
     found = [solve(spec_of(plant, rest, noise)) for plant in WORDS[name]]
     costs = [one.result["cost"] for one in found]
@@ -87,7 +87,7 @@ def test_one_plant_in_several_words_is_one_design(name, noise, loop):
         np.testing.assert_allclose(other.bound["r_u"], found[0].bound["r_u"], rtol=1e-6)
 
 
-def test_a_gain_is_coloured_noise():
+def test_a_kalman_gain_has_the_information_of_an_armax_model():
     """x+ = a x + b u + k e is ARMAX: A = 1 - a q^-1, C = 1 + (k - a) q^-1."""
     states = (
         "{parameters: {a: 0.8, b: 0.5, k: 0.3}, "
@@ -103,8 +103,8 @@ def test_a_gain_is_coloured_noise():
     np.testing.assert_allclose(found.noise_information, expected, rtol=1e-9, atol=1e-9)
 
 
-def check_words(model):
-    """What is written of a model is read as the same one, by names, values and responses."""
+def check_written_blocks(model):
+    """Asserts that the written blocks give the same names, values and responses; returns the plant."""
     blocks = blocks_of(model)
     text = "\n".join(f"{key}: {json.dumps(block)}" for key, block in blocks.items())
     again = build_model(parse_spec(f"{text}\nsample_time: 0.5", design=False))
@@ -129,29 +129,29 @@ OTHERS = [
 
 @pytest.mark.parametrize("noise", ["{variance: 0.1}", *NOISES])
 @pytest.mark.parametrize("plant", [*(one for words in WORDS.values() for one in words), *OTHERS])
-def test_the_words_of_a_model_are_read_back(plant, noise):
-    """What `identify` writes is the model that it found."""
+def test_the_written_blocks_of_a_model_are_read_back_as_the_same_model(plant, noise):
+    """`identify` writes the model that it has found in these blocks."""
     spec = parse_spec(f"plant: {plant}\nnoise: {noise}\nsample_time: 0.5\n", design=False)
     model = build_model(spec)
-    written = check_words(model.at(1.01 * model.theta))
+    written = check_written_blocks(model.at(1.01 * model.theta))
     assert ("parameters" in plant) == ("parameters" in written)
 
 
 @pytest.mark.parametrize("outputs", [1, 2])
 @pytest.mark.parametrize("noise", [0, 2])
 @pytest.mark.parametrize(("order", "zero"), [(1, False), (2, False), (2, True)])
-def test_the_words_of_a_process_that_was_found_in_a_log_are_read_back(order, zero, noise, outputs):
+def test_the_written_blocks_of_an_explored_process_are_read_back(order, zero, noise, outputs):
     rng = np.random.default_rng(order)
     rows, thetas = [], []
     for _ in range(outputs):
         rows.append(Process((1,) * outputs, order, 0.5, zero, noise))
         plant = rng.uniform(0.6, 1.4, rows[-1].size - 2 * noise)
         thetas.append(np.concatenate([plant, rng.uniform(-0.3, 0.3, 2 * noise)]))
-    check_words(process_models(rows, thetas, np.diag(rng.uniform(0.5, 1.0, outputs))))
+    check_written_blocks(process_models(rows, thetas, np.diag(rng.uniform(0.5, 1.0, outputs))))
 
 
 @pytest.mark.slow
-def test_a_study_estimates_the_named_parameters():
+def test_simulated_experiments_estimate_the_named_parameters():
     rest = REST.replace("samples: 60", "samples: 300") + "simulation: {runs: 40, seed: 2}\n"
     for plant in (WORDS["first order"][0], WORDS["first order"][4]):
         found = simulate(spec_of(plant, rest)).result["simulation"]["inputs"]["design"]

@@ -1,4 +1,4 @@
-"""What was known before a record: whether it counts beside it, and contradicts it or not."""
+"""Priors beside a record: whether they count, and whether they contradict it."""
 
 import json
 from functools import partial
@@ -29,7 +29,7 @@ signal: {candidates: 1}
 
 @pytest.fixture
 def lag_record(write):
-    """Writes a record of the lag, about an operating point, begun off it."""
+    """Writes a record of the lag about an operating point, with a start off it by `warm`."""
 
     def written(name, samples, seed, *, power=1.0, level=(0.0, 0.0), warm=0.0):
         u = np.sqrt(power) * np.random.default_rng(1000 + seed).standard_normal(samples)
@@ -41,14 +41,14 @@ def lag_record(write):
 
 @pytest.fixture(scope="module")
 def estimated(tmp_path_factory):
-    """What `identify` finds in a record of the lag, which others take for what was known before."""
+    """The result of `identify` for a record of the lag, which other tests take as a prior."""
     folder = tmp_path_factory.mktemp("estimated")
     u = np.sqrt(0.5) * np.random.default_rng(1001).standard_normal(300)
     (folder / "a.csv").write_text(csv_text(Table({"time_s": np.arange(300.0), "u": u, "y": answered(u, 1)})))
     return identify(parse_spec(LAG), folder / "a.csv")
 
 
-def test_a_prior_without_its_estimate_counts_neither_for_the_verdict_nor_for_the_top_up(lag_record):
+def test_a_prior_without_its_estimate_affects_neither_verdict_nor_top_up(lag_record):
     overrides = ["accuracy.model_error.relative=0.05"]
     path = lag_record("a.csv", 300, 1, power=0.5)
     plain = assess(parse_spec(LAG, overrides=overrides), path)
@@ -64,7 +64,7 @@ def test_a_prior_without_its_estimate_counts_neither_for_the_verdict_nor_for_the
     assert found == [1, 0]
 
 
-def test_a_prior_with_its_estimate_counts_as_its_record_does(lag_record, tmp_path):
+def test_a_prior_with_its_estimate_has_the_effect_of_its_record(lag_record, tmp_path):
     spec = parse_spec(LAG, overrides=["accuracy.model_error.relative=0.1"], folder=tmp_path)
     first = lag_record("a.csv", 700, 1, power=0.5, level=(40.0, 52.3), warm=1.0)
     second = lag_record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
@@ -82,7 +82,7 @@ def test_a_prior_with_its_estimate_counts_as_its_record_does(lag_record, tmp_pat
     assert result["identification"]["prior"]["probability"] > 1e-3
 
 
-def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(lag_record, estimated, tmp_path):
+def test_a_prior_from_the_same_data_is_refused_in_any_format_of_their_file(lag_record, estimated, tmp_path):
     path = lag_record("a.csv", 300, 1, power=0.5)
     (tmp_path / "model.yaml").write_bytes(estimated.files["model.yaml"])
     spaced = tmp_path / "b.csv"
@@ -93,8 +93,8 @@ def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(lag_
         assert (told.code, told.key) == ("data-repeated", "experiment.prior")
 
 
-def test_a_prior_of_a_copy_of_the_data_decides_nothing(lag_record, estimated, tmp_path):
-    """Rounded to a tenth of the noise, and a few rows less."""
+def test_a_prior_from_a_copy_of_the_data_leaves_the_verdict_undecided(lag_record, estimated, tmp_path):
+    """The copy is rounded to four digits and lacks the last two rows."""
     path = lag_record("a.csv", 300, 1, power=0.5)
     (tmp_path / "model.yaml").write_bytes(estimated.files["model.yaml"])
     known = parse_spec(LAG, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
@@ -107,8 +107,8 @@ def test_a_prior_of_a_copy_of_the_data_decides_nothing(lag_record, estimated, tm
     assert "prior-of-these-data" in codes_in(verdict.results.result)
 
 
-def test_estimates_from_different_data_are_as_alike_as_chance_has_it():
-    """Of two Gaussian estimates the probability is uniform; of the same one it vanishes."""
+def test_the_probability_that_estimates_agree_is_uniform_for_independent_data():
+    """The probability is uniform for two Gaussian estimates and vanishes for the same one."""
     rng = np.random.default_rng(1)
     information = np.array([[4.0, 1.0], [1.0, 2.0]])
     deviation = np.linalg.cholesky(np.linalg.inv(information))
@@ -121,7 +121,7 @@ def test_estimates_from_different_data_are_as_alike_as_chance_has_it():
     assert Earlier(one, information).likeness(one, factor) < 1e-9
 
 
-def test_a_prior_of_another_system_decides_nothing(lag_record):
+def test_a_prior_of_another_system_leaves_the_verdict_undecided(lag_record):
     path = lag_record("a.csv", 700, 1, power=0.5)
     found = identify(parse_spec(LAG), path).result
     values = {name: 1.1 * value for name, value in found["identification"]["theta"].items()}
@@ -135,7 +135,7 @@ def test_a_prior_of_another_system_decides_nothing(lag_record):
     "text",
     ["", "secret: [", "- 1", "plant: {B: [0, 1]}", "estimate: {parameters: {b1: 1}, covariance: [[1, 0]]}"],
 )
-def test_what_is_no_model_file_is_refused_and_not_shown(tmp_path, text):
+def test_an_invalid_model_file_is_refused_without_showing_its_content(tmp_path, text):
     (tmp_path / "model.yaml").write_text(text)
     spec = parse_spec(LAG, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
     with pytest.raises(SpecError) as caught:
@@ -147,7 +147,7 @@ def test_what_is_no_model_file_is_refused_and_not_shown(tmp_path, text):
 
 @pytest.mark.parametrize("name", ["folder", "there-is-none.csv", "text.csv", "output.csv"])
 @pytest.mark.parametrize("ask", [identify, assess, lambda spec, path: solve(spec)])
-def test_a_prior_that_cannot_be_read_is_refused_wherever_it_stands(ask, name, lag_record, tmp_path):
+def test_a_prior_that_cannot_be_read_is_refused_by_every_command(ask, name, lag_record, tmp_path):
     path = lag_record("a.csv", 300, 1, power=0.5)
     (tmp_path / "folder").mkdir()
     (tmp_path / "text.csv").write_text("u1\nhigh\nlow\n")

@@ -1,4 +1,4 @@
-"""Systems of python-control there and back, specs from plain data, results as arrays."""
+"""Conversion from and to python-control systems, specs from plain data, results as arrays."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def response(model, w):
     return model.plant_at(w)
 
 
-def test_a_discrete_transfer_function_comes_and_goes():
+def test_a_discrete_transfer_function_is_converted_in_both_directions():
     system = control.tf([0.3, 0.1], [1, -1.2, 0.5], 0.5)
     spec = from_control(system)
     model = build_model(spec)
@@ -41,7 +41,7 @@ def test_a_continuous_transfer_function_is_sampled_with_its_dead_time(delay):
         np.testing.assert_allclose(back(np.exp(1j * W)), held(np.exp(1j * W)), rtol=1e-10)
 
 
-def test_it_may_stay_in_continuous_time():
+def test_a_continuous_system_may_stay_in_continuous_time():
     system = control.tf([[[2.0], [1.0, 0.4]]], [[[3.0, 1], [1, 0.8, 2]]])
     spec = from_control(system)
     expected = np.moveaxis(system(1j * W), -1, 0)
@@ -50,7 +50,7 @@ def test_it_may_stay_in_continuous_time():
     assert refusals(lambda: to_control(from_control(system, delay=[[0.1, 0]])))[0].code == "not-supported"
 
 
-def test_states_by_their_transfer_functions_or_by_entries():
+def test_a_state_space_is_converted_by_transfer_functions_or_named_entries():
     A, B = np.array([[0.0, 1.0], [-2.0, -0.9]]), np.array([[0.0], [1.5]])
     system = control.ss(A, B, np.eye(2), np.zeros((2, 1)))
     w, expected = W, control.sample_system(system, 0.2, "zoh")
@@ -63,7 +63,7 @@ def test_states_by_their_transfer_functions_or_by_entries():
     assert build_model(by_entries).names == ("k",)
 
 
-def test_an_entry_has_no_poles_that_do_not_reach_it():
+def test_an_entry_of_a_state_space_has_only_the_poles_that_reach_it():
     system = control.ss(np.diag([-1.0, -2.0]), np.eye(2), np.eye(2), np.zeros((2, 2)))
     model = build_model(from_control(system, sample_time=0.1))
     assert model.names == ("b0[1,1]", "b0[2,2]", "a0[1,1]", "a0[2,2]")
@@ -77,7 +77,7 @@ def test_an_entry_has_no_poles_that_do_not_reach_it():
         (3.0, "not-supported", "plant"),
     ],
 )
-def test_what_cannot_be_a_plant_is_refused(system, code, key):
+def test_objects_that_cannot_be_a_plant_are_refused(system, code, key):
     found = refusals(lambda: from_control(system))[0]
     assert (found.code, found.key) == (code, key)
 
@@ -93,7 +93,7 @@ DATA = {
 }
 
 
-def test_a_spec_of_plain_data_is_that_of_its_text():
+def test_a_spec_from_plain_data_equals_that_from_its_text():
     spec = Spec.from_dict({**DATA, "plant": {"B": np.array([0, 3.6]), "F": (1, -0.7)}})
     assert spec.sha256 == parse_spec(spec.to_yaml()).sha256 == Spec.from_dict(DATA).sha256
     other = spec.with_(**{"experiment.samples": np.int64(600), "signal.seed": None})
@@ -124,7 +124,7 @@ def test_results_are_arrays():
     assert power.sum() == pytest.approx(lines.result["cost"], rel=1e-6)
 
 
-def test_what_a_run_does_not_have_is_no_attribute_of_it():
+def test_missing_tables_of_a_result_raise_attribute_errors():
     found = solve(Spec.from_dict(DATA))
     assert [one.message for one in found.findings] == list(found.result.get("notes", []))
     bare = replace(found, curves={}, tables={})
@@ -135,8 +135,8 @@ def test_what_a_run_does_not_have_is_no_attribute_of_it():
         _ = bare.spectrum
 
 
-def test_the_power_of_a_line_is_found_by_the_digits_that_people_write():
-    """Lines at multiples of pi/(60 sample_time), as numbers and as arrays of any shape."""
+def test_the_power_of_a_line_is_found_by_four_digits_of_its_frequency():
+    """The lines are multiples of pi/(60 sample_time); frequencies are numbers or arrays of any shape."""
     heater = {"continuous": {"gain": 2.1, "time_constant": 180, "dead_time": 25}, "sample": "zoh"}
     spec = {
         "sample_time": 4.76,

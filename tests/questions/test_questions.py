@@ -1,4 +1,4 @@
-"""Specs with limits, criteria and further requirements: what their results say."""
+"""Results of specs with limits, criteria and further requirements."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from inputdesign_cli.errors import SpecError
 from tests.support.first_order_specs import ERROR, FIR, PLANT, run
 
 
-def test_what_a_shortest_experiment_says_is_of_its_whole_samples():
-    """Of 7 samples, not of 6.4: ratio, information and bound.csv agree with r_u from the covariance."""
+def test_results_of_a_shortest_experiment_are_for_a_whole_number_of_samples():
+    """Ratio and bound.csv hold for 7 samples, not 6.4, and agree with r_u from the covariance."""
     text = ERROR.replace("0.01", "0.1") + FIR + "objective: shortest_experiment\nlimits: {input_power: 0.2}\n"
     outcome = solve(parse_spec(PLANT + text))
     result, table = outcome.result, outcome.tables["bound"].columns
@@ -31,7 +31,7 @@ def test_what_a_shortest_experiment_says_is_of_its_whole_samples():
 
 
 @pytest.mark.parametrize("samples", [100, 1000])
-def test_the_criterion_of_a_record_is_that_of_the_experiment_that_goes_on_like_it(samples):
+def test_the_criterion_of_a_record_is_scaled_to_the_length_of_the_experiment(samples):
     """One gain in white noise: M = prior + N P / lambda, whatever the length of the record."""
     result = solve(
         parse_spec(
@@ -43,11 +43,11 @@ def test_the_criterion_of_a_record_is_that_of_the_experiment_that_goes_on_like_i
     ).result
     told = 100 * 3.0 / 0.5
     assert result["objective"]["value"] == pytest.approx(40 + told, rel=1e-6)
-    lost = 1 - 1 / samples  # of the last sample nothing is seen
+    lost = 1 - 1 / samples  # the response to the last sample is not recorded
     assert result["signal"]["criterion"] == pytest.approx(40 + told * lost, rel=1e-3)
 
 
-def test_smallest_factor():
+def test_best_accuracy_with_half_the_needed_power_has_sqrt_2_times_the_error():
     """Half the power that the accuracy needs: r_u is at least sqrt(2) times what is admissible."""
     least = run(ERROR + FIR)["cost"]
     limits = f"limits: {{input_power: {least / 2}, output_power: 1000}}\n"
@@ -68,7 +68,7 @@ def test_smallest_factor():
     ("T", np.trace),
 ])  # fmt: skip
 @pytest.mark.parametrize("scale", ["absolute", "relative"])
-def test_criteria_are_those_of_the_reported_matrix(letter, measure, scale):
+def test_criteria_have_the_value_of_the_reported_information_matrix(letter, measure, scale):
     result = run(f"accuracy: {{criterion: {letter}, scale: {scale}}}\nlimits: {{input_power: 1}}\n" + FIR)
     M = np.asarray(result["information"]["matrix"])
     if scale == "relative":
@@ -83,7 +83,7 @@ def test_criteria_are_those_of_the_reported_matrix(letter, measure, scale):
 
 
 def test_an_earlier_record_is_prior_information(tmp_path):
-    """The record of half the experiment, applied before, halves what is left to do (nearly: one record)."""
+    """An earlier record with half the optimal information leaves about half of the cost."""
     plain = solve(parse_spec(PLANT + ERROR + FIR))
     w = 0.155 * np.arange(4000)
     record = tmp_path / "u.csv"
@@ -107,7 +107,7 @@ def test_standard_deviations_are_reached():
     ]
 
 
-def test_information_target_by_name_in_any_order():
+def test_an_information_target_takes_parameters_by_name_in_any_order():
     by_name = run(
         "accuracy: {information: {matrix: [[1.0e+6, 0], [0, 1.0e+4]], parameters: [f1, b1]}}\n" + FIR
     )
@@ -147,8 +147,8 @@ def test_density_limits_from_numbers_tables_and_filters(tmp_path):
         assert outcome.result["limits"][-1]["binding"]
 
 
-def test_free_power_near_dc_is_noted(flexible):
-    """With an integrator in the loop the free optimum has free power at DC: said, and mended by a cap."""
+def test_almost_free_power_near_dc_is_reported_and_a_limit_removes_it(flexible):
+    """With an integrator in the loop, excitation near frequency zero costs almost nothing."""
     path, free = "specs/flexible_transmission.yaml", "spectrum={type: free}"
     design = solve(load_spec(path, [free]))
     assert design.result["cost"] == pytest.approx(6.556636, rel=1e-5)
@@ -166,15 +166,15 @@ def test_free_power_near_dc_is_noted(flexible):
         ("flexible_transmission", "accuracy={model_error: {relative: 1000}}"),
     ],
 )
-def test_what_is_known_already_may_be_enough(spec, override):
-    """By the prior, or by the noise of normal operation in the loop."""
+def test_no_excitation_is_needed_where_the_prior_or_the_noise_suffices(spec, override):
+    """The first spec has a prior, the second the noise of normal operation in a loop."""
     result = solve(load_spec(f"specs/{spec}.yaml", [override, "spectrum.order=3"])).result
     assert (result["status"], result["cost"]) == ("nothing_needed", 0.0)
     assert [one["code"] for one in result["findings"]] == ["no-excitation-needed"]
 
 
-def test_an_input_that_a_trace_leaves_out_is_told():
-    """One input has all of the trace where its gains are largest; the other gets nothing."""
+def test_an_input_without_power_under_the_trace_criterion_is_reported():
+    """The trace is largest with all power at one input."""
     found = solve(
         parse_spec(
             "plant: {B: [[[0, 1], [0, 0.4]]], F: [[[1, -0.8], [1, -0.5]]]}\nnoise: {variance: 1}\n"
@@ -189,8 +189,8 @@ def test_an_input_that_a_trace_leaves_out_is_told():
 
 @pytest.mark.parametrize("spectrum", ["fir, order: 4", "free", "white"])
 @pytest.mark.parametrize(("share", "needed"), [(1.05, False), (0.99, True)])
-def test_what_noise_alone_tells_of_some_parameters_needs_no_excitation(spectrum, share, needed):
-    """Without excitation N samples of an ARX system give var a1 = (1 - a1^2) / N, and nothing of b1."""
+def test_a_parameter_that_the_noise_alone_determines_needs_no_excitation(spectrum, share, needed):
+    """Noise alone gives var a1 = (1 - a1^2) / N for N samples of an ARX system, and nothing about b1."""
     bound = share * np.sqrt((1 - 0.5**2) / 1000)
     found = solve(
         parse_spec(

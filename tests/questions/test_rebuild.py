@@ -1,4 +1,4 @@
-"""A question is built again at an estimate, and one object alone keeps the sections of a spec for that."""
+"""`Rebuild` builds a design question again at an estimate, and it alone keeps the spec for that."""
 
 import ast
 import pickle
@@ -23,7 +23,7 @@ def rebuilt(change, *overrides, theta=None):
     return Rebuild(spec, lambda spec: spec).at(model, change)
 
 
-def test_without_a_change_only_the_model_is_another():
+def test_without_a_change_a_rebuilt_experiment_differs_only_in_its_model():
     spec = parse_spec(SPEC)
     again = Rebuild(spec, build_experiment)
     model = build_model(spec).at(np.array([3.4, -0.73]), np.array([[1.2]]))
@@ -36,8 +36,8 @@ def test_without_a_change_only_the_model_is_another():
         again.at(model.at(np.array([3.4, -1.2])))
 
 
-def test_each_change_is_one_of_the_design():
-    """The values are those that a user would write; what is not named stays as the spec has it."""
+def test_each_change_sets_its_keys_of_the_spec_and_leaves_the_others():
+    """The values are those that a user would write; other keys stay as the spec has them."""
     plain = rebuilt(Change(120, 5))
     assert (plain.experiment.samples, plain.signal.seed, plain.campaign) == (120, 5, None)
     assert (plain.uncertainty, plain.signal.scale, plain.solver.any_spectrum) == (None, None, False)
@@ -50,7 +50,7 @@ def test_each_change_is_one_of_the_design():
     assert set(rebuilt(Change(120, 5, uncertainty="stated")).uncertainty.intervals) == {"b1"}
 
 
-def test_plants_that_the_data_leave_open_replace_those_of_the_spec():
+def test_the_uncertainty_from_data_replaces_that_of_the_spec():
     information = np.array([[2e2, -1e3], [-1e3, 2e4]])
     spec = rebuilt(Change(120, 5, information=information, uncertainty="data"), theta=[3.4, -0.73])
     assert np.array_equal(spec.experiment.prior.information, information)
@@ -58,12 +58,12 @@ def test_plants_that_the_data_leave_open_replace_those_of_the_spec():
     assert (spec.uncertainty.intervals, spec.uncertainty.scenarios) == (None, 10)
 
 
-def test_it_goes_to_other_processes():
+def test_a_rebuild_can_be_pickled():
     again = pickle.loads(pickle.dumps(Rebuild(parse_spec(SPEC), build_experiment)))
     assert again.at(None).samples == 200
 
 
-def test_no_other_object_of_a_question_has_a_field_for_the_spec():
+def test_only_rebuild_and_uncertain_plant_have_a_field_for_the_spec():
     root = Path(inputdesign_cli.__file__).parent / "questions"
     fields = [
         (node.name, line.annotation)

@@ -1,7 +1,7 @@
-"""Specs that cannot be asked: each is refused by `validate` with a code, at a key, with its place and a hint.
+"""Invalid specs: `validate` refuses each with a code, a key, its place and a hint.
 
-A row of a table is the code, the key and the changes of the spec that begins it, between bars; a line that is
-indented goes on with the row before. Words in capitals are in NAMES.
+A row of a table has code and key, and the changes of the spec at its head, separated by bars. Indented lines
+continue the row before. Words in capitals are abbreviations from NAMES.
 """
 
 import re
@@ -378,7 +378,7 @@ wrong-shape accuracy.model_error.sensitivity.controller.numerator | accuracy.mod
   6, controller: {numerator: [[[9]]]}}
 """),
 }  # fmt: skip
-# What rows say in short.
+# Abbreviations in the rows.
 NAMES = {
     "GIVEN_ONE": "spectrum={given: {type: white, power: 3}} | uncertainty={scenarios: [{b1: 0.45}]}",
     "LAGGED": "parameters: {K: 2.0, T: 5.0, L: 2.3}, sample: zoh, "
@@ -405,12 +405,12 @@ def row_of(text):
 ROWS = [
     (name, *row_of(row)) for name, (_, table) in TABLES.items() for row in re.split(r"\n(?! )", table.strip())
 ]
-# Complaints of the schema, which say all in their message.
+# Codes of the schema, whose messages need no hint.
 PLAIN = ("not-a-number", "out-of-range", "unknown-word", "zero-polynomial")
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: " ".join(row)[:80])
-def test_what_cannot_be_asked_is_refused_at_its_key(row):
+def test_an_invalid_spec_is_refused_with_code_key_place_and_hint(row):
     name, expected, *changes = row
     text = TABLES[name][0]
     found = refusals(

@@ -1,4 +1,4 @@
-"""From the spec to the result: designs, signals, simulations, figures, and what is said of bad input."""
+"""Regression problems from spec to result: designs, signals, simulations, figures and refusals."""
 
 from functools import cache
 from pathlib import Path
@@ -30,7 +30,7 @@ FOUR = [
 
 @cache
 def solved(path, *overrides, verb=solve):
-    """What a spec gives; no test may change it."""
+    """The results of a spec; no test may change them."""
     return verb(load_spec(path, list(overrides)))
 
 
@@ -38,7 +38,7 @@ def result(path, *overrides, verb=solve):
     return solved(path, *overrides, verb=verb).result
 
 
-def test_what_is_reported_adds_up():
+def test_the_mean_squared_error_is_squared_bias_plus_variance():
     found = result(FIR, *FOUR)
     error, objective = found["mean_squared_error"], found["objective"]
     assert error["value"] == pytest.approx(error["bias_squared"] + error["variance"])
@@ -49,7 +49,7 @@ def test_what_is_reported_adds_up():
     assert "signal" not in result(FIR, *FOUR, "experiment.samples=3")
 
 
-def test_least_error_and_least_energy_are_inverse():
+def test_the_least_error_at_the_least_energy_is_the_target():
     energy = result(FIR, *FOUR)["cost"]
     found = result(FIR, *FOUR, f"{E}.target=null", f"limits.energy={energy:.17g}")
     assert found["objective"]["kind"] == "mean_squared_error"
@@ -75,8 +75,8 @@ def test_free_regressors_have_their_moments_exactly(samples, periods):
     np.testing.assert_array_equal(Phi[:period], Phi[-period:])
 
 
-def test_the_signal_of_the_paper_has_these_moments():
-    """Example 2 prints a realisation of period 2, rounded to 1e-5, whose u2 begins with a misprint."""
+def test_the_signal_printed_for_example_2_has_the_designed_moments():
+    """The printed realisation has period 2 and is rounded to 1e-5; its u2 begins with a misprint."""
     R = result(FREE)["moments"]["R"]
     Phi = np.tile([[0.00057, 0.00057], [0.01529, 0.00944]], (5000, 1))
     np.testing.assert_allclose(Phi.T @ Phi, R, atol=2e-3)
@@ -86,14 +86,14 @@ def test_example_3_is_a_constant_signal():
     np.testing.assert_allclose(np.abs(solved(FIR).tables["signal"].columns["u1"]), 0.01, rtol=1e-9)
 
 
-def test_a_period_of_20_costs_what_the_errata_says():
+def test_a_period_of_20_samples_has_the_error_that_the_errata_state():
     entry = result(FIR, *FOUR, f"{E}.target=null", "limits.energy=8", "signal.periods=10")["signal"]
     assert entry["mean_squared_error"] == pytest.approx(1.072477, abs=1.5e-6)
     assert not entry["on_grid"]
     assert entry["energy"] == pytest.approx(8.0)
 
 
-def test_the_samples_meet_the_target_from_their_periodic_past():
+def test_samples_with_a_periodic_past_meet_the_target():
     outcome = solved(FIR, *FOUR)
     Phi = delayed_regressors(outcome.tables["signal"].columns["u1"], 4, "steady")
     entry = outcome.result["signal"]
@@ -102,7 +102,7 @@ def test_the_samples_meet_the_target_from_their_periodic_past():
     assert entry["energy"] < 1.001 * outcome.result["cost"]
 
 
-def test_from_rest_the_first_samples_are_missing():
+def test_regressors_from_rest_begin_with_zeros_and_have_less_energy():
     entry = result(FIR, *FOUR, "signal.start=zero")["signal"]
     assert entry["energy"] == entry["from_rest"]["energy"]
     assert entry["energy"] < result(FIR, *FOUR)["signal"]["energy"]
@@ -112,8 +112,8 @@ def test_from_rest_the_first_samples_are_missing():
 
 
 @pytest.mark.parametrize(("path", "mean"), [(FREE, 1.381966), (FIR, 1.0)])
-def test_examples_2_and_3(path, mean):
-    """10000 runs of 200 samples: the theory depends on Phi^T Phi only. Four standard errors."""
+def test_simulated_errors_of_examples_2_and_3_agree_with_theory(path, mean):
+    """Theory depends on Phi^T Phi only; 10000 runs of 200 samples agree within four standard errors."""
     study = result(path, "experiment.samples=200", "simulation.compare=[white]", verb=simulate)["simulation"]
     design, white = study["inputs"]["design"], study["inputs"]["white"]
     assert abs(design["mse"] - 1.0) < 4 * design["mse_standard_error"]
@@ -124,7 +124,7 @@ def test_examples_2_and_3(path, mean):
     assert white["energy"] == pytest.approx(design["energy"])
 
 
-def test_estimates_are_least_squares():
+def test_simulated_estimates_are_least_squares_estimates():
     rng = np.random.default_rng(0)
     Phi, theta = rng.standard_normal((30, 4)), np.array([1.0, 2.0, 3.0, 4.0])
     regression = Regression(np.array([1.0, 0.0]), np.array([0.0, 1.0]), 1.0, 0.25)
@@ -136,7 +136,7 @@ def test_estimates_are_least_squares():
     np.testing.assert_allclose(found.error, found.theta[:, 0] - 1.0 - 4.0)
 
 
-def test_a_run_has_its_files(tmp_path):
+def test_a_run_of_a_regression_writes_its_files(tmp_path):
     outcome = solved(FIR, "experiment.samples=60")
     files = {file.name for file in write_run(outcome, tmp_path / "run", draw_all(outcome))}
     wanted = "spec.yaml signal.csv signal.png spectrum.csv error.png moments.png figures.json result.json"
@@ -154,12 +154,12 @@ def test_a_run_has_its_files(tmp_path):
         (simulate, "experiment.samples=1", "wrong-shape"),
     ],
 )
-def test_what_cannot_be_made_or_simulated(verb, override, code):
+def test_unsupported_signals_and_simulations_are_refused(verb, override, code):
     assert code_of(verb, load_spec(FIR, [override])) == code
 
 
-def test_an_infeasible_target_says_what_would_be_feasible():
-    """Example 4 at alpha = 2: |b| is 1 at least, so a target of 4 or an alpha of 1 is the border."""
+def test_an_infeasible_target_is_refused_with_feasible_values():
+    """Example 4 at alpha = 2: |b| is at least 1, so a target of 4 or an alpha of 1 is the border."""
     two = f"{E}.neglected=[2]"
     told = refusal(lambda: solve(load_spec(FIR, [two, f"{E}.neglected_norm=2"])), InfeasibleError)
     assert told.code == "target-out-of-reach"

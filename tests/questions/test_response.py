@@ -80,7 +80,7 @@ def test_a_lower_limit_on_the_output_is_met_where_it_is_cheapest():
     result = solve(spec(limits__output_power={"min": floor})).result
     _, size, _ = lines_of(result)
     more = np.array(result["spectrum"]["powers"]) - np.array(plain()["spectrum"]["powers"])
-    # A plain argument: what is missing at the output comes from the line of the largest gain alone.
+    # Output power is cheapest at the line of the largest gain, so that only this line gets more.
     top = int(np.argmax(size))
     assert more[top] == pytest.approx(plain()["power"]["output"][0] / size[top] ** 2, rel=1e-6)
     assert np.abs(np.delete(more, top)).max() < 1e-9
@@ -100,7 +100,7 @@ def test_the_record_repeats_and_has_the_lines_of_the_design():
     )
     assert np.delete(transforms, numbers).max() < 1e-20
     assert results.result["signal"]["crest_factor"][0] < 2.2
-    # Noise of a finite record leaks, and the record makes up for it.
+    # Noise leaks in a finite record, which the scale of the record compensates.
     assert results.result["signal"]["worst_ratio"] == pytest.approx(1.0, rel=1e-9)
 
 
@@ -121,25 +121,25 @@ def test_simulated_deviations_are_those_designed_at_every_line(text):
         assert simulated == pytest.approx(table[name], rel=0.05)
 
 
-def test_equal_lines_keep_lower_limits_too():
+def test_the_baseline_of_equal_lines_keeps_a_lower_limit():
     floor = 3.0 * plain()["baseline"]["white"]["cost"]
     result = solve(spec(limits__input_power={"min": floor})).result
     assert result["cost"] == pytest.approx(floor, rel=1e-9)
     assert result["baseline"]["white"]["cost"] == pytest.approx(floor, rel=1e-9)
 
 
-def test_a_record_that_limits_keep_from_the_accuracy_says_so():
+def test_a_record_that_misses_the_accuracy_for_a_limit_is_reported():
     need = plain()["cost"]
     found = solve(spec(limits__input_power=need * (1 + 1e-9))).outcome
     (one,) = [one for one in found.findings if one.code == "noise-leaks"]
     assert one.figures["ratio"] == found.signal.worst_ratio > 1.0001
 
 
-def test_one_run_has_no_deviation():
+def test_a_simulation_of_a_single_run_is_refused():
     assert code_of(simulate, spec(simulation={"runs": 1})) == "out-of-range"
 
 
-def test_each_input_has_lines_of_its_own_powers():
+def test_the_powers_of_the_lines_of_two_inputs_have_their_closed_form():
     result = solve(spec(SEVERAL)).result
     powers = np.array(result["spectrum"]["powers"])
     w = np.array(result["spectrum"]["frequencies"])
@@ -150,7 +150,7 @@ def test_each_input_has_lines_of_its_own_powers():
     assert powers == pytest.approx(np.einsum("l,ab->lab", each, np.eye(2)), rel=1e-9)
 
 
-def test_a_given_multisine_is_analysed_at_its_lines():
+def test_a_given_multisine_of_a_quarter_of_the_power_has_twice_the_error():
     designed = plain()
     w, powers = designed["spectrum"]["frequencies"], np.array(designed["spectrum"]["powers"])
     given = {"type": "multisine", "frequencies": w, "amplitudes": np.sqrt(2 * powers / 4).tolist()}
@@ -170,7 +170,7 @@ def test_a_noise_spectrum_from_a_file_takes_the_place_of_the_model(tmp_path, wri
     assert twice["cost"] == pytest.approx(2 * result["cost"], rel=1e-12)
 
 
-def test_lines_that_tell_nonlinearity_stay_silent():
+def test_lines_for_the_detection_of_nonlinearity_have_no_power():
     results = solve(spec(accuracy__frequency_response__detection=3, experiment__samples=5000))
     response, u = results.result["frequency_response"], results.signal[:1000, 0]
     power = np.abs(np.fft.rfft(u)) ** 2
@@ -185,7 +185,7 @@ def test_lines_that_tell_nonlinearity_stay_silent():
     assert power[silent].max() < 1e-20 * power.max()
 
 
-def test_limits_that_are_too_tight_say_what_would_do():
+def test_a_limit_that_is_too_tight_is_refused_with_the_feasible_error():
     need = plain()["cost"]
     with pytest.raises(InfeasibleError) as caught:
         solve(spec(limits__input_power=need / 4))
@@ -196,8 +196,8 @@ def test_limits_that_are_too_tight_say_what_would_do():
 
 @pytest.mark.parametrize("limit", ["amplitude.input", "amplitude.output", "rate"])
 @pytest.mark.parametrize("share", [0.5, 1.05])
-def test_what_a_hint_says_of_limits_on_samples_makes_a_record(limit, share):
-    """A share of the level whose square is the power that the lines need, and a little more than that."""
+def test_the_remedies_for_limits_on_amplitude_and_rate_give_a_record(limit, share):
+    """The limits are 0.5 and 1.05 times the root mean square of the record without limits."""
     key, u = f"limits.{limit}", solve(spec()).signal[:, 0]
     y = scipy.signal.lfilter([0, 0.4, 0.1], [1, -1.5, 0.8], u)[400:]
     of = {"amplitude.input": u, "amplitude.output": y, "rate": np.diff(u, prepend=0.0)}[limit]
@@ -206,7 +206,7 @@ def test_what_a_hint_says_of_limits_on_samples_makes_a_record(limit, share):
     assert found.code == ("infeasible" if share < 1 else "limits-too-tight")
     times = float(re.search(r"admit ([0-9.]+) times", found.hint)[1])
     period = re.search(r"objective: shortest_experiment, with (\S+): (\d+)", found.hint)
-    assert (period is None) == (limit == "rate")  # which bounds no power by itself
+    assert (period is None) == (limit == "rate")  # a rate alone limits no power
     ways = [[f"{key}={times * stated}"], [f"accuracy.frequency_response.relative={0.05 * times}"]]
     ways += [["objective=shortest_experiment", f"{period[1]}={period[2]}"]] if period else []
     for way in ways:
@@ -228,7 +228,7 @@ def audited():
 @pytest.mark.parametrize(
     "path", ["cost", "spectrum.powers", "frequency_response.worst_ratio", "signal.worst_ratio"]
 )
-def test_a_number_that_is_wrong_does_not_pass(audited, path):
+def test_the_audit_rejects_a_wrong_number(audited, path):
     terms, plan, results = audited
     result = {name: dict(part) if isinstance(part, dict) else part for name, part in results.result.items()}
     *outer, name = path.split(".")
@@ -238,7 +238,7 @@ def test_a_number_that_is_wrong_does_not_pass(audited, path):
         audit_response(terms, plan, replace(results, outcome=read_plain(Outcome, result)))
 
 
-def test_a_record_that_is_wrong_does_not_pass(audited):
+def test_the_audit_rejects_a_wrong_record(audited):
     terms, plan, results = audited
     columns = dict(results.tables["signal"].columns)
     columns["u1"] = columns["u1"] * np.where(np.arange(columns["u1"].size) < 500, 1.0, 1.0001)

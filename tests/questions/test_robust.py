@@ -37,8 +37,8 @@ from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, solved
         (TWO, ("accuracy={criterion: A, scale: relative}", "limits={input_power: [1, 2]}")),
     ],
 )
-def test_copies_of_the_plant_change_nothing(text, asked):
-    """Whatever is asked, in a loop and with several channels."""
+def test_scenarios_that_copy_the_nominal_plant_do_not_change_the_design(text, asked):
+    """This holds for several requirements, in a loop and with several channels."""
     (name, value) = ("f1", -0.8) if text is LOOP else ("f1", -0.7) if text is FIRST else ("b1[1,1]", 1.0)
     scenarios = f"uncertainty={{scenarios: [{{'{name}': {value}}}, {{'{name}': {value}}}]}}"
     robust = [one for one in asked if one.startswith("uncertainty")]
@@ -50,7 +50,7 @@ def test_copies_of_the_plant_change_nothing(text, asked):
 
 
 def test_limits_on_powers_bind_design_and_record_at_every_plant():
-    """The output answers most at the slower plant; records of several seeds, of the power of the design."""
+    """The slower plant has the larger output power; records of several seeds keep its limit."""
     asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
     design = build_convex(parse_spec(FIRST, overrides=asked)).designed()
     powers = [design.problem.power("output", None, s).at(design.design.result.x) for s in (0, 1)]
@@ -66,7 +66,7 @@ def test_limits_on_powers_bind_design_and_record_at_every_plant():
     assert limit["value"] == pytest.approx(5.0, rel=1e-6)
     assert max(found)[0] < 4.0
     assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
-    assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
+    assert max(slow for _, slow in found) > 4.99  # the limit is active
 
 
 def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
@@ -81,8 +81,8 @@ def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
 
 
 @pytest.mark.slow
-def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
-    """Cost worst: beside the accuracy the cost is promised, at the plants drawn and to most of the others."""
+def test_cost_worst_is_the_largest_cost_of_the_drawn_plants_and_of_most_others():
+    """With `cost: worst` a fresh plant also counts as missed if it costs more."""
     prior = "covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 30, fresh: 60"
     found = solve(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}, cost: worst}}"])).result
     mean = solved(LOOP, f"uncertainty={{{prior}, cost: mean}}")
@@ -97,7 +97,7 @@ def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
     assert "less" not in mean["robust"]["fresh"]
 
 
-def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
+def test_fresh_plants_that_miss_accuracy_or_cost_are_counted_separately():
     prior = "uncertainty={covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 60, cost: worst}"
     task = build_convex(parse_spec(LOOP, overrides=[prior]))
     done = task.designed()
@@ -115,7 +115,7 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     assert less > dearer > set()
 
 
-def test_leaving_out_the_dearest_plants_makes_it_cheaper():
+def test_discarding_the_most_demanding_plants_lowers_the_cost():
     prior = f"covariance: {COVARIANCE}, scenarios: 15, fresh: 1"
     whole = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}}}"]))
     fewer = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, discard: 0.2}}"]))
@@ -130,7 +130,7 @@ def test_leaving_out_the_dearest_plants_makes_it_cheaper():
 
 @pytest.mark.slow
 def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
-    """The sensitivity of the scenario's own loop misses what is asked: without a floor nothing would do."""
+    """The loop of the scenario itself exceeds the required sensitivity: without a floor no design exists."""
     text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 9}")
     plant = "uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]%s}"
     assert solved(text, plant % "")["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-6)
@@ -140,8 +140,8 @@ def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
     assert fixed["cost"] < solved(text, plant % "")["cost"]
 
 
-def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
-    """The design on the initial estimate, on the true plant: by its own r_adm, and that of the estimate."""
+def test_the_true_flexible_transmission_misses_r_adm_of_the_initial_estimate():
+    """At the true plant, r_u of the design is 1.02 of the plant's own r_adm, 1.86 of the estimate's."""
     path = "specs/flexible_transmission.yaml"
     true = [
         "plant={A: [1, -1.99185, 2.20265, -1.84083, 0.89413], B: [0, 0, 0, 0.10276, 0.18123]}",
@@ -151,7 +151,7 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     oracle = build_convex(load_spec(path, true)).asked.question
     assert solve_design(oracle, tolerance=1e-7).result.objective == pytest.approx(7.7804, abs=1e-3)
     design = solve_design(nominal.asked.question, tolerance=1e-7)
-    # What it costs on the true plant: by numpy sums alone, with a plain program for the design, 12.444049.
+    # Its cost at the true plant, by sums in numpy for a design by another program, is 12.444049.
     spectrum, true_plant = design.result, oracle.experiment
     cost = sum(
         spectrum.basis.integrals(lambda w, k=k: true_plant.power_density(k, w), true_plant.singularities)
@@ -169,7 +169,7 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("asked", [(), ("limits={input_power: 1}", "objective=best_accuracy")])
-def test_the_record_serves_every_plant_by_its_own_samples(asked):
+def test_the_worst_ratio_of_the_record_is_the_largest_over_all_plants(asked):
     prior = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 20, fresh: 5}}"
     spec = parse_spec(FIRST, overrides=[prior, *asked])
     found = solve(spec)
@@ -186,7 +186,7 @@ def test_the_record_serves_every_plant_by_its_own_samples(asked):
 
 
 @pytest.mark.slow
-def test_the_fan_shows_every_plant_and_names_those_that_bind():
+def test_the_fan_of_ratios_shows_every_plant_and_names_the_active_ones():
     found = solve(
         parse_spec(TWO, overrides=["uncertainty={scenarios: [{'b1[1,1]': 0.8}, {'b1[1,1]': 1.1}]}"])
     )
@@ -203,8 +203,8 @@ def test_the_fan_shows_every_plant_and_names_those_that_bind():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("loop", [False, True])
-def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
-    """Of the output, and in a loop of the input: plain filters of plant and controller simulate both."""
+def test_amplitude_limits_hold_for_the_record_at_every_plant(loop):
+    """Filters of plant and controller simulate the output, and in a loop the input."""
     controller = "experiment={samples: 500, controller: {numerator: [0.1], denominator: [1]}}"
     plants, gain = [(3.6, -0.7), (3.6, -0.9), (5.0, -0.8)], 0.1 if loop else 0.0
     scenarios = "uncertainty={scenarios: [{f1: -0.9}, {b1: 5.0, f1: -0.8}]}"
@@ -217,12 +217,12 @@ def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
         y = lfilter([0, b], [1, f + gain * b], record)
         peaks.append((np.abs(y).max() / 9.0, np.abs(record - gain * y).max() / 0.5))
     assert np.max(peaks) <= 1.0 + 1e-9
-    assert np.max(peaks[1:]) > 0.99  # the limit holds the record back at another plant than that of the spec
+    assert np.max(peaks[1:]) > 0.99  # the limit is active at another plant than that of the spec
     assert result.result["signal"]["of_limits"].keys() == {"amplitude.input", "amplitude.output"}
 
 
-def test_fresh_plants_are_tried_as_long_as_there_is_time():
-    """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
+def test_fresh_plants_are_tried_until_the_time_limit():
+    """Skipped peaks change neither the misses nor the largest ratio; the time limit keeps the design."""
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 60}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     batches = list(done.plants.afresh())
@@ -250,7 +250,7 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
 
 
 @pytest.mark.slow
-def test_what_data_will_tell_of_the_worst_plant_is_foreseen():
+def test_the_worst_ratio_after_the_experiment_at_the_worst_plant_is_predicted():
     """One gain b: r_u is the same everywhere, r_adm a share of |b|, and the estimate is normal."""
     deviation, worst = 0.1, 0.8
     text = """
@@ -274,8 +274,8 @@ signal: {candidates: 1, seed: 1}
     assert "estimates" not in solved(text, "uncertainty.fresh=0")["robust"]
 
 
-def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
-    """Also where the experiment tells one of them nothing: a plant without its input."""
+def test_plants_that_are_tried_together_have_the_ratios_of_each_alone():
+    """This holds also beside a plant of gain zero, on which the experiment has no information."""
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 20}}"
     done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     (batch,) = done.plants.afresh()
@@ -291,8 +291,8 @@ def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
     assert np.delete(shares, 3) == pytest.approx([one.share for one in np.delete(alone, 3)], rel=1e-9)
 
 
-def test_of_an_interval_the_end_that_asks_for_most_is_found():
-    """A faster pole asks for more power: the worst case is the design for the end of the interval."""
+def test_the_search_finds_the_end_of_an_interval_that_needs_most_power():
+    """A faster pole needs more power: the worst case is the design for the end of the interval."""
     found = solved(
         FIRST, "uncertainty={intervals: {f1: [-0.8, -0.5]}, scenarios: 3, fresh: 0, worst_case: 0.95}"
     )
@@ -311,8 +311,8 @@ def test_of_an_interval_the_end_that_asks_for_most_is_found():
 @pytest.mark.parametrize(
     ("text", "covariance"), [(FIRST, COVARIANCE), (LOOP, "[[0.001, 0.0003], [0.0003, 4.0e-4]]")]
 )
-def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, covariance):
-    """Of 200 plants on the boundary of the ellipsoid, drawn by other means."""
+def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_the_search_finds(text, covariance):
+    """The plants are 200 draws on the boundary of the ellipsoid by other means."""
     overrides = [f"uncertainty={{covariance: {covariance}, scenarios: 5, fresh: 0, worst_case: 0.9}}"]
     spec = parse_spec(text, overrides=overrides)
     task = build_convex(spec)
@@ -324,7 +324,7 @@ def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, cov
     rng, nominal = np.random.default_rng(1), task.simulation.nominal.model.theta
     z = rng.standard_normal((200, nominal.size))
     z /= np.sqrt(np.einsum("ni,ij,nj->n", z, np.linalg.inv(covariance), z))[:, None]
-    radius = {2: 4.605170, 3: 6.251389}[nominal.size] ** 0.5  # of tables of chi-squared, 90 %
+    radius = {2: 4.605170, 3: 6.251389}[nominal.size] ** 0.5  # 90 % quantiles of chi-squared from tables
     plants = build_plants(spec, task.asked.question.experiment, task.asked.question.basis)
     tried = [(theta, plants.region.at(theta)) for theta in nominal + radius * z]
     thetas, alternatives = zip(*[one for one in tried if one[1] is not None], strict=True)
@@ -356,7 +356,7 @@ def peaks(u, plants):
 
 
 @pytest.mark.slow
-def test_drawn_plants_keep_limits_and_others_are_counted():
+def test_drawn_plants_keep_output_limits_and_fresh_ones_beyond_them_are_counted():
     found = solve(parse_spec(PEAKS))
     u = found.tables["signal"].columns["u1"]
     done = build_convex(parse_spec(PEAKS)).designed()
@@ -373,18 +373,18 @@ Z = np.exp(1j * W)
 
 
 def peak(b, f, K, p):
-    """Of |S| of the plant b q^-1 / (1 + f q^-1) under K / (1 - p q^-1), by the textbook."""
+    """The peak of |S| of b q^-1 / (1 + f q^-1) under K / (1 - p q^-1), by the textbook."""
     loop = K / (1.0 - p / Z) * b / Z / (1.0 + f / Z)
     return float(np.max(1.0 / np.abs(1.0 + loop)))
 
 
 def radius(b, f, K, p):
-    """Of the poles of that loop."""
+    """The largest radius of the poles of that loop."""
     return np.max(np.abs(np.roots([1.0, f - p + b * K, -f * p])))
 
 
 def asked(seed):
-    """Random plants around a nominal one, and a controller that keeps the margin with that one."""
+    """Spec of random plants with a controller that keeps the margin at the nominal one; peaks; limit."""
     rng = np.random.default_rng(seed)
     wished = 10 ** (PEAK_DB / 20.0)
     while True:
@@ -415,7 +415,7 @@ uncertainty: {{scenarios: [{listed}]}}
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("seed", range(4))
-def test_every_plant_whose_sensitivity_exceeds_what_is_asked_is_told_and_no_other(seed):
+def test_exactly_the_plants_beyond_the_required_sensitivity_are_reported(seed):
     text, peaks, wished = asked(seed)
     found = solve(parse_spec(text)).result
     told = found["robust"].get("floor", {"lost": [], "raised": []})
@@ -431,7 +431,7 @@ def test_every_plant_whose_sensitivity_exceeds_what_is_asked_is_told_and_no_othe
 REGION = "uncertainty={intervals: {b1: [0.3, 0.9]}, scenarios: 2, fresh: %s}"
 
 
-def test_plants_that_are_drawn_afresh_are_counted_where_no_model_will_do():
+def test_fresh_plants_beyond_the_required_sensitivity_are_counted():
     text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 7.5}")
     robust = solve(parse_spec(text, overrides=[REGION % 30, "solver.any_spectrum=false"])).result["robust"]
     beyond = np.mean([peak(b, -0.8, 0.4, 0.95) > 10 ** (7.5 / 20) for b in np.linspace(0.3, 0.9, 50)])
@@ -439,7 +439,7 @@ def test_plants_that_are_drawn_afresh_are_counted_where_no_model_will_do():
 
 
 @pytest.mark.slow
-def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
+def test_a_searched_plant_beyond_the_required_sensitivity_is_reported():
     text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 7.5}")
     region = (REGION % 1).replace("fresh", "worst_case: 0.9, fresh")
     found = solve(parse_spec(text, overrides=[region, "solver.any_spectrum=false"])).result["robust"][
@@ -450,7 +450,7 @@ def test_a_plant_that_was_searched_is_told_where_no_model_will_do():
 
 
 @pytest.mark.slow
-def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
+def test_fresh_plants_are_missed_no_more_often_than_the_wait_and_judge_bound():
     found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
     robust = found["robust"]
     assert robust["worst_share"] == pytest.approx(1.0, abs=1e-6)

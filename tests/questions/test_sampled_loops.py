@@ -1,4 +1,4 @@
-"""Plants in s under digital controllers, in polynomials and in the words of engineers."""
+"""Plants in s under digital controllers: polynomials, PID settings, single loops."""
 
 import warnings
 
@@ -43,8 +43,8 @@ plant:
 {REST}"""
 
 
-def test_a_limit_on_the_output_holds_for_the_record():
-    """What the record causes is had from the loop, sample by sample."""
+def test_a_limit_on_the_output_of_a_loop_holds_for_the_record():
+    """The loop is simulated under the record, sample by sample."""
     spec = load_spec(
         MOTOR,
         [
@@ -90,7 +90,7 @@ PI = {
 
 
 @pytest.mark.parametrize("rule", PI)
-def test_a_pid_is_its_polynomials(rule):
+def test_a_pid_controller_equals_its_polynomials_under_each_sampling_rule(rule):
     words = [
         f"{{pid: {{Kp: 0.4, Ti: 2.5, sample: {rule}}}}}",
         f"{{continuous: {{numerator: [1.0, 0.4], denominator: [2.5, 0]}}, sample: {rule}}}",
@@ -102,14 +102,14 @@ def test_a_pid_is_its_polynomials(rule):
         np.testing.assert_allclose(gradient, found[0], rtol=1e-9, atol=1e-12)
 
 
-def test_computing_takes_samples():
+def test_a_controller_delay_of_one_multiplies_its_response_by_exp_minus_jw():
     w = np.array([0.1, 1.0])
     late = build_experiment(spec_of("{pid: {Kp: 0.4, Ti: 2.5}, delay: 1}")).loop.controller.at(w)
     soon = build_experiment(spec_of("{pid: {Kp: 0.4, Ti: 2.5}}")).loop.controller.at(w)
     np.testing.assert_allclose(late[:, 0, 0], soon[:, 0, 0] * np.exp(-1j * w))
 
 
-def test_loops_are_a_matrix():
+def test_single_loops_equal_a_diagonal_controller_matrix():
     loops = """{loops: [{output: 1, input: 1, controller: {pid: {Kp: 0.4, Ti: 2.5}}},
       {output: 2, input: 2, controller: {numerator: [0.3]}}]}"""
     matrix = "{numerator: [[[0.44, -0.36], [0]], [[0], [0.3]]], denominator: [[[1, -1], [1]], [[1], [1]]]}"
@@ -127,7 +127,7 @@ def motor(theta, w):
 
 
 @pytest.mark.slow
-def test_the_motor_against_a_plain_program():
+def test_the_design_of_the_motor_is_that_of_a_semidefinite_program():
     """The least cost of r of order 3: relative parameters, sums over a circle, LMIs at 180 frequencies."""
     spec = load_spec(MOTOR, ["spectrum.order=3"])
     found = build_convex(spec).designed().design.result
@@ -140,7 +140,7 @@ def test_the_motor_against_a_plain_program():
     def controller(w):
         return (40 - 36.2 * np.exp(-1j * w)) / (1 - np.exp(-1j * w))
 
-    w = (np.arange(8192) + 0.5) * 2 * np.pi / 8192  # beside the integrator
+    w = (np.arange(8192) + 0.5) * 2 * np.pi / 8192  # off the pole of the integrator
     G, C, D = motor(theta, w), controller(w), gradient(w)
     S = 1 / (1 + C * G)
     cosines = np.array([np.ones(w.size)] + [2 * np.cos(k * w) for k in range(1, order + 1)])

@@ -1,4 +1,4 @@
-"""Every command against every section of a spec, as docs/questions.md says: used, refused, or no concern."""
+"""Each command uses, refuses or ignores each section of a spec as docs/questions.md states."""
 
 import json
 import re
@@ -53,7 +53,7 @@ OTHER = {
     "figures": "{width: column}",
     "sweep": "{set: {noise.variance: [1, 2]}}",
 }
-# Where those would not count, or take long.
+# Other values for commands where those have no effect or take long.
 SPECIAL = {
     "analyse": {"spectrum": "{given: {type: white, power: 2}}", "limits": "{input_power: 0.5}"},
     "simulate": {"campaign": "{stages: [80], max_samples: 80}"},
@@ -64,15 +64,15 @@ SPECIAL = {
         "solver": "{time_limit: 1.0e-9}",
     },
 }
-# What `assess` does as well, within a few seconds each.
+# Pairs of a few seconds each, which `assess` covers as well.
 ALIKE = {("identify", "signal")}
-# Commands that a spec need not ask a design of.
+# Commands that take a spec without a design.
 OF_DATA = ("identify", "explore --validate")
 
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """A record of the plant, too short for what is asked."""
+    """A record of the plant, too short for the required accuracy."""
     rng = np.random.default_rng(0)
     u, x = rng.choice([-1.0, 1.0], 80), np.zeros(80)
     for t in range(1, 80):
@@ -84,7 +84,7 @@ def data(tmp_path_factory):
 
 
 def content(results):
-    """What a result says, but for times, versions and the spec that it repeats."""
+    """A result as text, without times, versions and the hash of its spec."""
     told = {k: v for k, v in results.result.items() if k not in ("timing_s", "environment", "spec_sha256")}
     tables = {name: table.columns for name, table in results.tables.items()}
     files = dict(results.files)
@@ -117,7 +117,7 @@ VERBS = {
 
 
 def answered(verb, spec, data):
-    """The answer, or why there is none in the time that `solver` gives."""
+    """The answer, or the code of the error if the time limit of `solver` ends it."""
     try:
         return VERBS[verb](spec, data)
     except InaccurateError as ended:
@@ -125,7 +125,7 @@ def answered(verb, spec, data):
 
 
 def cells():
-    """Verb, section and what the page says of both."""
+    """Verb, section and their cell in the table of docs/questions.md."""
     (block,) = re.findall(r"^\| section \|.*?\n\n", PAGE.read_text(), flags=re.MULTILINE | re.DOTALL)
     head, _, *rows = ([c.strip() for c in line.strip("|").split("|")] for line in block.strip().splitlines())
     assert [name.strip("`") for name in head[1:]] == list(VERBS)
@@ -165,28 +165,28 @@ def test_the_page_has_every_section_of_the_schema():
         if cell == "used"
     ],
 )
-def test_what_is_used_changes_the_answer(verb, section, base, data):
+def test_a_section_marked_used_changes_the_answer(verb, section, base, data):
     spec = stated(verb, [other(verb, section)])
-    if (verb, section) == ("identify", "uncertainty"):  # counts where the data leave several minima
+    if (verb, section) == ("identify", "uncertainty"):  # it matters for several minima only
         assert build_identification(spec).knowledge != build_identification(stated(verb, [])).knowledge
         return
     assert answered(verb, spec, data) != base[verb]
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_what_is_of_no_concern_changes_nothing(verb, base, data):
+def test_sections_marked_by_a_dash_do_not_change_the_answer(verb, base, data):
     unconcerned = [other(verb, section) for v, section, cell in CELLS if (v, cell) == (verb, "-")]
     assert VERBS[verb](stated(verb, unconcerned), data) == base[verb]
 
 
 @pytest.mark.parametrize(("verb", "section"), [(v, s) for v, s, cell in CELLS if cell == "refused"])
-def test_what_is_refused_is_an_error(verb, section, data):
+def test_a_section_marked_refused_is_not_supported(verb, section, data):
     found = refusal(lambda: VERBS[verb](stated(verb, [other(verb, section)]), data))
     assert (found.code, found.key) in {("not-supported", section), ("not-supported", verb)}
 
 
 @pytest.mark.parametrize("section", ["objective", "campaign"])
 @pytest.mark.parametrize("verb", [solve, simulate, validate])
-def test_other_commands_refuse_it_of_a_given_excitation_too(verb, section):
+def test_objective_and_campaign_are_refused_beside_a_given_excitation(verb, section):
     spec = parse_spec(SPEC, overrides=[*GIVEN, f"{section}={OTHER[section]}"])
     assert refusals(lambda: verb(spec))[0].code == "not-supported"

@@ -45,7 +45,7 @@ def random_errors(rng, n, size):
 
 
 def test_every_error_below_r_adm_keeps_the_sensitivity(design):
-    """Whatever the phase and direction of the error, at every frequency; and r_adm is not zero."""
+    """The errors have random phases and directions at every frequency; r_adm is positive."""
     requirement = design.problem.requirements[0]
     G, C = responses(requirement.experiment.loop, GRID)
     bound = requirement.admissible.at(GRID)
@@ -58,7 +58,7 @@ def test_every_error_below_r_adm_keeps_the_sensitivity(design):
 
 
 def test_r_adm_is_no_smaller_than_by_the_triangle_inequality(design):
-    """Which takes s(D C) <= s(D) s(C): no model would do where only one channel has integral action."""
+    """With s(D C) <= s(D) s(C), no model would suffice where only one channel has integral action."""
     requirement = design.problem.requirements[0]
     w = np.array([0.8])
     G, C = responses(requirement.experiment.loop, w)
@@ -90,7 +90,7 @@ def test_models_of_the_ellipsoid_keep_the_sensitivity(design):
     assert peak <= 10 ** (7 / 20)
 
 
-def test_one_channel_is_the_siso_bound():
+def test_r_adm_of_one_channel_is_the_siso_bound():
     A, B = [1, -0.9], [0, 0.5, 0.2]
     numerator, denominator, W = [0.4, -0.3], [1, -1], Rational.build([0.5, 0.1], [1, -0.3])
     loop = Loop(PolynomialModel.single(B, A=A), TransferMatrix.build([[numerator]], [[denominator]]))
@@ -118,7 +118,7 @@ def gradients(values, w):
 
 
 @pytest.mark.slow
-def test_the_norm_of_the_error_against_a_plain_program():
+def test_a_design_for_the_frobenius_norm_is_that_of_a_semidefinite_program():
     """Least power with T P T^T <= (r_adm / alpha)^2 at 60 frequencies, all in raw parameters."""
     design = designed(OPEN)
     problem, found = design.problem, design.result

@@ -1,7 +1,7 @@
-"""The golden values of plants in physical parameters, by plain programs: closed forms, scipy, cvxpy.
+"""Golden values of plants in physical parameters, by closed forms, scipy and cvxpy.
 
-Nothing of the package computes what is expected: gradients are differences of responses that are written out,
-sampled by scipy or by the response to a step, and the least cost is a semidefinite program over the powers.
+The package computes no expected value: gradients are differences of responses that are written out here,
+sampled by scipy or by the step response. The least cost is a semidefinite program over the powers.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ GOLDEN = Path(__file__).parents[2] / "golden"
 
 
 def golden(name):
-    """Path -> expected value."""
+    """The expected values of a golden file by their paths in the result."""
     runs = yaml.safe_load((GOLDEN / f"{name}.yaml").read_text(encoding="utf-8"))["runs"]
     return {one["path"]: one["expected"] for run in runs for one in run["quantities"]}
 
@@ -76,19 +76,19 @@ def heater_cost(name):
 
 
 @pytest.mark.parametrize("name", HEATERS)
-def test_heater(name):
+def test_the_golden_cost_of_the_heater_is_that_of_a_semidefinite_program(name):
     assert golden(name)["cost"] == pytest.approx(heater_cost(name), rel=1e-6)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HEATERS)
-def test_the_heater_is_designed_as_by_a_plain_program(name):
+def test_the_designed_cost_of_the_heater_is_that_of_a_semidefinite_program(name):
     found = solve(load_spec(f"specs/{name}.yaml")).result
     assert found["cost"] == pytest.approx(heater_cost(name), rel=1e-5)
 
 
 def loop_design(response, theta, most, controller, h, samples, variance):
-    """Lines of r in a loop: what they tell, what e tells around the loop, and what u and y cost."""
+    """The least cost of lines of r in a loop, with the information of e and the powers of u and y."""
 
     def parts(w):
         z = np.exp(1j * w)
@@ -108,7 +108,7 @@ def loop_design(response, theta, most, controller, h, samples, variance):
     return least_cost(information, price, known, np.array(most))
 
 
-def test_integrating_tank():
+def test_the_golden_cost_of_the_integrating_tank_is_that_of_a_semidefinite_program():
     """k e^(-Ls) / s behind a hold: a ramp from L on, differenced."""
     h = 2.0
 
@@ -125,8 +125,8 @@ def test_integrating_tank():
     assert golden("integrating_tank")["cost"] == pytest.approx(value, rel=1e-6)
 
 
-def test_motor():
-    """b / (s (s + a)) behind a hold, b and a those of the motor at the known inertia."""
+def test_the_golden_cost_of_the_motor_is_that_of_a_semidefinite_program():
+    """b / (s (s + a)) behind a hold, with b and a of the motor at its known inertia."""
     h, J = 0.02, 0.02
 
     def response(theta):
@@ -148,7 +148,7 @@ LEVELS, AREAS = (12.4, 12.7, 1.8, 1.4), (28.0, 32.0, 28.0, 32.0)
 
 
 def tanks(theta):
-    """Gains (2, 2) and time constants of the entries, as the paper's (7) has them."""
+    """Gains (2, 2) and time constants of the entries by (7) of the paper."""
     g1, g2, k1, k2, *outlets = theta
     T = [A / a * np.sqrt(2 * h / 981) for A, a, h in zip(AREAS, outlets, LEVELS, strict=True)]
     c1, c2 = T[0] * 0.5 / AREAS[0], T[1] * 0.5 / AREAS[1]
@@ -156,7 +156,7 @@ def tanks(theta):
     return gains, [[(T[0],), (T[0], T[2])], [(T[1], T[3]), (T[1],)]]
 
 
-def test_tanks_are_those_of_the_paper():
+def test_gains_and_time_constants_of_the_tanks_are_those_of_the_paper():
     """Table and (8) of the paper print c1 = 2.6, c2 = 2.8, T = 62, 90, 23, 30."""
     gains, times = tanks(list(TANKS.values()))
     np.testing.assert_allclose(gains, [[2.6, 1.5], [1.4, 2.8]], atol=0.06)
@@ -164,7 +164,7 @@ def test_tanks_are_those_of_the_paper():
     np.testing.assert_allclose(alone, [62, 90, 23, 30], atol=1)
 
 
-def test_quadruple_tank():
+def test_the_golden_cost_of_the_quadruple_tank_is_that_of_a_conic_program():
     """Hermitian powers of two inputs at every line; entries sampled by scipy."""
     w = np.arange(1, 61) * np.pi / 60
 
@@ -229,7 +229,7 @@ def gradient(theta, w, h):
 
 
 @pytest.mark.slow
-def test_white_noise_tells_of_the_column_what_sums_over_frequencies_tell():
+def test_deviations_of_the_column_under_white_noise_follow_sums_over_frequencies():
     """M over a fine grid of the circle; each entry has its own parameters, each output its own noise."""
     w = 2.0 * np.pi * (np.arange(2**14) + 0.5) / 2**14
     overrides = ["spectrum={given: {type: white, power: 1.0}}"]

@@ -1,4 +1,4 @@
-"""The shortest record within limits on single samples: solving at shorter lengths finds none that meets."""
+"""The shortest record within limits on single samples: simulated searches, enumeration, priors."""
 
 import itertools
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.selection import Record
 from tests.support.refusals import code_of
 
-# A lag whose spectrum alone would take five samples, and two inputs whose designs of stated length differ.
+# A lag whose spectrum alone needs five samples, and two inputs whose designs differ with the length.
 LAG = """
 plant: {B: [0, 1.0], F: [1, -0.9]}
 noise: {variance: 0.1}
@@ -46,8 +46,8 @@ SHORTEST = "objective: shortest_experiment\n"
 
 @dataclass
 class Ways:
-    """Ways whose records meet from a length on, with information in proportion to it beside what was known
-    `before`; what was tried.
+    """Stand-ins for ways to make a record: they meet the accuracy from a length on, with information in
+    proportion to it. `before` is the ratio by the prior alone; `tried` lists ways and lengths.
     """
 
     enough: Sequence[int]
@@ -84,7 +84,7 @@ class Ways:
     block=st.sampled_from([1, 4, 10]),
     before=st.sampled_from([np.inf, 3.0, 1.1, 1.001]),
 )
-def test_the_length_is_that_of_the_best_way_to_one_per_cent(enough, start, block, before):
+def test_the_search_finds_the_shortest_length_of_all_ways_within_one_percent(enough, start, block, before):
     ways = Ways(enough, before=before)
     start = block * max(start // block, 1)
     if start >= min(enough):
@@ -105,7 +105,7 @@ def test_the_length_is_that_of_the_best_way_to_one_per_cent(enough, start, block
     inputs=st.sampled_from([1, 2, 3]),
 )
 def test_few_long_records_are_made(enough, share, inputs):
-    """What a record needs follows from a short one: long ones are made in the best way, and few of them."""
+    """Short records show which way is best, so that few long ones are made, and in the best way only."""
     ways = Ways(enough)
     start = max(int(share * min(enough)), 2_001)
     if start >= min(enough):
@@ -133,7 +133,7 @@ solver: {any_spectrum: false}
 
 @pytest.mark.slow
 def test_a_long_shortest_record_takes_few_records_of_its_length():
-    """The work is counted in samples of records that are made, in lengths of the one that is found."""
+    """The work is the number of samples of all records, at most 15 times the length that is found."""
     made, plain = [], SignalGenerator.several
 
     def several(self, rngs):
@@ -150,7 +150,7 @@ def test_a_long_shortest_record_takes_few_records_of_its_length():
 @pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
 def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):
-    """No phases make up for a third less accuracy than asked."""
+    """No choice of phases compensates for a third less accuracy than required."""
     made, plain = [], SignalGenerator.several
 
     def several(self, rngs):
@@ -168,7 +168,7 @@ def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(m
     assert len(made) == 1
 
 
-def test_a_search_ends_at_the_longest_record_and_with_its_time():
+def test_a_search_ends_at_the_longest_record_and_at_the_time_limit():
     assert Ways([5000]).found(100, longest=4000) is None
     assert Ways([4000]).found(100, longest=4000) == 4000
     assert Ways([950]).found(100, longest=900) is None
@@ -181,7 +181,7 @@ def test_a_search_ends_at_the_longest_record_and_with_its_time():
 
 
 class Slow(Ways):
-    """Of a plant that hardly answers within the first samples: short records promise far too little."""
+    """Ways for a plant that hardly responds within the first samples: short records predict too little."""
 
     def record(self, number: int, samples: int) -> Record:
         found = super().record(number, samples)
@@ -189,14 +189,14 @@ class Slow(Ways):
 
 
 @pytest.mark.parametrize("start", [3, 8, 20])
-def test_records_too_short_to_tell_do_not_end_the_search(start):
+def test_uninformative_short_records_do_not_end_the_search(start):
     found = Slow([48]).found(start, longest=20_000)
     assert found is not None
     assert 48 <= found <= 49
 
 
 def shortest_of_two_levels(b: float, pole: float, variance: float, relative: float, alpha: float) -> int:
-    """Of b q^-1 / (1 - pole q^-1), levels of one, from rest: all sequences of each length are looked at."""
+    """The shortest record of levels -1 and 1 from rest for b q^-1 / (1 - pole q^-1), by enumeration."""
     w = np.linspace(0.0, np.pi, 400)
     z = np.exp(-1j * w)
     F = 1.0 - pole * z
@@ -218,8 +218,8 @@ def shortest_of_two_levels(b: float, pole: float, variance: float, relative: flo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("relative", [0.25, 0.2, 0.15])
-def test_two_levels_are_as_short_as_any_that_there_are(relative):
-    """Within a sample of the shortest of all sequences."""
+def test_a_two_level_record_is_within_one_sample_of_the_shortest(relative):
+    """All sequences are enumerated to find the shortest."""
     text = f"""
 plant: {{B: [0, 1.0], F: [1, -0.7]}}
 noise: {{variance: 0.1}}
@@ -256,8 +256,8 @@ objective: shortest_experiment
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
-def test_what_is_known_already_needs_a_short_record_only(share):
-    """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""
+def test_a_prior_shortens_the_shortest_record(share):
+    """Short records add almost nothing to a prior; in proportion to them no length would suffice."""
     text = LAG + SHORTEST
     known = np.array(solve(parse_spec(text)).result["information"]["matrix"])
     prior = f"experiment: {{prior: {{information: {(share * known).tolist()}}}}}\n"
@@ -270,7 +270,7 @@ def test_what_is_known_already_needs_a_short_record_only(share):
 @pytest.mark.first(1)
 @pytest.mark.parametrize("more", [1e-6, 0.05, 3.0])
 @pytest.mark.parametrize("text", [LAG, TWO], ids=["lag", "two inputs"])
-def test_what_is_known_may_do_without_an_experiment(text, more):
+def test_a_sufficient_prior_needs_no_experiment(text, more):
     known = np.array(solve(parse_spec(text + SHORTEST)).result["information"]["matrix"])
     prior = f"experiment: {{prior: {{information: {((1.0 + more) * known).tolist()}}}}}\n"
     found = solve(parse_spec(text + SHORTEST + prior)).result
@@ -279,7 +279,7 @@ def test_what_is_known_may_do_without_an_experiment(text, more):
 
 
 @pytest.mark.parametrize(("samples", "expected"), [(20, "conflicting-keys"), (4000, None)])
-def test_a_stated_length_is_no_shortest_record_if_it_misses(samples, expected):
+def test_a_stated_length_that_misses_the_accuracy_is_refused_as_the_shortest(samples, expected):
     text = f"plant: {{B: [0, 0.2], F: [1, -0.8]}}\nnoise: {{variance: 0.1}}\n{SHORTEST}"
     text += "spectrum: {type: white}\naccuracy: {standard_deviation: {b1: 0.02}}\nlimits: {input_power: 1}\n"
     spec = parse_spec(f"{text}signal: {{samples: {samples}}}\n")

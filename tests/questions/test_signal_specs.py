@@ -1,4 +1,4 @@
-"""The words of `signal:` and of limits on single samples, from the spec to the files."""
+"""Options of `signal:` and limits on single samples, from the spec to the files."""
 
 import io
 import re
@@ -45,7 +45,7 @@ CASES = [
 
 @pytest.mark.first(5)
 @pytest.mark.parametrize(("text", "most"), CASES, ids=[text for text, _ in CASES])
-def test_the_record_meets_the_accuracy(text, most):
+def test_records_of_all_kinds_meet_the_accuracy_and_keep_their_limits(text, most):
     outcome = solve(parse_spec(BASE + text + "\n"))
     signal = outcome.result["signal"]
     assert 0.98 <= signal["worst_ratio"] <= 1 + 1e-9
@@ -57,7 +57,7 @@ def test_the_record_meets_the_accuracy(text, most):
 
 
 @pytest.mark.slow
-def test_a_record_that_is_too_short_names_one_that_is_not():
+def test_the_length_named_in_a_refusal_is_long_enough_for_a_record():
     with pytest.raises(InfeasibleError) as error:
         solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2, type: filtered_noise}\n"))
     (diagnostic,) = error.value.diagnostics
@@ -112,7 +112,7 @@ def test_a_converter_of_too_small_a_range_is_named():
     assert 500 < samples_in(diagnostic.hint) < 2000
 
 
-def test_limits_that_no_length_makes_up_for():
+def test_a_limit_on_the_rate_below_the_needed_power_of_moves_is_infeasible():
     with pytest.raises(InfeasibleError) as error:
         solve(parse_spec(BASE + "limits: {rate: 0.003}\nsignal: {candidates: 1}\n"))
     assert error.value.diagnostics[0].code == "infeasible"  # by the power of the moves
@@ -129,7 +129,7 @@ def test_a_missed_accuracy_is_noted():
 @pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.37, 0.3, -0.1])
 def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(offset):
-    """Steps of 0.25: the record swings about the nearest value, within the limit from the offset."""
+    """The converter has steps of 0.25; the record varies about the value nearest to the offset."""
     found = solve(
         parse_spec(
             BASE.replace("500", "900") + "limits: {amplitude: 0.75}\n"
@@ -143,8 +143,8 @@ def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(off
 
 
 @pytest.mark.slow
-def test_the_share_of_each_limit_that_single_samples_take():
-    """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
+def test_the_share_of_each_limit_that_the_largest_samples_take_is_stated():
+    """Levels -a and a have moves of 2 a: a limit on moves binds before an equal one on values."""
     limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"
     outcome = solve(parse_spec(BASE + "objective: shortest_experiment\n" + limits))
     u, shares = outcome.tables["signal"].columns["u1"], outcome.result["signal"]["of_limits"]
@@ -160,8 +160,8 @@ def test_the_share_of_each_limit_that_single_samples_take():
 TWO = "specs/two_by_two_arx.yaml"
 
 
-def test_what_is_applied_to_several_inputs():
-    """Converters of a range each, offsets, periods, all files, and the record among the curves."""
+def test_the_files_of_two_inputs_keep_converters_offsets_and_periods():
+    """Each input has a converter and an offset; all files and curves hold the same record."""
     changes = [
         "spectrum.order=4",
         "signal.type=binary",

@@ -32,8 +32,8 @@ signal: {{candidates: 1}}
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("samples", "each"), [(12, 1), (200, 20)])
-def test_short_records_differ_so_much_that_each_has_one_run(monkeypatch, samples, each):
-    """Twenty runs of each of five records of 8 samples told of these five: it cost 1.7 times too much."""
+def test_exact_confidence_takes_one_run_of_each_short_record(monkeypatch, samples, each):
+    """Twenty runs each of five records of 8 samples describe these only; the cost was 1.7 times too high."""
     seen, genuine = set(), confidence.Reapplied
 
     def noted(excitation, times):
@@ -45,7 +45,7 @@ def test_short_records_differ_so_much_that_each_has_one_run(monkeypatch, samples
     assert seen == {each}
 
 
-def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
+def test_runs_that_check_the_confidence_are_not_those_that_correct_it(monkeypatch):
     seen = []
 
     def noted(self, stream):
@@ -64,7 +64,7 @@ def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
 
 
 @pytest.mark.parametrize(("kept", "told"), [(0.93, True), (0.948, False), (0.97, False)])
-def test_less_than_what_is_asked_is_told(kept, told):
+def test_a_confidence_significantly_below_the_required_one_is_reported(kept, told):
     runs = 4000
     limits = scipy.stats.binomtest(round(kept * runs), runs).proportion_ci(0.95)
     reached = Reached(1000, kept, (0.9, 1.0), kept, runs, kept, (limits.low, limits.high))
@@ -74,8 +74,8 @@ def test_less_than_what_is_asked_is_told(kept, told):
 
 
 @pytest.mark.slow
-def test_a_design_of_a_short_experiment_keeps_what_is_asked():
-    """The first 4000 runs told that nothing was to be corrected, by chance: it kept 93 %."""
+def test_a_design_of_a_short_experiment_has_the_required_exact_confidence():
+    """By chance, the first 4000 runs call for no correction; without one the confidence is 93 %."""
     found = solve(
         parse_spec(
             SPEC.format(samples=150),
@@ -94,7 +94,7 @@ def test_a_design_of_a_short_experiment_keeps_what_is_asked():
         u *= np.sqrt(c[0] / np.mean(u**2))  # records of a design have its power
         b, f = 3.6, -0.7
         y = scipy.signal.lfilter([0.0, b], [1.0, f], u) + rng.standard_normal(150)
-        for _ in range(6):  # Gauss and Newton for the simulation error
+        for _ in range(6):  # Gauss-Newton steps for the simulation error
             per_gain = scipy.signal.lfilter([0.0, 1.0], [1.0, f], u)
             per_pole = scipy.signal.lfilter([0.0, -b], [1.0, f], per_gain)
             step = np.linalg.lstsq(np.stack([per_gain, per_pole], axis=1), y - b * per_gain, rcond=None)[0]
@@ -139,7 +139,7 @@ def test_a_long_record_needs_no_simulated_ones(tmp_path):
     assert "short-record" not in codes(results)
 
 
-def test_stated_errors_grow_by_what_simulated_records_show(tmp_path):
+def test_stated_errors_of_a_short_record_grow_by_factors_of_simulated_records(tmp_path):
     data = recorded(tmp_path / "short.csv", 40, 1)
     results = identify(spec(), data)
     figures = codes(results)["short-record"]["figures"]
@@ -156,8 +156,8 @@ def test_stated_errors_grow_by_what_simulated_records_show(tmp_path):
 
 
 @pytest.mark.slow
-def test_no_error_is_stated_more_sharply_than_by_theory(tmp_path):
-    """Also where noise and plant scatter differently, and where hardly anything can be estimated."""
+def test_no_variance_is_stated_below_that_of_first_order_theory(tmp_path):
+    """This holds also where noise and plant scatter differently, and where estimates are very poor."""
     judged = 0
     for samples, seed in ((9, 0), (12, 2), (12, 5)):
         data = recorded(tmp_path / f"{samples}_{seed}.csv", samples, seed)
@@ -175,8 +175,8 @@ def test_no_error_is_stated_more_sharply_than_by_theory(tmp_path):
 
 
 @pytest.mark.slow
-def test_regions_hold_the_truth_as_often_as_stated(tmp_path):
-    """The 95 % regions of the plant, of 60 records of 50 samples."""
+def test_confidence_regions_contain_the_true_plant_about_as_often_as_stated(tmp_path):
+    """Regions of 95 % for the plant, from 60 records of 50 samples."""
     truth, held, tried = np.array([B, F]), 0, 0
     for seed in range(60):
         results = identify(spec(), recorded(tmp_path / f"{seed}.csv", 50, seed)).result
@@ -190,8 +190,8 @@ def test_regions_hold_the_truth_as_often_as_stated(tmp_path):
     assert held / tried >= 0.88
 
 
-def test_the_likelihood_of_a_regression_is_that_of_students_t():
-    """Of least squares the distances of plants as likely as the data allow are those of Fisher's F."""
+def test_likelihood_regions_of_a_regression_follow_the_f_distribution():
+    """For least squares, Fisher's F gives the distances to the boundary of the likelihood region."""
     rng, samples = np.random.default_rng(4), 24
     u, e = rng.standard_normal(samples), 0.3 * rng.standard_normal(samples)
     y = scipy.signal.lfilter([0, 0.2], [1, -0.5], u) + scipy.signal.lfilter([1], [1, -0.5], e)
@@ -204,8 +204,8 @@ def test_the_likelihood_of_a_regression_is_that_of_students_t():
 
 
 @pytest.mark.slow
-def test_regions_of_a_lag_hold_the_truth_after_twelve_samples(tmp_path):
-    """Its likelihood is no parabola: 58 % of the regions by first-order theory hold the truth."""
+def test_regions_of_a_lag_contain_the_truth_after_twelve_samples(tmp_path):
+    """The likelihood is not quadratic: only 58 % of the regions by first-order theory contain the truth."""
     asked = """
 plant: {continuous: {gain: 2, time_constant: 5, dead_time: 1.4}, sample: zoh}
 noise: {variance: 0.04}

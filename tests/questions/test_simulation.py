@@ -1,4 +1,4 @@
-"""Monte Carlo studies: the promises of designs are kept, on the model and on other plants."""
+"""Monte Carlo studies: simulated errors are as designed, on the model and on other plants."""
 
 import pickle
 
@@ -56,7 +56,7 @@ def flexible():
     return simulated(FLEXIBLE, "simulation.runs=200", FAST).result
 
 
-def test_the_flexible_transmission_keeps_its_promise_on_its_model_only(flexible):
+def test_the_flexible_transmission_meets_r_adm_on_its_design_model_only(flexible):
     # Errata: 83 % of the runs for the design and 93 % for the white input on the true plant; 99 % and 100 %
     # where the plant is the design model. Four standard errors of 200 runs are 10.6, 7.3 and 2.8 %.
     design = flexible["simulation"]["inputs"]["design"]
@@ -93,8 +93,8 @@ def compared(text, *overrides):
     return found, design["within_promised_r_u"], (panel.frequency, panel.r_u), pair
 
 
-def test_a_criterion_per_sample_is_compared_like_one_of_the_record():
-    # log det M is stationary at its optimum: a gap of 1e-10 leaves about its root in M, 1e-5.
+def test_a_criterion_per_sample_is_simulated_like_one_for_the_whole_record():
+    # log det M is stationary at its optimum: a gap of 1e-10 allows about its root in M, 1e-5.
     per_sample, *found = compared(f"{D_OPTIMAL}signal: {{samples: 400}}", "solver.tolerance=1e-10")
     of_length, *expected = compared(f"{D_OPTIMAL}experiment: {{samples: 400}}", "solver.tolerance=1e-10")
     assert (per_sample.result["samples"], of_length.result["samples"]) == (1, 400)
@@ -109,7 +109,7 @@ def test_a_criterion_per_sample_is_compared_like_one_of_the_record():
 
 
 @pytest.mark.parametrize("region", ["first_order", "ellipsoid"])
-def test_what_is_known_before_does_not_grow_with_the_record(region):
+def test_prior_information_does_not_grow_with_the_length_of_the_record(region):
     given = ["spectrum={given: {type: white, power: 1}}", "simulation.runs=20"]
     accuracy = f"accuracy: {{model_error: {{relative: 0.2, region: {region}}}}}\n"
     short = f"{accuracy}experiment: {{samples: 100, {PRIOR}}}\nsignal: {{samples: 400}}"
@@ -130,8 +130,8 @@ def studied():
     return simulated(ARX, "spectrum.order=2", "simulation={runs: 60, compare: [white, prbs]}", FAST)
 
 
-def test_the_promise_is_kept_on_the_design_model(studied):
-    """With the powers of the design; every entry has its error bands."""
+def test_simulated_errors_on_the_design_model_are_within_r_u_and_r_adm(studied):
+    """The records have the powers of the design; every entry has its error bands."""
     within_wishart(studied.result["simulation"])
     inputs, designed = studied.result["simulation"]["inputs"], studied.result["power"]["excitation"]
     # r_u is a joint region of 95 % for all entries at all frequencies.
@@ -163,7 +163,7 @@ def test_the_promise_is_kept_on_the_design_model(studied):
         (IN_SECONDS, ["plant.sample=zoh"]),
     ],
 )
-def test_plants_of_other_kinds_keep_their_promise(spec, overrides):
+def test_simulated_errors_of_box_jenkins_and_continuous_plants_are_within_r_u(spec, overrides):
     simulation = simulated(spec, *overrides).result["simulation"]
     within_wishart(simulation)
     design = simulation["inputs"]["design"]
@@ -172,7 +172,7 @@ def test_plants_of_other_kinds_keep_their_promise(spec, overrides):
     assert design["within_r_u"] <= design["within_r_adm"]  # the design keeps r_u below r_adm
 
 
-def test_the_true_system_may_be_another():
+def test_estimates_are_those_of_a_true_system_that_differs_from_the_spec():
     plant = f"{{A: [[1, -0.9], [1, 0.4]], B: [{TRUE}]}}"
     result = simulated(
         ARX, GIVEN, f"simulation={{runs: 60, plant: {plant}, noise: {{relative_std: 0.1}}}}"
@@ -187,14 +187,14 @@ def test_the_true_system_may_be_another():
     np.testing.assert_allclose(simulation["true_variance"], 0.01 * smallest * np.eye(2), rtol=1e-9)
 
 
-def test_a_true_system_of_another_structure_has_no_theory():
+def test_no_r_u_is_stated_for_a_true_system_of_another_structure():
     plant = f"{{A: [[1, -0.7, 0.1], [1, 0.4]], B: [{TRUE}]}}"
     design = of_design(ARX, GIVEN, f"simulation={{runs: 20, plant: {plant}}}")
     assert "within_r_u" not in design
     assert "within_r_adm" in design
 
 
-def test_a_loop_keeps_its_promise():
+def test_simulated_errors_of_a_loop_are_within_r_adm_at_the_designed_powers():
     outcome = simulated(LOOP, "simulation={runs: 50, compare: [white]}", FAST)
     result, simulation = outcome.result, outcome.result["simulation"]
     within_wishart(simulation)
@@ -205,7 +205,7 @@ def test_a_loop_keeps_its_promise():
         if kind in design["total_power"]:
             assert np.all(np.array(design["total_power"][kind]) > design["power"][kind])
     shown = outcome.tables["disturbance_design"].columns
-    for i in (1, 2):  # until it has faded
+    for i in (1, 2):  # the response has faded at the end
         assert np.abs(shown[f"y{i}_r"][-1]) < 0.2 * np.abs(shown[f"y{i}_r"]).max()
         mean = np.sum(shown[f"y{i}_r"] ** 2) / 2000
         assert mean == pytest.approx(result["power"]["output"][i - 1], rel=0.1)
@@ -215,8 +215,8 @@ def test_a_loop_keeps_its_promise():
 
 
 @pytest.mark.slow
-def test_a_loop_around_a_held_plant_keeps_its_promise():
-    """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
+def test_simulated_errors_of_a_loop_around_a_held_plant_are_within_r_u():
+    """The true motor differs from the spec; noise in u does not bias the direct method."""
     true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
     simulation = simulated(MOTOR, f"simulation={{runs: 80, {true}}}", "spectrum.order=8").result["simulation"]
     within_wishart(simulation)
@@ -227,7 +227,7 @@ def test_a_loop_around_a_held_plant_keeps_its_promise():
     np.testing.assert_allclose(mean, [2.2, 11, 20], rtol=0.01)
 
 
-def test_a_true_system_that_the_controller_does_not_hold_is_refused():
+def test_a_true_system_that_the_controller_does_not_stabilise_is_refused():
     plant = "{A: [[1, -1.1], [1, -0.6]], B: [[[0, -1.0, -0.4], [0, 0]], [[0, 0], [0, 1.2, -0.5]]]}"
     found = refusal(lambda: simulated(LOOP, f"simulation={{runs: 5, plant: {plant}}}"), SpecError)
     assert (found.code, found.key) == ("unstable-loop", "simulation.plant")
@@ -244,7 +244,7 @@ COLOURED = "noise: {C: [1, 0.8], variance: 0.5}"
 @pytest.mark.first(1)
 @pytest.mark.parametrize("nominal", [IN_Q, IN_S])
 @pytest.mark.parametrize("loop", ["", ", controller: {numerator: [[[0.1], [0]], [[0], [0.1]]]}"])
-def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
+def test_a_true_system_in_s_or_in_q_gives_the_same_simulation(nominal, loop):
     """b/(s + ln 2) behind a hold of one second is b/(2 ln 2) q^-1/(1 - q^-1/2)."""
     found = []
     for truth in (IN_Q, IN_S):
@@ -256,7 +256,7 @@ def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
             np.testing.assert_allclose(found[0][key][kind], found[1][key][kind], rtol=1e-6)
     for name, value in found[0]["mean_estimate"].items():
         assert value == pytest.approx(found[1]["mean_estimate"][name], rel=1e-4, abs=1e-5)
-    if not loop:  # y is noise of mean square 0.5 (1 + 0.8^2) about what the input causes
+    if not loop:  # the noise adds 0.5 (1 + 0.8^2) to the output power
         added = np.subtract(found[0]["total_power"]["output"], found[0]["power"]["output"])
         np.testing.assert_allclose(added, 0.82, rtol=0.3)
 
@@ -277,7 +277,7 @@ def test_prior_information_narrows_the_estimates():
         (ARX, {}),
     ],
 )
-def test_the_delivered_record_is_tried_about_its_operating_point(spec, signal):
+def test_the_delivered_record_is_simulated_about_its_operating_point(spec, signal):
     changes = [f"signal.{key}={value}" for key, value in signal.items()]
     result = simulated(spec, "simulation={runs: 20, excitation: record}", "spectrum.order=3", *changes).result
     tried = result["simulation"]["inputs"]["design"]["power"]["input"]
@@ -285,7 +285,7 @@ def test_the_delivered_record_is_tried_about_its_operating_point(spec, signal):
 
 
 class Elsewhere:
-    """Tasks travel as bytes and are done in reverse order, as other processes may do them."""
+    """An executor that pickles tasks and does them in reverse order, as other processes may."""
 
     shares_files = True
 
@@ -306,7 +306,7 @@ class Elsewhere:
         (MOTOR, ["spectrum.order=3"]),
     ],
 )
-def test_seeds_repeat_wherever_runs_are_computed(spec, overrides):
+def test_equal_seeds_give_equal_estimates_in_any_executor(spec, overrides):
     asked = load_spec(spec, [*overrides, "simulation={runs: 30, seed: 5}", "signal.candidates=1"])
     here, there = simulate(asked), simulate(asked, executor=Elsewhere())
     means = [one.result["simulation"]["inputs"]["design"]["mean_estimate"] for one in (here, there)]
@@ -314,8 +314,8 @@ def test_seeds_repeat_wherever_runs_are_computed(spec, overrides):
 
 
 @pytest.mark.slow
-def test_a_run_that_tells_too_little_is_counted_not_fatal():
-    """Poles so fast, and noise so strong, that some runs see a plant that answers at once."""
+def test_uninformative_runs_are_counted_and_do_not_end_the_simulation():
+    """Poles are so fast and noise so strong that some runs show a plant without dynamics."""
     entry = of_design(
         "plant:\n"
         "  continuous: {numerator: [[[1.3]], [[1.6]]], denominator: [[[1, 1.8]], [[1, 1.9]]]}\n"
@@ -354,15 +354,15 @@ def test_covariances_of_one_channel_lie_in_the_range_of_the_wishart_distribution
 
 
 @pytest.mark.slow
-def test_the_shipped_plant_in_s():
-    """r_u of the figure is that of bound.csv for one sample over the root of the length of the record."""
+def test_r_u_of_a_simulated_record_is_that_of_one_sample_over_the_root_of_n():
+    """The spec is two_by_two.yaml, in continuous time, whose bound.csv is for one sample."""
     found = simulate(load_spec("specs/two_by_two.yaml", ["signal.samples=1024", "simulation.runs=2"]))
     for panel, bound in zip(found.curves["errors_design"].panels, found.curves["bound"].panels, strict=True):
         np.testing.assert_allclose(panel.r_u, bound.r_u / np.sqrt(1024), rtol=1e-9)
 
 
-def test_a_record_does_not_meet_the_noise_that_it_was_drawn_from():
-    """Candidates and batches of runs were children of one seed. Of 4000 runs the largest ratio is 1.32."""
+def test_simulated_noise_is_not_the_noise_that_the_record_was_drawn_from():
+    """Seeds of candidates and runs must differ; with other seeds the largest ratio of 4000 runs is 1.32."""
     text = (
         "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {variance: 1.0}\nexperiment: {samples: 200}\n"
         "accuracy: {model_error: {relative: 0.05}}\nspectrum: {type: fir, order: 4}\n"

@@ -1,4 +1,4 @@
-"""From a spec to a result: what it holds, and what a user is told when it cannot be done."""
+"""From a spec to a result: content of the result, golden files, grid method, and refused tables."""
 
 from pathlib import Path
 
@@ -28,20 +28,20 @@ QUICK = ("first_order", "flexible_transmission", "given_excitations", "peer_exam
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", QUICK)
-def test_golden_files(name):
-    """Each quantity beside the paper's figure and the independent solution."""
+def test_golden_files_are_reproduced(name):
+    """Each quantity is compared with the paper's figure and the independent solution."""
     golden = load_golden(ROOT / "golden" / f"{name}.yaml")
     rows = compare(golden, {run.name: execute(golden, run) for run in golden.runs})
     assert rows
     assert [row for row in rows if not row.passed] == []
 
 
-def test_result_is_consistent():
+def test_the_numbers_of_a_result_are_consistent():
     outcome = solve(spec_of(SMALL))
     result = outcome.result
     c = np.asarray(result["spectrum"]["coefficients"])
     assert result["status"] == "optimal"
-    assert result["objective"]["value"] == pytest.approx(c[0])  # input power alone costs
+    assert result["objective"]["value"] == pytest.approx(c[0])  # the cost is the input power
     assert result["objective"]["relative_gap"] <= 1e-7
     bounds = [result["objective"][key] for key in ("any_spectrum_bound", "lower_bound", "value")]
     assert bounds == sorted(bounds)
@@ -52,7 +52,7 @@ def test_result_is_consistent():
     assert list(signal) == ["time_s", "u1"]
     power = np.mean(signal["u1"] ** 2)
     assert power == pytest.approx(c[0] * (1 + result["signal"]["extra_power"]))
-    assert result["signal"]["worst_ratio"] == pytest.approx(1.0, abs=1e-8)  # at the least power for that
+    assert result["signal"]["worst_ratio"] == pytest.approx(1.0, abs=1e-8)  # with the least power
     bound = outcome.tables["bound"].columns
     assert np.all(bound["r_u"] <= bound["r_adm"] * (1 + 1e-7))
     assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
@@ -78,7 +78,7 @@ def test_equal_seeds_give_equal_signals():
     assert not np.array_equal(one, other)
 
 
-def test_grid_method_reports_itself_honestly():
+def test_the_grid_method_is_reported_as_optimal_on_its_grid_only():
     outcome = solve(spec_of(SMALL, solver="{method: lmi, grid: 60}"))
     assert outcome.result["status"] == "optimal_on_grid"
     (told,) = [one for one in outcome.result["findings"] if one["code"] == "accuracy-on-grid"]
@@ -121,12 +121,12 @@ def test_the_bound_over_every_spectrum_can_be_left_out(kind):
         for asked in ("true", "false")
     )
     assert fast["objective"]["value"] == whole["objective"]["value"]
-    free = kind == "free"  # itself every spectrum
+    free = kind == "free"  # the family is every spectrum
     assert ("any_spectrum_bound" in fast["objective"]) is free
     assert ("other-spectra-left-out" in codes_in(fast)) is not free
 
 
-# Where a spec names a table, which is TABLE.
+# Specs that name a table, whose path is TABLE.
 TABLED = {
     "r_adm": (SMALL.replace("relative: 0.01", "table: TABLE"), []),
     "phi": (SMALL.replace("{type: fir, order: 3}", "{given: {type: table, file: TABLE}}"), ["signal=null"]),
@@ -172,7 +172,7 @@ TABLES = [
 
 
 @pytest.mark.parametrize(("of", "content", "code", "words"), TABLES)
-def test_bad_tables(tmp_path, of, content, code, words):
+def test_bad_tables_are_refused_with_their_fault(tmp_path, of, content, code, words):
     table = tmp_path / "r.csv"
     if content is not None:
         table.write_text(content, encoding="utf-8")

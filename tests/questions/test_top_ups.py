@@ -1,4 +1,4 @@
-"""What follows an estimate: another experiment, or none, about the operating point of the record."""
+"""Top-ups after an estimate: another experiment or none, about the operating point of the record."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ from tests.support.heater import HEATER, STRUCTURE
 
 
 @pytest.mark.slow
-def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
+def test_assess_states_the_error_that_remains_after_a_limited_top_up(heater_record):
     path = heater_record("a.csv", 300, 1, power=0.02)
     limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
     found = assess(parse_spec(HEATER, overrides=limits), path)
@@ -23,7 +23,7 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     left, times = result["assessment"]["left"], result["assessment"]["experiments"]
     assert left > 1.5
     assert result["signal"]["begun_anywhere"] > 1.0
-    # So many of them, one after the other, are enough, and one fewer is not.
+    # The stated number of top-ups is enough, and one fewer is not.
     one = np.asarray(result["information"]["matrix"])
     data = np.asarray(identify(parse_spec(HEATER), path).result["information"]["matrix"])
     theta = result["identification"]["theta"]
@@ -41,7 +41,7 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
 
 
-def test_noise_alone_may_be_what_the_data_still_need(tmp_path):
+def test_a_top_up_without_excitation_states_the_error_after_its_noise(tmp_path):
     """Without excitation N samples of an ARX system add N / (1 - a1^2) to the information on a1."""
     rng, N = np.random.default_rng(0), 1000
     u, e = 0.3 * rng.standard_normal(N), rng.standard_normal(N)
@@ -121,14 +121,14 @@ def test_a_top_up_varies_about_the_operating_point(heater_record, tmp_path):
         ({}, None, None, {}),
     ],
 )
-def test_each_input_has_its_level(levels, point, means, expected):
+def test_notes_state_the_operating_point_and_the_level_of_each_input(levels, point, means, expected):
     found = level_notes(levels, point, None if means is None else np.array(means), np.ones(2))
     assert {one.code: one.figures for one in found} == expected
 
 
 @pytest.mark.slow
-def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):
-    """With the second record alone it judges what the first spec judges with both."""
+def test_the_spec_of_a_top_up_counts_the_earlier_record(heater_record, tmp_path, monkeypatch):
+    """With the second record alone it gives the worst ratio of the first spec with both."""
     monkeypatch.chdir(tmp_path)
     asked = "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0004}}\n"
     Path("spec.yaml").write_text(STRUCTURE + asked + "signal: {candidates: 1}\n")
@@ -153,8 +153,8 @@ def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, 
         assert error["code"] == "data-repeated"
 
 
-def test_an_estimate_outside_of_the_intervals_is_topped_up(tmp_path):
-    """What was thought before is no reason to stop: the intervals then reach the estimate."""
+def test_an_estimate_outside_the_stated_intervals_is_topped_up(tmp_path):
+    """The intervals of the top-up are extended to the estimate."""
     text = """
 plant: {B: [0, 1]}
 noise: {variance: 4}

@@ -1,4 +1,4 @@
-"""Whenever its time ends, a design is delivered that meets what is required, with bounds that hold."""
+"""At any time limit the delivered design meets its requirements, and its bounds hold."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ SPECS = {
     "shortest": BOUND + "objective: shortest_experiment\nspectrum: {type: fir, order: 12}\n"
     "limits: {input_power: 1}\n",
     "criterion": "accuracy: {criterion: D}\nspectrum: {type: fir, order: 12}\nlimits: {input_power: 1}\n",
-    "side": "accuracy: {criterion: A, standard_deviation: {b1: 0.2}}\nspectrum: {type: fir, order: 12}\n"
+    "A, std b1": "accuracy: {criterion: A, standard_deviation: {b1: 0.2}}\nspectrum: {type: fir, order: 12}\n"
     "limits: {input_power: 1}\n",
 }
 
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("text", SPECS.values(), ids=SPECS)
-def test_what_is_delivered_meets_everything_and_its_bounds_hold(slow_solver, text):
+def test_a_design_at_any_time_limit_meets_its_requirements_with_valid_bounds(slow_solver, text):
     best = solve(parse_spec(PLANT + text)).result["objective"]
     statuses = []
     for calls in count():
@@ -69,13 +69,13 @@ EXACT = SPECS["cost"].replace("alpha: 2.45", "confidence: {exact: 0.9, draws: 20
 @pytest.mark.parametrize(
     ("verb", "text"), [(simulate, SPECS["cost"] + "simulation: {runs: 2}\n"), (solve, EXACT)]
 )
-def test_without_a_record_nothing_is_simulated_and_no_exact_confidence_claimed(slow_solver, verb, text):
+def test_simulation_and_exact_confidence_are_refused_without_time_for_a_record(slow_solver, verb, text):
     with pytest.raises(InaccurateError) as ended:
         verb(parse_spec(f"{PLANT}{text}solver: {{time_limit: 1}}"))
     assert ended.value.diagnostics[0].code == "out-of-time"
 
 
-def test_an_interrupt_is_as_the_end_of_the_time():
+def test_an_interrupt_has_the_effect_of_a_time_limit():
     with stoppable() as stop, watching(lambda done: stop()):
         result = solve(parse_spec(PLANT + SPECS["cost"])).result
     assert (result["status"], result["solver"]["ended_by"]) == ("gap_open", "the interrupt")
@@ -90,7 +90,7 @@ spectrum: {type: moments, structure: toeplitz}
 """
 
 
-def test_moments_are_delivered_with_the_bound_so_far(slow_solver):
+def test_moments_are_delivered_with_a_valid_bound_at_any_time_limit(slow_solver):
     best = solve(parse_spec(MOMENTS)).result["objective"]
     gaps = []
     for seconds in (1, 91, 601):
@@ -107,7 +107,7 @@ def test_moments_are_delivered_with_the_bound_so_far(slow_solver):
 @pytest.mark.parametrize("prices", [[1, 1], [1, 30], [0.03, 1]])
 @pytest.mark.parametrize("gains", [(1, 0.5), (0.02, 3)])
 def test_a_design_of_two_inputs_never_costs_more_than_white_input(prices, gains):
-    """At the first round and at the end."""
+    """This holds after the first round and at the end."""
     text = f"""
 plant: {{B: [[[0, {gains[0]}], [0, {gains[1]}]]], F: [[[1, -0.5], [1, -0.9]]]}}
 noise: {{variance: 0.1}}

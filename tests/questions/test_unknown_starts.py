@@ -1,4 +1,4 @@
-"""Records that live on their start from rest say so: errors with unknown starts, by plain regression."""
+"""Records that need a start from rest are reported, with the error for unknown starts by regression."""
 
 from dataclasses import replace
 
@@ -32,13 +32,13 @@ spectrum: {type: multisine, lines: 50}
 SETTLED = SINGLE.replace("F: [1, -1]", "F: [1, -0.8]")
 
 
-def told(text):
+def solved(text):
     done = solve(parse_spec(text))
     return done, [one for one in done.result.get("findings", []) if one["code"] == "start-from-rest"]
 
 
-def left(psi, starts):
-    """The size of a gradient (N,) beside what unknown starts (N, m) explain."""
+def residual_norm(psi, starts):
+    """The norm of a gradient (N,) after regression on unknown starts (N, m)."""
     return np.linalg.norm(psi - starts @ np.linalg.lstsq(starts, psi, rcond=None)[0])
 
 
@@ -47,29 +47,29 @@ def growth(found):
     return one["figures"]["growth"]
 
 
-def test_a_position_and_a_velocity_that_nobody_knows():
+def test_unknown_position_velocity_and_level_raise_the_error_of_an_inertia():
     """y = u / (J s^2) behind a hold, by recursion; the start adds a line, a level of u a parabola."""
-    done, notes = told(DOUBLE)
+    done, notes = solved(DOUBLE)
     u, h, J = done.tables["signal"].columns["u1"], 0.1, 2.0
     y = scipy.signal.lfilter(h**2 / 2 * np.array([0.0, 1.0, 1.0]), [1.0, -2.0, 1.0], u) / J
     psi = -y / J
     assert 0.01 / np.linalg.norm(psi) == pytest.approx(0.01, rel=1e-6)
     line = np.column_stack([np.ones(N), np.arange(N) / N])
     curve = np.column_stack([line, line[:, 1] ** 2])
-    assert np.linalg.norm(psi) / left(psi, line) > 20.0
-    assert growth(notes) == pytest.approx(np.linalg.norm(psi) / left(psi, curve), rel=5e-3)
+    assert np.linalg.norm(psi) / residual_norm(psi, line) > 20.0
+    assert growth(notes) == pytest.approx(np.linalg.norm(psi) / residual_norm(psi, curve), rel=5e-3)
 
 
-def test_a_level_that_an_integrator_keeps():
-    done, notes = told(SINGLE)
+def test_an_unknown_start_raises_the_error_of_an_integrator():
+    done, notes = solved(SINGLE)
     psi = scipy.signal.lfilter([0.0, 1.0], [1.0, -1.0], done.tables["signal"].columns["u1"])
     line = np.column_stack([np.ones(N), np.arange(N) / N])
-    expected = pytest.approx(np.linalg.norm(psi) / left(psi, line), rel=5e-3)
+    expected = pytest.approx(np.linalg.norm(psi) / residual_norm(psi, line), rel=5e-3)
     assert growth(notes) == expected
     assert done.result["signal"]["begun_anywhere"] == expected
 
 
-def test_an_unknown_start_costs_what_its_information_shows():
+def test_the_growth_by_an_unknown_start_bounds_that_by_the_information():
     task = build_convex(parse_spec(SETTLED))
     record, nominal = task.delivered().record, task.simulation.nominal
     experiment = replace(nominal, samples=len(record))
@@ -79,13 +79,13 @@ def test_an_unknown_start_costs_what_its_information_shows():
     )
     anywhere = information_of_data(experiment.model, record, plant.signals("output", record), free=True)
     (exact,) = np.sqrt(np.diag(plant.information(record)) / np.diag(plant.known + anywhere))
-    assert 1.0 < exact <= found < 1.2  # a bound is enough where nothing is said
+    assert 1.0 < exact <= found < 1.2  # a bound suffices where nothing is reported
 
 
 @pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])
 @pytest.mark.parametrize("F", [[1.0, -0.8], [1.0, -1.0], [1.0, -1.5, 0.7]], ids=["lag", "tank", "spring"])
-def test_what_is_told_from_anywhere(F, D):
-    """Gradients by differences, weighed by the covariance of the noise; starts are all states of 1/F."""
+def test_information_with_an_unknown_start_is_that_of_generalised_least_squares(F, D):
+    """Gradients by differences are weighted by the noise covariance; starts are all states of 1/F."""
     text = f"plant: {{B: [0, 0.5], F: {F}}}\nnoise: {{D: {D}, variance: 0.3, known: [d1]}}\n"
     model = build_model(parse_spec(text.replace(", known: [d1]", "") if len(D) == 1 else text, design=False))
     u = np.random.default_rng(4).standard_normal(80)

@@ -1,4 +1,4 @@
-"""An expression that is zero at the nominal parameters is a coefficient as any other."""
+"""Expressions that are zero at the nominal parameters are treated as any other coefficient."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def spec_at(name, value, rest=REST):
 
 @pytest.mark.parametrize("name", PLANTS)
 def test_the_gradient_is_that_of_plants_nearby(name):
-    """A difference quotient of the responses of other specs, each read by itself."""
+    """The reference is a difference quotient of the responses of specs with other parameters."""
     w, h = np.linspace(0.05, 3.1, 40), 1e-5
     model = build_model(spec_at(name, 2.0))
     at, once, twice = (build_model(spec_at(name, 2.0 + k * h)).plant_at(w) for k in range(3))
@@ -61,7 +61,7 @@ def test_the_gradient_is_that_of_plants_nearby(name):
 
 @pytest.mark.first(2)
 @pytest.mark.parametrize("name", ["first of B", "of A", "first of a numerator", "gain", "common delay"])
-def test_the_information_is_the_limit_of_that_nearby(name):
+def test_the_information_is_the_limit_of_that_of_plants_nearby(name):
     at, near = (analyse(spec_at(name, value)).result["information"] for value in (2.0, 2.0 + 1e-7))
     assert at["parameters"] == near["parameters"]
     size = np.sqrt(np.diag(near["matrix"]))
@@ -86,7 +86,7 @@ def test_an_entry_that_vanishes_must_be_as_accurate_as_the_others(name):
 
 
 @pytest.mark.parametrize("name", ["first of a numerator", "D of states"])
-def test_what_may_act_at_once_is_no_delay_of_a_loop(name):
+def test_a_vanishing_direct_term_makes_a_loop_algebraic(name):
     loop = REST.replace("{samples: 300}", "{samples: 300, controller: {numerator: [0.1], denominator: [1]}}")
     for value in (2.0, 2.0 + 1e-6):
         assert code_of(build_experiment, spec_at(name, value, loop)) == "algebraic-loop"

@@ -1,4 +1,4 @@
-"""Met, missed or undecided: what is said of records, of models, and of the plant of the spec."""
+"""Verdicts met, missed and undecided on records, on models and on the plant of the spec."""
 
 import shlex
 from dataclasses import replace
@@ -37,7 +37,7 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, following, heater_rec
     result = found.results.result
     assert (found.verdict, result["status"]) == ("undecided", "undecided")
     assert "recent_inputs" in result["identification"]["failed"]
-    # b6, b7 stand for the delay; what the lag adds comes after them.
+    # b6, b7 cover the delay; the lag adds coefficients after them.
     assert result["identification"]["tests"]["recent_inputs"]["lag"] in (7, 8, 9)
     listed = {one["code"]: one for one in result["findings"]}
     assert listed["plant-structure"]["severity"] == "refuted"
@@ -48,7 +48,7 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, following, heater_rec
 
 
 @pytest.mark.slow
-def test_records_of_two_plants_are_named(heater_record, tmp_path):
+def test_a_record_of_another_plant_is_named(heater_record, tmp_path):
     spec = parse_spec(HEATER)
     first, second = heater_record("a.csv", 400, 1), heater_record("b.csv", 400, 2)
     assert assess(spec, [first, second]).verdict == "met"
@@ -63,7 +63,7 @@ def test_records_of_two_plants_are_named(heater_record, tmp_path):
     assert differs.message in found.results.outcome.assessment.undecided
 
 
-def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(heater_record):
+def test_columns_of_channels_that_the_plant_does_not_have_are_reported(heater_record):
     path = heater_record("a.csv", 720, 1)
     lines = path.read_text().splitlines()
     path.write_text("\n".join([f"{lines[0]},u2", *(f"{line},0.5" for line in lines[1:])]))
@@ -72,7 +72,7 @@ def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(he
 
 
 @pytest.mark.slow
-def test_beside_an_undecided_model_stands_what_the_data_say_without_one(heater_record):
+def test_an_undecided_verdict_has_a_nonparametric_frequency_response(heater_record):
     found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True))
     table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
     G = table["G_re"] + 1j * table["G_im"]
@@ -88,7 +88,7 @@ def test_beside_an_undecided_model_stands_what_the_data_say_without_one(heater_r
 
 
 @pytest.mark.slow
-def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp_path):
+def test_in_a_loop_the_frequency_response_is_that_to_a_recorded_reference(heater_record, tmp_path):
     loop = [
         "experiment.controller={numerator: [0.01], denominator: [1]}",
         "accuracy.model_error.relative=1.0",
@@ -110,7 +110,7 @@ def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp
 @pytest.mark.parametrize(
     ("factor", "contradicts"), [(1.0, False), (1.1, False), (1.6, False), (-1.0, True), (3.0, True)]
 )
-def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, heater_record):
+def test_a_plant_that_is_not_the_one_of_the_spec_is_reported(factor, contradicts, heater_record):
     path = heater_record("a.csv", 720, 1)
     B = [0, 0, 0, 0, 0, 0, *(factor * 2.35 * (1 - SLOW) * share for share in (0.4, 0.6))]
     found = assess(parse_spec(HEATER, overrides=[f"plant={{B: {B}, F: [1, {-SLOW}]}}"]), path)
@@ -144,10 +144,10 @@ def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, he
         (20.0, 30.0, False),
     ],
 )
-def test_a_far_estimate_contradicts_the_spec_by_its_statistic_where_something_is_asked(
+def test_a_far_estimate_contradicts_the_spec_by_chi_squared_and_admissible_error(
     deviations, admitted, contradicts
 ):
-    """Two parameters, one of them off: chi-squared is beyond its square with exp(-deviations^2 / 2).
+    """With two parameters, chi-squared exceeds deviations^2 with probability exp(-deviations^2 / 2).
 
     As b1 goes from 1 to 3, G differs by at most 2/0.3 = 6.7.
     """
@@ -166,14 +166,14 @@ def test_a_far_estimate_contradicts_the_spec_by_its_statistic_where_something_is
     assert distance.nominal.probability == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
     told = "another-plant" if contradicts else "far-from-the-spec"
     assert [one.code for one in far_from_nominal(distance)] == [told] * (contradicts or asked)
-    weights = {one.severity for one in far_from_nominal(distance)}  # a value without uncertainty is no doubt
+    weights = {one.severity for one in far_from_nominal(distance)}  # a spec without uncertainty gets a note
     assert weights <= ({Severity.DOUBT} if contradicts else {Severity.NOTE})
     uncertain = replace(distance, exact=False)
     assert {one.severity for one in far_from_nominal(uncertain)} <= {Severity.DOUBT}
 
 
-def test_looks_share_the_level_of_what_they_may_end():
-    """0.001 for records and 0.01 for a prior, of two records and twenty looks at data that come in."""
+def test_the_level_of_a_test_is_divided_among_repeated_looks():
+    """Records have a level of 0.001 and priors one of 0.01, which all looks share (Bonferroni)."""
     prior, tests = SimpleNamespace(differing=4e-4, alike=0.9), SimpleNamespace(alike=(2e-5, 2e-5))
     estimate = SimpleNamespace(prior=prior, tests=tests)
     assert differences(estimate, ["a.csv", "b.csv"], looks=24)
@@ -200,7 +200,7 @@ STATED = {
     f"estimate: {{parameters: {{b1: 3.0, K: 1.0}}, covariance: {MATRIX}}}": np.diag([0.1, 0.0]),
     f"uncertainty: {{covariance: {MATRIX}, scenarios: 3}}": P,
     f"uncertainty: {{information: {np.linalg.inv(P).tolist()}, scenarios: 3}}": P,
-    # Even draws: a twelfth of the squared width, and the squared distance of the middle.
+    # Uniform draws: a twelfth of the squared width, and the squared distance of the middle.
     "uncertainty: {intervals: {b1: [2.8, 3.4]}, scenarios: 3}": np.diag([0.6**2 / 12 + 0.1**2, 0.0]),
     "uncertainty: {scenarios: [{b1: 2.8}, {b1: 3.4, f1: -0.6}]}": np.array([[0.1, 0.02], [0.02, 0.005]]),
 }  # fmt: skip
@@ -218,7 +218,7 @@ def record(tmp_path_factory):
 
 @pytest.mark.first(4)
 @pytest.mark.parametrize("stated", STATED)
-def test_the_statistic_is_by_the_covariance_of_the_difference(record, stated):
+def test_the_statistic_adds_the_covariances_of_the_estimate_and_of_the_spec(record, stated):
     found = assess(parse_spec(SPEC.format(b1=3.0) + stated), record)
     result = found.results.result
     nominal = result["assessment"]["nominal"]
@@ -229,7 +229,7 @@ def test_the_statistic_is_by_the_covariance_of_the_difference(record, stated):
     assert nominal["probability"] == pytest.approx(scipy.stats.chi2.sf(statistic, 2), rel=1e-5, abs=1e-300)
 
 
-def test_what_the_spec_is_unsure_of_is_not_another_plant(record):
+def test_a_difference_within_the_stated_uncertainty_is_not_another_plant(record):
     """G may differ at a frequency by two standard deviations of the difference."""
     gap = {}
     for b1, known in ((3.0, False), (3.0, True), (-3.0, True)):
@@ -243,8 +243,8 @@ def test_what_the_spec_is_unsure_of_is_not_another_plant(record):
 
 
 @pytest.mark.slow
-def test_records_are_judged_together_by_the_number_that_is_printed(heater_record):
-    """Information of two records adds up, and the top-up counts the first as the joint verdict does."""
+def test_two_records_are_judged_together_by_the_stated_worst_ratio(heater_record):
+    """The first record alone misses the accuracy; both records together meet it."""
     spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"])
     first = heater_record("a.csv", 300, 1, power=0.02, level=(40.0, 52.3), warm=1.0)
     second = heater_record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)

@@ -1,4 +1,4 @@
-"""The periods that count of records with gaps: as many as lie in the pieces, all of the same phase."""
+"""Whole periods of records with gaps: as many as fit between the gaps, all of the same phase."""
 
 from itertools import pairwise
 
@@ -18,7 +18,7 @@ PERIOD = 20
 
 
 def record(pieces, *, step=1.0, files=1):
-    """Pieces (first, last + 1) of a record that counts its samples in u, in one file or as many again."""
+    """A record of pieces (first, last + 1), repeated in each file; u holds the numbers of the samples."""
     at = np.concatenate([np.arange(first, last) for first, last in pieces] * files)
     lengths = tuple(last - first for first, last in pieces) * files
     named = tuple((f"{i}.csv", len(at) // files) for i in range(files))
@@ -27,7 +27,7 @@ def record(pieces, *, step=1.0, files=1):
 
 
 def most_by_trial(pieces, skip):
-    """Of the phases one by one: how many periods lie in the pieces after the transient."""
+    """The largest number of periods in the pieces after the transient, over all phases."""
     counts = []
     for phase in range(PERIOD):
         starts = np.arange(phase, 2000, PERIOD)
@@ -48,7 +48,7 @@ def most_by_trial(pieces, skip):
     step=st.sampled_from([1.0, 0.01, 60.0]),
     files=st.integers(1, 2),
 )
-def test_as_many_periods_as_lie_between_the_gaps_count(gaps, skip, step, files):
+def test_as_many_periods_count_as_fit_between_the_gaps(gaps, skip, step, files):
     edges = [-1, *sorted(gaps), 200]
     pieces = [(a + 1, b) for a, b in pairwise(edges) if b > a + 1]
     data = record(pieces, step=step, files=files)
@@ -96,8 +96,8 @@ signal: {periods: 6}
 
 
 @pytest.mark.parametrize("gap", [700, 1203, 2999 - 640])
-def test_the_response_of_a_record_with_a_gap_is_that_of_its_periods(write, gap):
-    """By the transforms of the same stretches, worked out here; the true response lies in the discs."""
+def test_the_response_of_a_record_with_a_gap_is_that_of_its_whole_periods(write, gap):
+    """The reference is the ratio of the transforms of these periods; most discs contain the truth."""
     spec = parse_spec(TEXT)
     u = solve(spec).signal[:, 0]
     noise = 0.1 * np.random.default_rng(gap).standard_normal(len(u))

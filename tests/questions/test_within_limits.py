@@ -1,4 +1,4 @@
-"""Limits that are too tight: what is said of them is true, and what a record within them reaches."""
+"""Limits that are too tight: stated factors and remedies hold, and records come near to the limits."""
 
 import re
 
@@ -30,7 +30,7 @@ def refused(text, code="infeasible"):
     return diagnostic
 
 
-def test_closed_form_of_one_gain():
+def test_the_attainable_deviation_of_one_gain_has_its_closed_form():
     """One gain b1 in white noise: its variance is lambda / (N P), whatever the spectrum."""
     text = """
 plant: {B: [0, 2.0]}
@@ -64,7 +64,7 @@ accuracy: {standard_deviation: {b1: 0.01}}
     ],
     ids=["power", "floor", "channels", "variance"],
 )
-def test_what_is_bought_can_be_had_and_no_more(head, accuracy, fraction):
+def test_the_stated_attainable_accuracy_is_feasible_and_a_better_one_is_not(head, accuracy, fraction):
     details = refused(head + accuracy.format(fraction)).details
     factor, power = details["factor"], 2 if "variance" in accuracy else 1
     (bought,) = details["bought"]
@@ -78,7 +78,7 @@ def test_what_is_bought_can_be_had_and_no_more(head, accuracy, fraction):
     assert still.details["factor"] == pytest.approx(1 / (1 - 1e-3), rel=1e-5)
 
 
-def test_an_experiment_that_is_too_short_says_what_it_buys():
+def test_a_limit_on_samples_that_is_too_small_states_the_attainable_error():
     text = FIRST + "objective: shortest_experiment\n" + WITHIN.format(0.01)
     limits = "limits: {{input_power: 0.2, samples: {}}}\n"
     told = refused(text + limits.format(400), "too-long")
@@ -99,8 +99,8 @@ def test_an_experiment_that_is_too_short_says_what_it_buys():
         ("amplitude: {}, output_power: {}", {"amplitude.input": 0.1, "output_power": 0.02}),
     ],
 )
-def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
-    """Several limits that are exhausted together: who raises each as told has a spectrum, no less does."""
+def test_the_stated_factors_of_several_limits_just_suffice_for_a_spectrum(limits, keys):
+    """Several limits are active together: raised by the stated factors they admit a spectrum, not below."""
     text = TWO.replace("input_power: [1.0, 0.02]", "LIMITS").replace("signal: {candidates: 1}\n", "")
     text += WITHIN.format(0.3)
     message = refused(text.replace("LIMITS", limits.format(*keys.values()))).message
@@ -112,7 +112,7 @@ def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
         return text.replace("LIMITS", limits.format(*bounds))
 
     assert "no change of a single limit is enough" in message
-    refused(raised(1.0 + 1e-4), "limits-too-tight")  # a spectrum does; a record takes more, as is told
+    refused(raised(1.0 + 1e-4), "limits-too-tight")  # a spectrum exists, and no record
     refused(raised(1.0 - 1e-2), "infeasible")
 
 
@@ -128,7 +128,7 @@ spectrum: {type: fir, order: 20}
 """
 
 
-def test_a_power_below_the_least_is_a_proof():
+def test_an_amplitude_below_the_root_of_the_least_power_is_infeasible():
     least = solve(parse_spec(DEAR_OUTPUT.replace("output_power: 1", "input_power: 1") % "samples: 720"))
     least = least.result["objective"]["value"]
     with pytest.raises(InfeasibleError) as caught:
@@ -140,7 +140,7 @@ def test_a_power_below_the_least_is_a_proof():
     assert samples == pytest.approx(720 / 0.99**2, rel=0.02)
 
 
-def test_a_record_of_another_spectrum_is_delivered_where_that_of_the_cheapest_does_not_fit():
+def test_a_record_of_another_spectrum_is_delivered_where_the_cheapest_does_not_fit():
     found = solve(parse_spec(DEAR_OUTPUT % "amplitude: 1.95"))
     signal, u = found.result["signal"], np.array(found.tables["signal"].columns["u1"])
     assert np.abs(u).max() <= 1.95
@@ -149,14 +149,14 @@ def test_a_record_of_another_spectrum_is_delivered_where_that_of_the_cheapest_do
     (note,) = [one for one in found.result["findings"] if one["code"] == "other-signal"]
     power = signal["spectrum_of"]["input_power"]
     assert note["figures"]["input_power"] == pytest.approx(power, rel=1e-3)
-    # What it costs is told against the design, and what the note promises is true.
+    # The extra power is relative to the design, and the remedy of the note works.
     assert signal["extra_power"] == pytest.approx(signal["output_power"][0] / found.result["cost"] - 1)
     again = solve(parse_spec(DEAR_OUTPUT % f"amplitude: 1.95, input_power: {power}")).result["signal"]
     assert again["worst_ratio"] <= 1.0 + 1e-9
 
 
 @pytest.mark.slow
-def test_a_kind_of_signal_that_is_asked_for_is_not_replaced():
+def test_a_stated_kind_of_signal_is_not_replaced_and_the_proposed_one_works():
     stated = DEAR_OUTPUT + "signal: {type: ternary, candidates: 8}\n"
     told = refusals(lambda: solve(parse_spec(stated % "amplitude: 2")), InfeasibleError)[0]
     assert told.code == "limits-too-tight"
@@ -166,8 +166,8 @@ def test_a_kind_of_signal_that_is_asked_for_is_not_replaced():
     assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
-def test_two_levels_come_near_to_what_is_proved_of_every_record():
-    """No record with a peak below 1.80486 meets it, whatever its kind: so says the error at 1.8."""
+def test_a_two_level_record_is_within_6_percent_of_the_proved_least_peak():
+    """The refusal at 1.8 states that no record of any kind with a peak below 1.80486 meets the accuracy."""
     stated = DEAR_OUTPUT + "signal: {type: binary, candidates: 8}\n"
     with pytest.raises(InfeasibleError) as caught:
         solve(parse_spec(stated % "amplitude: 1.8"))
@@ -177,7 +177,7 @@ def test_two_levels_come_near_to_what_is_proved_of_every_record():
     assert found["peak"][0] <= 1.06 * least
 
 
-def test_a_record_that_falls_short_of_the_best_accuracy_is_not_called_cheap():
+def test_a_record_that_falls_short_of_the_best_accuracy_is_reported():
     spec = (
         PLANT.replace("500", "200")
         + WITHIN.format(0.01)
@@ -204,7 +204,7 @@ spectrum: {type: multisine, lines: 10}
 
 
 def test_the_noise_that_a_controller_passes_on_to_the_input_is_named():
-    """With u = -0.3 y and y a sample later, its deviation is that of a geometric series."""
+    """With u = -0.3 y and y(t) = u(t-1) + e(t), the variance of u is a geometric series."""
     text = """
 plant: {B: [0, 1.0]}
 noise: {variance: 0.2}
@@ -237,8 +237,8 @@ signal: {type: multisine, candidates: 1}
     ],
     ids=["noise", "sinusoids in a loop", "two levels in a loop"],
 )
-def test_infeasible_limits_are_explained_and_what_is_promised_is_true(text, power, level, relative):
-    """Who raises the limit as told, admits the errors that a spectrum can keep, or takes longer, succeeds."""
+def test_the_stated_remedies_for_an_infeasible_power_limit_work(text, power, level, relative):
+    """The remedies are a higher limit, a larger admissible error and a longer experiment."""
     least = solve(parse_spec(text)).result["power"][power.split("_")[0]][0]
     limited = f"{text}limits: {{{power}: %r}}\n"
     told = refusal(lambda: solve(parse_spec(limited % level)), InfeasibleError)
@@ -256,12 +256,12 @@ def test_infeasible_limits_are_explained_and_what_is_promised_is_true(text, powe
         assert solve(parse_spec(limited % level, overrides=[change])).result["status"] == "optimal"
 
 
-def test_infeasible_without_a_way_out_by_one_limit():
+def test_the_common_factor_of_two_infeasible_limits_just_suffices():
     limits = "limits: {input_power: 0.01, output_power: 0.1}\n"
     diagnostic = refused(PLANT + ERROR + FIR + limits)
     assert "no change of a single limit is enough" in diagnostic.message
     times = float(diagnostic.message.split("have to be ")[1].split(" times")[0])
-    # What the message promises is true, and no overstatement.
+    # The stated factor suffices, and 0.1 % less does not.
     raised = (
         f"limits: {{input_power: {0.01 * times * (1 + 1e-4)}, output_power: {0.1 * times * (1 + 1e-4)}}}\n"
     )
@@ -272,14 +272,14 @@ def test_infeasible_without_a_way_out_by_one_limit():
     refused(PLANT + ERROR + FIR + lowered)
 
 
-def test_a_density_that_is_too_low_is_told_its_factor():
+def test_a_limit_on_the_density_that_is_too_low_states_the_needed_factor():
     # A flat spectrum needs 1.705495; below that level no spectrum has more at any frequency.
     diagnostic = refused(PLANT + ERROR + FIR + "limits: {spectrum: 1.5}\n")
     times = float(diagnostic.message.split("limits.spectrum would have to be ")[1].split(" times")[0])
     assert times == pytest.approx(1.705495 / 1.5, rel=1e-4)
 
 
-def test_contradictory_limits():
+def test_contradictory_limits_are_refused_with_both_keys():
     limits = "limits: {input_power: 0.3, output_power: {min: 300}}\n"
     diagnostic = refused(PLANT + ERROR + FIR + limits, "contradictory-limits")
     assert all(power in diagnostic.message for power in ("output_power", "input_power"))

@@ -1,4 +1,4 @@
-"""A weight with a pole on the stability limit in its band is refused by its name, whatever it weighs."""
+"""A weight with a pole on the unit circle in its band is refused; the message names key and frequency."""
 
 import json
 import re
@@ -44,13 +44,13 @@ def frequency(told):
 
 @pytest.mark.parametrize("at", POLES)
 @pytest.mark.parametrize("key", KEYS)
-def test_a_pole_on_the_circle_is_named_with_its_frequency(key, at):
+def test_a_weight_with_a_pole_on_the_unit_circle_is_refused_with_key_and_frequency(key, at):
     told = refused(KEYS[key]({"numerator": [1], "denominator": POLES[at]}))
     assert told.code in ("admissible-not-positive", "bad-limit")
     assert (told.key, frequency(told)) == (key, pytest.approx(at, rel=1e-3))
 
 
-def test_a_band_without_it_does():
+def test_a_weight_with_a_pole_outside_the_band_is_accepted():
     weight = {"numerator": [1], "denominator": [1, -1]}
     error = {"absolute": 1, "weight": weight, "band": [0.01, 3.0]}
     spec = parse_spec(SPEC, overrides=[f"accuracy.model_error={json.dumps(error)}"])
@@ -58,7 +58,7 @@ def test_a_band_without_it_does():
 
 
 @pytest.mark.parametrize("at", POLES)
-def test_a_zero_is_named_where_nothing_may_vanish(at):
+def test_a_zero_on_the_unit_circle_is_refused_where_a_weight_must_be_positive(at):
     weight = {"numerator": POLES[at], "denominator": [1]}
     for bound in ("max", "min"):
         told = refused({**BESIDE, "limits": {"spectrum": {bound: weight}}})
@@ -68,7 +68,7 @@ def test_a_zero_is_named_where_nothing_may_vanish(at):
 
 
 @pytest.mark.parametrize("value", [9e99, 1e308, 1e-320])
-def test_a_table_has_numbers_that_a_spec_may_have(value, tmp_path):
+def test_a_table_of_r_adm_with_an_extreme_number_is_refused_by_row(value, tmp_path):
     (tmp_path / "t.csv").write_text(f"frequency,r_adm\n0,1\n1,{value}\n3.2,1\n")
     table = "accuracy: {model_error: {table: t.csv}}\n"
     (told,) = refusals(lambda: solve(parse_spec(SPEC + table, folder=tmp_path)), DataError)

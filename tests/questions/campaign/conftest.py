@@ -1,4 +1,4 @@
-"""A folder with a spec, and a campaign that has begun in it."""
+"""Fixtures: a folder with a spec, and campaigns that have begun in it."""
 
 import shutil
 
@@ -10,7 +10,7 @@ from tests.support.commands import caller
 
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
-    """Run `idesign` in an empty folder with the spec in it: its exit code, stdout and stderr."""
+    """Runs `idesign` in a folder that holds only the spec; returns exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.yaml").write_text(SPEC)
     return caller(monkeypatch, capsys)
@@ -18,11 +18,11 @@ def run(monkeypatch, capsys, tmp_path):
 
 @pytest.fixture
 def begun(run, campaigns, tmp_path):
-    """A campaign with its first plan."""
+    """The directory of a campaign with one plan and no record."""
     return shutil.copytree(campaigns / "begun", tmp_path / "c")
 
 
 @pytest.fixture
 def once(run, campaigns, tmp_path):
-    """A campaign with its first record."""
+    """The directory of a campaign with one record."""
     return shutil.copytree(campaigns / "once", tmp_path / "c")

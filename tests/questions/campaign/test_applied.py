@@ -1,4 +1,4 @@
-"""What was applied against what was planned: records as loggers write them follow it, others do not."""
+"""Records against their plan: those with the usual faults of loggers match it, unrelated ones do not."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ LENGTHS = (30, 120)
 
 
 def planned(kind, samples, seed):
-    """(n,): noise of one kind with the root mean square one."""
+    """(n,): white noise through a filter of PLANS, with a standard deviation of one."""
     b, a = PLANS[kind]
     x = lfilter(b, a, np.random.default_rng(seed).standard_normal(samples + 50))[50:]
     return x / np.std(x)
@@ -35,7 +35,7 @@ RECORDED = {
     "held one sample longer": lambda p: np.concatenate([[0.0], p[:-1]]),
     "a sample lost": lambda p: np.delete(p, len(p) // 2),
     "a sample written twice": lambda p: np.insert(p, len(p) // 3, p[len(p) // 3])[: len(p)],
-    "all of it": lambda p: np.round(4 * np.clip(np.delete(p, len(p) // 4), -1.2, 1.2)) / 4 + 0.3,
+    "several faults": lambda p: np.round(4 * np.clip(np.delete(p, len(p) // 4), -1.2, 1.2)) / 4 + 0.3,
 }
 
 
@@ -43,7 +43,7 @@ RECORDED = {
 @pytest.mark.parametrize("name", RECORDED)
 @pytest.mark.parametrize("samples", LENGTHS)
 @pytest.mark.parametrize("kind", PLANS)
-def test_a_record_as_loggers_write_it_is_that_of_its_plan(kind, samples, name):
+def test_records_with_the_usual_faults_of_loggers_match_their_plan(kind, samples, name):
     found = [compared(p, RECORDED[name](p)) for p in (planned(kind, samples, seed) for seed in range(20))]
     assert sum(not match.follows for match in found) <= 1
     assert sum(match.off for match in found) <= 2
@@ -52,7 +52,7 @@ def test_a_record_as_loggers_write_it_is_that_of_its_plan(kind, samples, name):
 @pytest.mark.parametrize(
     ("kind", "samples", "least"), [("white", 30, 19), ("slow", 120, 19), ("resonant", 400, 19)]
 )
-def test_an_unrelated_record_is_not(kind, samples, least):
+def test_unrelated_records_do_not_match_the_plan(kind, samples, least):
     for other in (kind, "white"):
         found = [
             compared(planned(kind, samples, seed), planned(other, samples, 100 + seed)) for seed in range(20)
@@ -62,8 +62,8 @@ def test_an_unrelated_record_is_not(kind, samples, least):
 
 @pytest.mark.parametrize(("kind", "most"), [("slow", 6), ("resonant", 8)])
 @pytest.mark.parametrize("samples", [30, 50])
-def test_signals_that_are_alike_by_chance_are_told_by_their_moves(kind, samples, most):
-    """Of 40 unrelated records up to 23 have a correlation of a half, in place or shifted by a few samples."""
+def test_few_unrelated_records_match_a_slow_plan_despite_chance_correlation(kind, samples, most):
+    """Up to 23 of 40 correlate by 0.5 or more, shifted by a few samples; Cochrane-Orcutt rejects most."""
     found = [
         compared(planned(kind, samples, seed), planned(kind, samples, 1000 + seed)).follows
         for seed in range(40)
@@ -73,14 +73,14 @@ def test_signals_that_are_alike_by_chance_are_told_by_their_moves(kind, samples,
 
 @pytest.mark.parametrize("scale", [0.1, 0.9, 1.1, -1.0, 25.4])
 @pytest.mark.parametrize("kind", PLANS)
-def test_a_scale_is_found(kind, scale):
+def test_a_record_at_another_scale_is_flagged_with_its_scale(kind, scale):
     plan = planned(kind, 60, 3)
     match = compared(plan, scale * np.round(50 * plan) / 50 + 0.2)
     assert match.off
     assert match.scale == pytest.approx(scale, rel=1e-2)
 
 
-def test_every_channel_is_looked_at():
+def test_every_channel_is_compared_with_its_own_plan():
     plan = np.column_stack([planned("white", 60, 1), 0.1 * planned("white", 60, 2)])
     assert compared(plan, plan).follows
     # The weaker channel alone is wrong: all samples together hardly show it.
@@ -91,7 +91,7 @@ def test_every_channel_is_looked_at():
     match = compared(plan, noise)
     assert (match.follows, match.channel) == (False, 2)
     assert stand_in(plan, swapped) == (1, "u2")
-    # So also where both move much alike.
+    # The same holds for strongly correlated channels.
     alike = np.column_stack([plan[:, 0], plan[:, 0] + 0.6 * planned("white", 60, 2)])
     assert stand_in(alike, alike[:, ::-1]) == (1, "u2")
     for other in (alike, alike + 0.05, noise):
@@ -106,14 +106,14 @@ def stand_in(plan, applied):
     return None if found is None else found[:2]
 
 
-def test_where_a_plan_is_at_rest_noise_of_the_sensor_is_no_move():
+def test_small_sensor_noise_follows_a_plan_at_rest_and_large_noise_does_not():
     rest, rng = np.zeros((40, 1)), np.random.default_rng(1)
     rows = np.arange(40)
     assert matched(rest, 0.05 * rng.standard_normal((40, 1)), rows, 1.0).follows
     assert not matched(rest, rng.standard_normal((40, 1)), rows, 1.0).follows
 
 
-def test_rows_without_values_are_left_out():
+def test_rows_without_values_are_left_out_of_the_comparison():
     plan = planned("white", 80, 4)
     rows = np.delete(np.arange(80), [10, 11, 50])
     match = compared(plan, plan[rows], rows)
@@ -127,7 +127,7 @@ def test_rows_without_values_are_left_out():
 @pytest.mark.parametrize("name", RECORDED)
 @pytest.mark.parametrize("kind", PLANS)
 def test_columns_of_a_static_plant_are_not_taken_for_swapped(kind, name):
-    """Its output follows the plan too, but hardly better than the input that it answers."""
+    """The output follows the plan too, but hardly better than the input does."""
     swapped = 0
     for seed in range(20):
         plan = planned(kind, 120, seed)

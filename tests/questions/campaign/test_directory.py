@@ -1,4 +1,4 @@
-"""`idesign campaign`, `next` and `status`: the directory remembers, refuses and goes on."""
+"""`idesign campaign`, `next` and `status`: what the directory stores, refuses and continues."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from tests.support.campaigns import SPEC, answered, applied, found, planned, wri
 
 @pytest.fixture
 def taken(run):
-    """Gives a record to the campaign: its exit code, the result or nothing, and what stderr says."""
+    """Gives a record to the campaign; returns exit code, result (or {}) and stderr."""
 
     def take(*arguments):
         code, out, err = run("next", "c", *arguments, "--json", "--no-figures")
@@ -29,7 +29,7 @@ def taken(run):
 
 @pytest.fixture
 def begin(run, tmp_path):
-    """Begins a campaign with overrides: its directory, exit code and what stderr says."""
+    """Begins a campaign with overrides; returns its directory, exit code and stderr."""
 
     def begin(name, *overrides):
         sets = [part for one in overrides for part in ("--set", one)]
@@ -43,7 +43,7 @@ def kept(directory):
     return (directory / "result.json").read_bytes()
 
 
-def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begin, taken, tmp_path):
+def test_a_campaign_runs_until_the_data_meet_the_requirement(run, begin, taken, tmp_path):
     begun, _, _ = begin("c", "campaign.last=nominal")
     assert len(planned(begun)) == 20
     for number in range(1, 12):
@@ -56,7 +56,7 @@ def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begin, taken,
     campaign = result["campaign"]
     samples = np.cumsum([0, *(record["samples"] for record in campaign["records"])])
     assert [entry["samples"] for entry in campaign["rounds"]] == samples.tolist()
-    # Every plan, record and estimate stays, and the times of the plans follow each other.
+    # Every plan, record and estimate stays, and the times of the plans are consecutive.
     for number in range(1, len(campaign["records"]) + 1):
         names = ("plan_{}.csv", "record_{}.csv", "record_{}_as_given.csv", "model_{}.yaml")
         assert all((begun / name.format(f"{number:02d}")).is_file() for name in names)
@@ -74,8 +74,8 @@ def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begin, taken,
     assert run("status", "c")[0] == 0
 
 
-def test_a_withdrawn_record_does_not_count_and_stays(taken, once, tmp_path):
-    """That of another plant, which left the campaign undecided."""
+def test_a_withdrawn_record_is_kept_but_not_used(taken, once, tmp_path):
+    """The record comes from another plant and has made the campaign undecided."""
     other = applied(once, tmp_path / "b.csv", gain=-2.0, poles=(-0.5,))
     code, result, _ = taken(other)
     assert (code, result["status"]) == (5, "undecided")
@@ -84,7 +84,7 @@ def test_a_withdrawn_record_does_not_count_and_stays(taken, once, tmp_path):
     after, (gone,) = result["campaign"], found(result, "record-withdrawn")
     assert (code, gone["where"], gone["figures"]) == (0, "record_02.csv", {"record": 2})
     assert after["rounds"][-1]["records"] == [1]
-    # It was applied: its samples and its energy are spent.
+    # The withdrawn experiment was applied, so its samples count as spent.
     assert after["rounds"][-1]["samples"] == before["rounds"][-1]["samples"]
     assert after["rounds"][-1]["estimate"] == pytest.approx(before["rounds"][1]["estimate"], rel=1e-6)
     assert (once / "record_02.csv").is_file()
@@ -99,8 +99,8 @@ def test_several_records_are_withdrawn_at_once(taken, once, tmp_path):
     assert (code, gone, result["campaign"]["rounds"][-1]["records"]) == (0, [1, 2], [])
 
 
-def test_what_is_decided_anew_by_the_same_data_plans_the_same_part(begun, taken, tmp_path):
-    """A plan may have been applied already."""
+def test_planning_again_from_the_same_data_gives_the_same_plan(begun, taken, tmp_path):
+    """The plan must stay, since it may have been applied already."""
     for number in (1, 2):
         record, plan = applied(begun, tmp_path / f"r{number}.csv"), planned(begun)
         assert taken()[0] == 0
@@ -109,7 +109,7 @@ def test_what_is_decided_anew_by_the_same_data_plans_the_same_part(begun, taken,
 
 
 @pytest.mark.parametrize("never", [False, True])
-def test_records_that_differ_end_a_campaign_unless_it_goes_on(begin, taken, tmp_path, never):
+def test_inconsistent_records_end_a_campaign_unless_stop_is_never(begin, taken, tmp_path, never):
     directory, _, _ = begin("c", *(["campaign.stop=never"] * never))
     assert taken(applied(directory, tmp_path / "a.csv"))[0] == 0
     code, result, _ = taken(applied(directory, tmp_path / "b.csv", gain=-2.0, poles=(-0.5,)))
@@ -124,8 +124,8 @@ def test_records_that_differ_end_a_campaign_unless_it_goes_on(begin, taken, tmp_
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("cap", [0.2, 0.05])
-def test_the_power_of_a_part_is_compared_with_that_of_its_plan(begin, cap):
-    """A single part of the whole experiment lasts without data, so no robust plan is missed."""
+def test_a_part_scaled_to_the_power_cap_states_its_share_of_the_planned_power(begin, cap):
+    """The only part is planned without data, so no warning says that it is not robust."""
     directory, _, _ = begin("c", f"campaign.power_cap={cap}", "campaign.pilot=200", "campaign.block=200")
     result = read_run(directory)
     (weaker,), plan = found(result, "part-scaled"), result["campaign"]["rounds"][0]["plan"]
@@ -158,12 +158,12 @@ def test_a_record_of_an_earlier_plan_is_refused(once, taken, tmp_path, missing):
     (repeated,) = found(result, "part-repeated")
     plans = repeated["figures"]["plan"], repeated["figures"]["other"]
     assert (code, repeated["where"], plans) == (0, "again.csv", ("plan_02.csv", "plan_01.csv"))
-    # What is due is never taken for something else, with rows missing or not.
+    # A record of the plan that is due is not mistaken for an earlier one.
     assert taken(applied(once, tmp_path / "r3.csv"))[0] == 0
 
 
-def test_what_does_not_belong_is_refused_and_changes_nothing(run, once, taken, tmp_path):
-    """Too long, no file, no record, given before, mixed up; and other commands in the directory."""
+def test_refused_records_and_commands_leave_the_campaign_unchanged(run, once, taken, tmp_path):
+    """Records too long, missing, unknown, repeated or shuffled; other commands in the directory."""
     before, times = kept(once), np.arange(200)
     long = written(tmp_path / "long.csv", times, np.ones(200), times**0.5)
     record = applied(once, tmp_path / "r2.csv")
@@ -198,8 +198,8 @@ def without_a_value(rows):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("mend", [without_a_value, lambda rows: rows[5:]])
-def test_rows_that_are_missing_leave_the_others_where_they_are(begun, taken, tmp_path, mend):
-    """The applied samples count, whether the record begins late or has a gap."""
+def test_missing_rows_do_not_shift_the_others_in_time(begun, taken, tmp_path, mend):
+    """All applied samples are counted, whether the record begins late or has a gap."""
     record = applied(begun, tmp_path / "r1.csv")
     head, *rows = record.read_text().splitlines()
     record.write_text("\n".join([head, *mend(rows)]) + "\n")
@@ -221,7 +221,7 @@ def test_directories_of_another_kind_and_version_are_refused(run, begun):
     assert "run-missing" in run("status", "nowhere")[2]
 
 
-def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
+def test_a_killed_next_command_leaves_the_state_before_or_after_it(run, begun, tmp_path):
     record = applied(begun, tmp_path / "r.csv")
     for step in (1, 40, 400, 1200, 2000, 3000):
         child = os.fork()
@@ -250,8 +250,8 @@ def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("gain", "sign"), [(2.0, False), (-2.0, True)])
-def test_a_poor_plant_of_the_spec_is_told_once(begun, taken, tmp_path, gain, sign):
-    """It is why an experiment goes in parts; the plans after the first one rest on estimates."""
+def test_a_plant_far_from_the_spec_is_reported_after_the_first_record(begun, taken, tmp_path, gain, sign):
+    """Only the first plan rests on the spec; later plans rest on estimates."""
     told = []
     for number in (1, 2):
         result = taken(applied(begun, tmp_path / f"r{number}.csv", gain=gain))[1]
@@ -263,7 +263,7 @@ def test_a_poor_plant_of_the_spec_is_told_once(begun, taken, tmp_path, gain, sig
     assert (len(told[0]), told[1]) == (1, set())
 
 
-def test_moves_between_parts_keep_the_limit(begin, run, tmp_path):
+def test_moves_from_part_to_part_keep_rate_and_amplitude_limits(begin, run, tmp_path):
     directory, _, _ = begin("d", "limits.rate=1.2", "signal.offset=40", "limits.amplitude=2.5")
     assert run("next", "d", applied(directory, tmp_path / "d1.csv"), "--no-figures")[0] == 0
     u = planned(directory)[:, 1] - 40.0
@@ -271,11 +271,11 @@ def test_moves_between_parts_keep_the_limit(begin, run, tmp_path):
     assert np.abs(u).max() <= 2.5 * (1 + 1e-9)
 
 
-def test_every_part_has_a_record_by_the_seed_of_the_spec(begin, run, tmp_path):
-    """The same again by the same seed, and another by another."""
+def test_the_seed_of_the_spec_determines_the_plans_of_a_campaign(begin, run, tmp_path):
+    """The same seed gives the same plan, another seed another one."""
     seeds = {"none": (), "0": ("signal.seed=0",), "6": ("signal.seed=6",), "again": ("signal.seed=6",)}
     plans = {name: planned(begin(name, *own)[0]) for name, own in seeds.items()}
-    assert np.array_equal(plans["none"], plans["0"])  # as everywhere, none is 0
+    assert np.array_equal(plans["none"], plans["0"])  # the default seed is 0
     assert not np.array_equal(plans["none"], plans["6"])
     assert np.array_equal(plans["6"], plans["again"])
     assert run("next", "6", applied(tmp_path / "6", tmp_path / "r.csv"), "--no-figures")[0] == 0
@@ -283,22 +283,22 @@ def test_every_part_has_a_record_by_the_seed_of_the_spec(begin, run, tmp_path):
     assert first != second
 
 
-def test_parts_have_values_of_the_converter_only(begin):
-    """2^6 values over 20, so 0.3125 apart; the offset lies between two of them."""
+def test_samples_of_a_part_are_values_of_the_converter(begin):
+    """2^6 values over 20 are 0.3125 apart; the offset lies between two of them."""
     overrides = ["signal.quantisation={bits: 6, range: 10}", "signal.offset=0.4"]
     directory, _, _ = begin("c", *overrides)
     steps = planned(directory)[:, 1] / (20.0 / 2**6)
     assert np.allclose(steps, np.rint(steps), atol=1e-9)
     (round_,) = read_run(directory)["campaign"]["rounds"]
     assert round_["plan"]["offset"] == [0.3125]  # 0.4 is nearer to it than to 0.625
-    # Records vary about the same value.
+    # Identification takes the same operating point.
     assert build_identification(parse_spec(SPEC, overrides=overrides)).operating_point == {"u1": 0.3125}
 
 
 @pytest.mark.parametrize(
     ("asked", "code"), [(["signal.samples=50"], "not-supported"), (["signal.also=[mat]"], "not-supported")]
 )
-def test_what_no_part_has_is_refused(begin, asked, code):
+def test_signal_options_that_campaigns_do_not_support_are_refused(begin, asked, code):
     directory, exit_code, err = begin("c", *asked)
     assert (exit_code, code in err, asked[0].split("=")[0] in err) == (2, True, True)
     assert not directory.exists()
@@ -306,8 +306,8 @@ def test_what_no_part_has_is_refused(begin, asked, code):
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("hold", "least"), [(7, 0.3), (1, 0.4), (4, None), ("auto", 0.2)])
-def test_moves_of_parts_are_large_and_dwell(begin, run, tmp_path, hold, least):
-    """From part to part, too."""
+def test_moves_within_and_between_parts_keep_least_move_and_hold(begin, run, tmp_path, hold, least):
+    """The first move starts from the offset of 3."""
     shortest = {"auto": 1}.get(hold, hold)
     own = [f"signal.hold={hold}"] + ([] if least is None else [f"signal.least_move={least}"])
     directory, code, err = begin("c", "campaign.block=30", "campaign.pilot=30", "signal.offset=3", *own)
@@ -321,8 +321,8 @@ def test_moves_of_parts_are_large_and_dwell(begin, run, tmp_path, hold, least):
 
 
 @pytest.mark.parametrize("least", [0.1, 1.0, 2.5])
-def test_a_part_of_larger_moves_has_its_power(least):
-    """Though its plan moves by less; only a limit keeps it weaker."""
+def test_enlarging_moves_to_the_least_move_keeps_the_power(least):
+    """The planned moves are smaller; only the amplitude limit may reduce the power."""
     record = np.random.default_rng(1).standard_normal((80, 2)) * [1.0, 0.5]
     start, reach = np.array([0.0, 2.0]), np.array([6.0, 3.0])
     moved = usefully_moved(record, start, np.array([least, 0.5 * least]), reach)

@@ -1,4 +1,4 @@
-"""Campaigns in a loop and with two channels, in stages: the true plant is not that of the spec."""
+"""Campaigns in a closed loop and with two channels, in stages; the true plant differs from the spec."""
 
 import json
 import shutil
@@ -31,7 +31,7 @@ spectrum: {type: fir, order: 4}
 signal: {candidates: 2}
 campaign: {stages: [60, 120, 120], last: nominal}
 """
-# As in the specs, and off by several standard deviations of the finished experiment.
+# True parameters, several standard deviations of the finished experiment away from the specs.
 TRUE_TWO = {"a1[1]": -0.75, "a1[2]": 0.35, "b1[1,1]": 0.9, "b1[1,2]": -0.6, "b1[2,1]": 0.7, "b1[2,2]": 1.1}
 TRUE_LOOP = {"b1": 0.4, "f1": -0.85}
 
@@ -63,7 +63,7 @@ def loop(r, e):
 
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory):
-    """The campaigns of the specs, in folders of their names."""
+    """A folder with the campaigns `two` and `loop`, each with its first plan."""
     folder = tmp_path_factory.mktemp("begun")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -75,12 +75,12 @@ def begun(tmp_path_factory):
 
 @pytest.fixture
 def begin(begun, tmp_path):
-    """Copies one of them as `c`."""
+    """Copies one of these campaigns to the folder `c`."""
     return lambda name: shutil.copytree(begun / name, tmp_path / "c")
 
 
 def recorded(directory, name):
-    """Header and rows of what is recorded of the part that comes next."""
+    """Header and rows of the record of the next part, simulated with the true plant."""
     plans = [np.loadtxt(path, delimiter=",", skiprows=1) for path in sorted(directory.glob("plan_*.csv"))]
     times, x = np.concatenate(plans)[:, 0], np.concatenate(plans)[:, 1:]
     e = np.random.default_rng(4).standard_normal((1000, x.shape[1]))[: len(x)]
@@ -99,7 +99,7 @@ def saved(path, header, table):
 @pytest.mark.parametrize(
     ("name", "true"), [pytest.param("two", TRUE_TWO, marks=pytest.mark.slow), ("loop", TRUE_LOOP)]
 )
-def test_a_campaign_ends_with_the_true_parameters(run, begin, tmp_path, name, true):
+def test_a_campaign_ends_within_four_deviations_of_the_true_parameters(run, begin, tmp_path, name, true):
     begin(name)
     for number in range(1, 8):
         record = saved(tmp_path / f"r{number}.csv", *recorded(tmp_path / "c", name))
@@ -109,7 +109,7 @@ def test_a_campaign_ends_with_the_true_parameters(run, begin, tmp_path, name, tr
         if result["status"] != "running":
             break
         plan = result["campaign"]["rounds"][-1]["plan"]
-        if name == "two":  # where the power of the inputs is paid for
+        if name == "two":  # the cost is the input power
             assert plan["part_cost"] == pytest.approx(plan["part_power"])
         assert plan["part_cost"] <= 10.0 * result["campaign"]["first_cost"] * (1 + 1e-9)
     assert result["status"] == "stopped"
@@ -121,7 +121,7 @@ def test_a_campaign_ends_with_the_true_parameters(run, begin, tmp_path, name, tr
     assert [record["samples"] for record in result["campaign"]["records"]][:2] == [60, 120]
 
 
-def test_the_input_of_a_loop_is_not_its_reference(run, begin, tmp_path):
+def test_a_wrong_reference_is_refused_and_a_missing_one_is_reported(run, begin, tmp_path):
     begin("loop")
     header, table = recorded(tmp_path / "c", "loop")
     wrong = table.copy()
@@ -146,14 +146,14 @@ def test_the_input_of_a_loop_is_not_its_reference(run, begin, tmp_path):
         ("loop", [0, 3, 2, 1], "u1 follows plan_01.csv as r1 should", "time_s,r,y,u"),
     ],
 )
-def test_swapped_columns_are_named(run, begin, tmp_path, name, order, told, right):
+def test_swapped_columns_are_named_and_accepted_once_renamed(run, begin, tmp_path, name, order, told, right):
     begin(name)
     header, table = recorded(tmp_path / "c", name)
     record = saved(tmp_path / "s.csv", header, table[:, order])
     code, _, err = run("next", "c", record)
     assert (code, "record-unlike" in err, "the columns of s.csv look swapped" in err) == (2, True, True)
     assert told in err
-    if name == "loop":  # a reference goes by the header
+    if name == "loop":  # the header names a reference
         assert "first line" in err
         record, options = saved(record, right, table[:, order]), ()
     else:
@@ -162,7 +162,7 @@ def test_swapped_columns_are_named(run, begin, tmp_path, name, order, told, righ
 
 
 @pytest.mark.parametrize(("name", "into", "other"), [("two", 4, "y2"), ("loop", 2, "y1")])
-def test_an_output_that_is_what_was_applied_is_refused(run, begin, tmp_path, name, into, other):
+def test_an_output_that_is_a_copy_of_the_excitation_is_refused(run, begin, tmp_path, name, into, other):
     begin(name)
     header, table = recorded(tmp_path / "c", name)
     copied = 3 if name == "loop" else 1
@@ -173,7 +173,7 @@ def test_an_output_that_is_what_was_applied_is_refused(run, begin, tmp_path, nam
 
 
 @pytest.mark.slow
-def test_a_record_that_ends_early_says_so(run, begin, tmp_path):
+def test_a_record_shorter_than_its_plan_is_reported(run, begin, tmp_path):
     begin("two")
     header, table = recorded(tmp_path / "c", "two")
     code, out, _ = run("next", "c", saved(tmp_path / "s.csv", header, table[:45]), "--json", "--no-figures")
@@ -182,7 +182,7 @@ def test_a_record_that_ends_early_says_so(run, begin, tmp_path):
     assert shorter["figures"] == {"plan": "plan_01.csv", "samples": 45, "planned": 60}
 
 
-def test_what_is_wrong_with_a_record_is_said_of_the_file_that_was_given(run, begin, tmp_path):
+def test_refusals_of_a_record_name_the_file_as_it_was_given(run, begin, tmp_path):
     begin("loop")
     header, table = recorded(tmp_path / "c", "loop")
     assert run("next", "c", saved(tmp_path / "n.csv", "time_s,u,y", table[:, :3]), "--no-figures")[0] == 0

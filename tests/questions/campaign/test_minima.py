@@ -1,4 +1,4 @@
-"""Data that leave several models lead to another part, which tells them apart."""
+"""Data that several minima of the likelihood fit lead to a part that discriminates between them."""
 
 import json
 
@@ -29,26 +29,26 @@ COLOURED = SPEC.replace("{variance: 1.0}", "{C: [1, -0.5], D: [1, -0.8], varianc
         (200, "met", False, "never", "stopped"),
     ],
 )
-def test_a_campaign_ends_when_it_is_decided(done, verdict, refuted, stop, state):
+def test_a_campaign_ends_by_its_samples_its_verdict_and_its_stop_rule(done, verdict, refuted, stop, state):
     rules = build_rules(parse_spec(SPEC, overrides=[f"campaign.stop={stop}"]))
     assert rules.state(done, verdict, refuted=refuted) == state
 
 
 def predictions_apart(u, one, other):
-    """(n,): the difference of the predictions of two models (b, c, d, f) in units of the noise, by hand."""
+    """(n,): difference of the predictions of two models (b, c, d, f) in standard deviations of e, by hand."""
     y = [lfilter([0.0, b], [1.0, f], u) for b, _, _, f in (one, other)]
     return lfilter([1.0, -0.8], [1.0, -0.5], y[0] - y[1]) / np.sqrt(0.5)
 
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("ratio", [1.1, 0.9])
-def test_the_part_tells_two_minima_apart(ratio):
-    """By 36 of -2 log likelihood, with less power than white noise takes, and within the amplitude."""
+def test_a_part_discriminates_between_two_minima_of_the_likelihood(ratio):
+    """It adds 36 to -2 log likelihood, more than white noise of equal power, within the amplitude."""
     spec = parse_spec(COLOURED, overrides=["limits.amplitude=4", "campaign.power_cap=1000"])
     at, rules = build_planner(spec), build_rules(spec)
     model, other = at.nominal.model, np.array([3.2, -0.5, -0.8, -0.73])
     known = Standing(model, 1e5 * np.eye(4) / ratio**2, ratio, open=True, others=(other,))
-    assert at.plan(rules, known, 60, 5, 1.0).kind != "parting" or ratio < 1.0  # other parts follow
+    assert at.plan(rules, known, 60, 5, 1.0).kind != "parting" or ratio < 1.0  # more parts follow
     plan = at.plan(rules, known, 140, 5, 1.0)
     assert (plan.kind, plan.alone, len(plan.applied)) == ("parting", False, 60)
     u = plan.applied[:, 0]
@@ -60,7 +60,7 @@ def test_the_part_tells_two_minima_apart(ratio):
     assert told > np.mean(apart)
     free = build_planner(parse_spec(COLOURED))  # without a limit
     assert free.plan(rules, known, 140, 5, 1.0).kind == "parting"
-    # Where tests alone leave it open, the part is planned as if without data.
+    # If only residual tests leave the model undecided, the part is planned as if without data.
     alone = at.plan(rules, Standing(model, known.information, 0.9, open=True), 140, 5, 1.0)
     assert (alone.kind, alone.alone) == ("nominal", True)
     assert alone.power > 0.0
@@ -79,7 +79,7 @@ signal: {type: multisine, offset: 45}
 
 
 def exchanged(u, seed):
-    """(n,): outlet of the exchanger, 1.72 degC/%, 262 s and 31 s, with 0.1 degC that fades in a minute."""
+    """(n,): outlet in degC: 1.72 degC/%, lag 262 s, dead time 31 s; noise 0.1 degC, correlated over 60 s."""
     fine = np.concatenate([np.zeros(31), np.repeat(u, 10)])
     lag, fade = np.exp([-1 / 262, -1 / 60])
     y = lfilter([0.0, 1.72 * (1 - lag)], [1.0, -lag], fine)[: 10 * len(u)]
@@ -91,7 +91,7 @@ def exchanged(u, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "parts"), [(3, True), (7, False)])
 def test_campaigns_on_an_exchanger_end_met(seed, parts, monkeypatch, capsys, tmp_path):
-    """Minima on both sides of a sampling instant, in the dead time, are told apart; 12 parts are allowed."""
+    """A part separates minima of the dead time on both sides of a sampling instant; 12 parts are allowed."""
     monkeypatch.chdir(tmp_path)
     run, spec = caller(monkeypatch, capsys), tmp_path / "s.yaml"
     spec.write_text(EXCHANGER)

@@ -1,4 +1,4 @@
-"""Campaigns whose model lacks something end as soon as the data say so, and not by chance before."""
+"""Campaigns with a wrong model structure end once the data refute it; right structures seldom do."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.campaigns import SPEC, applied
 
-TRUE = {"gain": 1.4, "poles": (0.7, 0.6)}  # where the model has one pole
+TRUE = {"gain": 1.4, "poles": (0.7, 0.6)}  # the model has one pole
 
 
 def until_it_ends(run, directory, folder, *options, most=12):
@@ -22,7 +22,7 @@ def until_it_ends(run, directory, folder, *options, most=12):
 
 
 @pytest.mark.slow
-def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
+def test_a_refuted_model_structure_ends_the_campaign(run, begun, tmp_path):
     code, result = until_it_ends(run, begun, tmp_path)
     assert code == 5
     assert result["status"] == "undecided"
@@ -32,7 +32,7 @@ def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
     assert (first["figures"]["samples"], first["figures"]["end"]) == (result["samples"], 600)
     assert first["figures"]["records"] == [record["file"] for record in result["campaign"]["records"]]
     assert not (begun / "signal.csv").exists()
-    # More records are not taken, unless it is said that it goes on.
+    # Further records are refused without --regardless.
     code, _, err = run("next", "c", tmp_path / "r0.csv")
     assert code == 2
     assert "--regardless" in err
@@ -46,7 +46,7 @@ def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
+def test_withdrawn_records_are_left_out_of_suggestions_to_explore(run, begun, tmp_path):
     until_it_ends(run, begun, tmp_path)
     assert run("next", "c", "--withdraw", 1, "--no-figures")[0] in (0, 5)
     result = json.loads((begun / "result.json").read_text())
@@ -56,15 +56,15 @@ def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
     assert not any("record_01.csv" in note or "record_??" in note for note in named)
 
 
-def test_a_record_is_not_withdrawn_and_forgiven_at_once(run, begun):
+def test_withdraw_and_regardless_exclude_each_other(run, begun):
     code, _, err = run("next", "c", "--withdraw", 1, "--regardless")
     assert code == 2
     assert "--regardless" in err
 
 
 @pytest.mark.slow
-def test_right_models_are_seldom_refuted_at_any_part():
-    """White records of a first-order plant, looked at after each of 30 parts."""
+def test_a_right_structure_is_seldom_refuted_at_any_look():
+    """White records of a first-order plant are tested after each part of 20 samples."""
     from inputdesign_cli import parse_spec
     from inputdesign_cli.identification import identify
     from inputdesign_cli.questions.campaign.build import build_campaign
@@ -86,7 +86,7 @@ def test_right_models_are_seldom_refuted_at_any_part():
 
 
 @pytest.mark.slow
-def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
+def test_a_campaign_with_stop_never_lasts_the_whole_experiment(run, tmp_path):
     (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 60, stop: never}"))
     assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
     code, result = until_it_ends(run, tmp_path / "c", tmp_path)
