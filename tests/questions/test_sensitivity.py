@@ -154,10 +154,3 @@ def test_the_norm_costs_more_than_the_entries_and_is_reported():
     requirement = designed(OPEN).problem.requirements[0]
     assert requirement.of_the_norm
     assert isinstance(requirement.admissible, Absolute)
-
-
-@pytest.mark.slow
-def test_the_norm_is_reported():
-    outcome = solve(parse_spec(OPEN))
-    assert outcome.result["requirements"][0]["norm"] == "frobenius"
-    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
