@@ -25,7 +25,8 @@ _CERTAIN, _HELPS = 1e-4, 1e-3
 _FOLLOWS = 1e-9
 # Innovations of u and y depend on each other beyond this correlation.
 _TOGETHER = 0.1
-# A jump is this multiple of an input's median innovation; fewest samples to compare jumps with the rest.
+# A jump is this multiple of an input's median innovation. Fewer jumps do not show their own scatter; the
+# other samples are as many per lag at least.
 _JUMP, _FEWEST = 6.0, 5
 # The gain of -2 log likelihood by chance in a choice among some thousands of structures and delays.
 _BY_CHOICE = 25.0
@@ -102,19 +103,20 @@ def _moved_at_once(parts: Parts, lags: int) -> list[float]:
     found = []
     for x in new_u.T:
         jumps, chance = np.abs(x) > _JUMP * np.median(np.abs(x)), 1.0
-        for e in new_y.T if np.sum(jumps) >= _FEWEST and np.sum(~jumps) >= lags * _FEWEST else ():
-            (small, own), (large, other) = (_slope(x[at], e[at]) for at in (~jumps, jumps))
+        for e in new_y.T if np.any(jumps) and np.sum(~jumps) >= lags * _FEWEST else ():
+            least = float(np.std(e[~jumps])) if np.sum(jumps) < _FEWEST else 0.0
+            (small, own), (large, other) = _slope(x[~jumps], e[~jumps]), _slope(x[jumps], e[jumps], least)
             apart = min(abs(small) / own, abs(small - large) / np.hypot(own, other))
             chance = min(chance, float(scipy.special.erfc(apart / np.sqrt(2.0))))
         found.append(chance)
     return found
 
 
-def _slope(x: Array, y: Array) -> tuple[float, float]:
-    """Return the slope of y (n,) over x (n,), and its deviation."""
+def _slope(x: Array, y: Array, least: float = 0.0) -> tuple[float, float]:
+    """Return the slope of y (n,) over x (n,), and its deviation if errors deviate by `least` at least."""
     power = max(float(x @ x), 1e-300)
     slope = float(x @ y) / power
-    return slope, max(float(np.std(y - slope * x)) / np.sqrt(power), 1e-300)
+    return slope, max(float(np.std(y - slope * x)), least, 1e-150) / np.sqrt(power)
 
 
 def like_answers(parts: Parts, output: int, j: int) -> bool:

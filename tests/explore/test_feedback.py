@@ -78,7 +78,7 @@ KINDS = ("held", "levels", "prbs", "sines", "walk", "step", "white", "smooth", "
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("colour", "hold"), [("ar", 10), ("walk", 20)])
+@pytest.mark.parametrize(("colour", "hold"), [("ar", 10), ("walk", 20), ("walk", 260)])
 def test_feedback_is_found_in_a_loop_with_a_held_reference(plant, colour, hold):
     """Between steps past inputs predict as much as past outputs; only simultaneous changes are left."""
     record = looped(np.random.default_rng(1), plant, colour, hold)
