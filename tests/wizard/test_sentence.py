@@ -120,7 +120,8 @@ WRITTEN = {
     "PI controller for a room. The radiator valve is at 40 %, it may move by +-20 %. One percent of valve "
     "gives about 0.11 degC, it reacts within about 0.7 h, dead time about 2 min. Noise 0.04 degC. The sensor "
     "shows 0.01 degC steps. The weather drifts slowly. I have 16 hours at most, less is better.": (
-        "gain=0.11 time_constant=2520 dead_time=120 offset=40 duration=57600 variance=0.0016083333333333334"
+        # The noise, of variance 0.04^2 + 0.01^2 / 12, and a random walk are (1 + c q^-1) e / (1 - q^-1).
+        "gain=0.11 time_constant=2520 dead_time=120 offset=40 duration=57600 variance=0.001963771"
     ),
     "I've got a heat exchanger on steam. Steam valve sits at 35 %, I can swing it ±5 %. Outlet temperature "
     "responds about 0.8 °C per %, in roughly 4 minutes, after 20 seconds or so. Sensor noise ±0.1 °C. I need "
