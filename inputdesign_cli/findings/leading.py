@@ -117,7 +117,7 @@ def _slow_cause(first: Finding, against: Sequence[Finding], estimate: Estimate, 
     """Return the command for a drift along a line, or for a leak of an integrator, that explains the rest.
 
     Past inputs, or a shift of most of a record, may stand for the effect of a leak. A line in the output of a
-    plant that integrates may be its response to the input.
+    plant that integrates may be its response to the input. Noise that integrates explains a line already.
     """
     model, rows = _model(estimate), first.figures.get("rows")
     wide = isinstance(rows, list) and any(last - begin > _WIDE * len(data.y) for begin, last in rows)
@@ -125,7 +125,7 @@ def _slow_cause(first: Finding, against: Sequence[Finding], estimate: Estimate, 
     if _rank(first.code) < _rank("level-shift") or (shift and not wide):
         return ""
     integrates = bool(np.any(np.abs(model.plant_points) < INTEGRATES))
-    if not (data.lined or integrates) and np.any(slopes_of(data.parts)):
+    if not (data.lined or integrates or _drifts(model)) and np.any(slopes_of(data.parts)):
         return _DETREND
     of_drift = first.code in (DRIFT.code, PLANT.code) and any(one.code == DRIFT.code for one in against)
     if not (shift or of_drift) or _no_leak(estimate) or not (denominator := _leaking(model)):

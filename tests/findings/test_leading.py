@@ -288,6 +288,8 @@ def test_no_command_adds_a_drift_or_a_leak_that_the_model_has():
     noise = "{standard_deviation: 1, correlation_time: 60}"
     assert "noise.drift=true" in led(TANK, noise)
     assert led(TANK, noise.replace("}", ", drift: true}")).startswith("idesign explore")
+    for code in ("plant-structure", "drift"):
+        assert led(LAG, noise.replace("}", ", drift: true}"), code).startswith("idesign explore")
     of_structure = ("drift", "plant-structure")
     for more in ((), of_structure, (*of_structure, "noise-structure"), ("level-shift",)):
         assert '"plant.continuous.denominator=[1, leak]"' in led(NAMED_TANK, noise, *more)
