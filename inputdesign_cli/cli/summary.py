@@ -85,7 +85,7 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
         rivals = outcome.identification is not None and outcome.identification.rivals
         listed = ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
         also = "; levels are estimated as well" * (outcome.exploration is not None)
-        also += "; or other parameters, below" * bool(rivals)
+        also += "; or other parameters, see rivals in result.json" * bool(rivals)
         yield "estimate", f"{listed}   (+-: one standard deviation{also})"
     yield from _lines(facts(outcome, part="estimate"))
     verdicts = []
