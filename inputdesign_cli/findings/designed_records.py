@@ -36,8 +36,8 @@ RECORD_DEAR = doubt(
 )
 RECORD_LONGER = note(
     "record-longer",
-    "Limits on single samples require a longer record. The spectrum alone needs fewer samples. The length "
-    "was found by trial, without proof.",
+    "The record is longer than its spectrum alone needs. A limit on single samples requires it, the fewest "
+    "values of a period, or the response that its end cuts off. It was found by trial, without proof.",
     "Nothing, or widen the limit on single samples that the record uses most.",
 )
 OTHER_SIGNAL = note(
@@ -76,19 +76,32 @@ def requirement_missed(names: Sequence[str], ratio: float) -> list[Finding]:
     return RECORD_MISSES.when(ratio > 1.0 + _FALLS_SHORT, fact, where="signal", worst_ratio=ratio)
 
 
-def length_of_record(record: Record, asked: int, block: int) -> list[Finding]:
+def length_of_record(
+    record: Record, asked: int, block: int, fewest: int, shares: Mapping[str, float]
+) -> list[Finding]:
     """Return a finding if a record is longer than was asked for, or dear for want of samples.
 
     Args:
         asked: the number of samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
+        fewest: the fewest values of a period.
+        shares: of each limit on single samples that the record uses.
     """
     size, times = len(record.samples), 1.0 + record.extra_power
     if record.method == "given":
         return []
     if size > asked + block:
-        fact = f"{size} samples, to one per cent, where the spectrum alone needs {asked}"
-        return [RECORD_LONGER.found(fact, where="signal", samples=size, of_spectrum=asked)]
+        nearest = max(shares, key=lambda name: shares[name], default="")
+        where, remedy, why = "signal", "", "the response to its last samples is lost"
+        if size == fewest * block:
+            why = f"a period has at least {fewest} values"
+            if block > 1:
+                where, remedy = "signal.hold", "A shorter signal.hold or fewer signal.periods shorten it."
+        elif nearest:
+            where = f"limits.{nearest}"
+            why = f"it is the shortest to one per cent, and uses {100 * shares[nearest]:.3g} % of {where}"
+        fact = f"{size} samples in place of {asked}, because {why}"
+        return [RECORD_LONGER.found(fact, where=where, remedy=remedy, samples=size, of_spectrum=asked)]
     dear = record.extra_power > _EXPENSIVE
     return RECORD_DEAR.when(dear, f"{times:.3g} times as much", where="signal.samples", times=times)
 

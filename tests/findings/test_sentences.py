@@ -91,8 +91,13 @@ FOUND = {
         *records.accuracy_missed(MADE),
         *records.requirement_missed(["model_error"], 1.1),
     ],
-    "record-dear": records.length_of_record(MADE, 40, 1),
-    "record-longer": records.length_of_record(MADE, 20, 1),
+    "record-dear": records.length_of_record(MADE, 40, 1, 2, {}),
+    "record-longer": [
+        *records.length_of_record(MADE, 20, 1, 2, {"amplitude.input": 0.8, "rate": 1.0}),
+        *records.length_of_record(MADE, 1, 5, 8, {"rate": 1.0}),
+        *records.length_of_record(MADE, 1, 1, 40, {"rate": 1.0}),
+        *records.length_of_record(MADE, 20, 1, 2, {}),
+    ],
     "record-too-few-values": records.too_short(6, 16),
     "bound-of-power-only": records.short_windows(12, 1000.0, 0.6),
     "noise-moves-input": records.noise_moves_input(np.array([0.2]), [3.0]),
@@ -135,9 +140,14 @@ def test_cases_that_are_in_order_have_no_findings():
     assert unfinished.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good) == []
     assert records.short_windows(12, 10.0, 0.6) == records.short_windows(12, 1000.0, 0.05) == []
-    assert records.length_of_record(good, 40, 1) == records.less_accurate(1.001, 1.0) == []
+    assert records.length_of_record(good, 40, 1, 2, {}) == records.less_accurate(1.001, 1.0) == []
     assert runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None) == []
     assert runs.other_length(7, 7) == runs.one_minimum(None) == []
+
+
+def test_a_longer_record_is_put_down_to_what_lengthens_it():
+    places = [one.where for one in FOUND["record-longer"]]
+    assert places == ["limits.rate", "signal.hold", "signal", "signal"]
 
 
 def test_figures_are_the_numbers_of_the_case():

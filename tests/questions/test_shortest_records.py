@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.time_limit import OutOfTimeError
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.questions import build_task
 from inputdesign_cli.questions.common.record import Made, make_record
 from inputdesign_cli.questions.least_cost.record_search import ShortestRecord, Way
@@ -287,3 +287,20 @@ def test_a_stated_length_that_misses_the_accuracy_is_refused_as_the_shortest(sam
         assert solve(spec).result["signal"]["worst_ratio"] <= 1.0
     else:
         assert code_of(solve, spec, kind=SpecError) == expected
+
+
+@pytest.mark.parametrize("relative", [0.2, 0.1, 0.05])
+def test_where_power_alone_is_limited_the_record_is_as_long_as_it_must_be(relative):
+    """The spectrum needs fewer samples than a record from rest, which loses the response to its last ones."""
+    text = LAG.replace("amplitude: 1", "input_power: 1").replace("0.05", str(relative)) + SHORTEST
+    found = solve(parse_spec(text)).result
+    signal = found["signal"]
+    assert found["objective"]["value"] + 1.0 < signal["samples"]
+    assert signal["worst_ratio"] <= 1.0 + 1e-9
+    assert signal["power"][0] <= 1.0 + 1e-9
+    assert signal["extra_power"] == pytest.approx(signal["power"][0] - 1.0)
+
+
+def test_where_no_record_within_the_longest_experiment_excites_every_parameter():
+    text = LAG.replace("amplitude: 1", "input_power: 1, samples: 2").replace("0.05", "0.2") + SHORTEST
+    assert code_of(solve, parse_spec(text), kind=InfeasibleError) == "limits-too-tight"

@@ -396,6 +396,6 @@ def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Rec
 
 def no_record(request: RecordRequest, samples: int, best: str, hint: str) -> InfeasibleError:
     """Return the error `limits-too-tight`: what the best record of this length reaches."""
-    keys = request.limit_keys
+    keys = request.limit_keys or ("limits.samples",)
     message = f"no record of {samples} samples within {' and '.join(keys)} was found that {best}"
     return InfeasibleError.because("limits-too-tight", message, hint, keys[0])

@@ -259,6 +259,13 @@ def _first_fitting(request: RecordRequest, question: Question, design: Design, s
             if pilot is not None and reach(pilot, before) > _FAR_FROM * samples:
                 return _longer(request, question, design, [pilot], request.length(samples))
     record = make_record(request, design, samples)
+    if record is not None and not record.met and sought and not request.bounds.hard and request.meets:
+        # Powers alone are limited, and a record from rest loses the response to its last samples.
+        try:
+            return _longer(request, question, design, [record], len(record.samples))
+        except InfeasibleError:
+            if not np.isfinite(record.worst_ratio):
+                raise
     if record is None or record.met or not request.searched:
         if record is not None:
             refuse_too_short(request, design.problem.experiment, record)
@@ -310,11 +317,14 @@ def _of_less_power(question: Question, design: Design) -> Iterator[tuple[float, 
 
 def _other_record(request: RecordRequest, design: Design, other: Made, record: Record) -> Made:
     """Return the other record with its cost relative to the design that was asked for, and a finding."""
+    found = other_signal(_WORDS.get(record.method, record.method), other.input_power)
+    return replace(other, record=_at_the_cost(request, design, other, record), findings=(found,))
+
+
+def _at_the_cost(request: RecordRequest, design: Design, other: Made, record: Record) -> Record:
+    """Return the other record with its cost relative to the design that was asked for."""
     asked, own = (design_cost(each, request.cost) for each in (design, other.design))
-    extra = (1.0 + record.extra_power) * own / asked - 1.0
-    kind = _WORDS.get(record.method, record.method)
-    found = other_signal(kind, other.input_power)
-    return replace(other, record=replace(record, extra_power=extra), findings=(found,))
+    return replace(record, extra_power=(1.0 + record.extra_power) * own / asked - 1.0)
 
 
 def _words(request: RecordRequest) -> str:
@@ -347,8 +357,9 @@ def _longer(
         design.problem.experiment.inputs,
     )
     found = search.search(misses, samples)
-    if found is not None:
+    if found is not None and found.record is not None:
         other = found.request.settings.method != request.settings.method
+        found = replace(found, record=_at_the_cost(request, design, found, found.record))
         return replace(found, findings=(other_signal(_words(found.request)),) if other else ())
     missed = misses[0]
     if len(missed.samples) != samples:

@@ -212,12 +212,14 @@ class ConvexTask(SpectrumTask):
             signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
         if made.input_power is not None:
             signal = replace(signal, spectrum_of={"input_power": made.input_power})
-        asked = request.samples or done.experiment.samples
+        asked, fewest = request.samples or done.experiment.samples, least_period(problem.experiment.inputs)
         findings = [
             *([] if coverage is None else confidence_missed(coverage, signal.confidence)),
             *made.findings,
             *of_records.accuracy_missed(record),
-            *of_records.length_of_record(record, asked, request.settings.block),
+            *of_records.length_of_record(
+                record, asked, request.settings.block, fewest, signal.of_limits or {}
+            ),
             *loop_not_held((one.loop for one in results.outcome.requirements or ()), request.settings.hold),
         ]
         if known is not None:
