@@ -49,10 +49,13 @@ OTHER_SIGNAL = note(
 
 
 @finding(NOTE, "record-not-computed", "Set a shorter record with `signal.samples`.")
-def too_long(kind: FindingKind, samples: int, longest: int) -> list[Finding]:
+def too_long(kind: FindingKind, samples: int, longest: int, *, sought: bool = False) -> list[Finding]:
     """The experiment is too long to compute its record. There is a longest record for each model."""
     fact = f"it has {samples} samples, and at most {longest} are computed for this model"
-    return kind.when(samples > longest, fact, where="signal.samples", samples=samples, longest=longest)
+    where, remedy = "signal.samples", ""
+    if sought:  # no shorter one would do
+        where, remedy = "limits", "Raise the limits, or loosen the accuracy."
+    return kind.when(samples > longest, fact, where=where, remedy=remedy, samples=samples, longest=longest)
 
 
 @finding(NOTE, "record-too-few-values", "Take more samples, a shorter `signal.hold`, or fewer periods.")

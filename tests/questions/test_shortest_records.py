@@ -304,3 +304,12 @@ def test_where_power_alone_is_limited_the_record_is_as_long_as_it_must_be(relati
 def test_where_no_record_within_the_longest_experiment_excites_every_parameter():
     text = LAG.replace("amplitude: 1", "input_power: 1, samples: 2").replace("0.05", "0.2") + SHORTEST
     assert code_of(solve, parse_spec(text), kind=InfeasibleError) == "limits-too-tight"
+
+
+@pytest.mark.parametrize("limits", ["amplitude: 1", "input_power: 1"])
+def test_a_shortest_record_that_is_too_long_to_compute_is_named_and_its_spectrum_kept(limits):
+    text = LAG.replace("amplitude: 1", limits).replace("0.05", "2e-4") + SHORTEST
+    found = solve(parse_spec(text)).result
+    assert found["objective"]["value"] > 1e6
+    assert "signal" not in found
+    assert ("record-not-computed", "limits") in [(one["code"], one["where"]) for one in found["findings"]]

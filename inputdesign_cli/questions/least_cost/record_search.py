@@ -252,7 +252,7 @@ def _first_fitting(request: RecordRequest, question: Question, design: Design, s
     if sought:
         # A spectrum may need fewer samples than the shortest possible record has.
         samples = max(samples, least_period(design.problem.experiment.inputs) * request.settings.block)
-        if request.searched and samples > LONG:
+        if request.searched and samples > LONG and request.length(samples) <= request.longest:
             length = pilot_length(samples, request.settings.block)
             pilot = make_record(replace(request, samples=None), design, length, first=True)
             before = ratio_before(design, request.step)

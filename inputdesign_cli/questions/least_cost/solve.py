@@ -193,7 +193,8 @@ class ConvexTask(SpectrumTask):
         coverage = None if error is None else error.confidence
         if record is None:
             length, inputs = request.length(done.experiment.samples), problem.experiment.inputs
-            missing = of_records.too_long(length, request.longest)
+            sought = problem.goal == "samples" and request.samples is None
+            missing = of_records.too_long(length, request.longest, sought=sought)
             if done.excites:
                 missing += of_records.too_short(request.settings.period(length), least_period(inputs))
             missed = [] if coverage is None else confidence_missed(coverage, None)
