@@ -88,7 +88,7 @@ def length_of_record(
         asked: the number of samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
         fewest: the fewest values of a period.
-        shares: of each limit on single samples that the record uses.
+        shares: used share of each limit on single samples.
     """
     size, times = len(record.samples), 1.0 + record.extra_power
     if record.method == "given":
@@ -102,7 +102,8 @@ def length_of_record(
                 where, remedy = "signal.hold", "A shorter signal.hold or fewer signal.periods shorten it."
         elif nearest:
             where = f"limits.{nearest}"
-            why = f"it is the shortest to one per cent, and uses {100 * shares[nearest]:.3g} % of {where}"
+            why = f"no shorter one of this kind was found, to one per cent; it uses {100 * shares[nearest]:.3g} %"
+            why += f" of {where}"
         fact = f"{size} samples in place of {asked}, because {why}"
         return [RECORD_LONGER.found(fact, where=where, remedy=remedy, samples=size, of_spectrum=asked)]
     dear = record.extra_power > _EXPENSIVE
