@@ -102,8 +102,8 @@ def length_of_record(
                 where, remedy = "signal.hold", "A shorter signal.hold or fewer signal.periods shorten it."
         elif nearest:
             where = f"limits.{nearest}"
-            why = f"no shorter one of this kind was found, to one per cent; it uses {100 * shares[nearest]:.3g} %"
-            why += f" of {where}"
+            uses = f"{100 * shares[nearest]:.3g} % of {where}"
+            why = f"no shorter one of this kind was found, to one per cent; it uses {uses}"
         fact = f"{size} samples in place of {asked}, because {why}"
         return [RECORD_LONGER.found(fact, where=where, remedy=remedy, samples=size, of_spectrum=asked)]
     dear = record.extra_power > _EXPENSIVE
