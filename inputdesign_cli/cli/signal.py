@@ -109,7 +109,11 @@ def signal(
         if file.suffix.removeprefix(".").lower() not in _ENDINGS:
             listed = ", ".join(f".{ending}" for ending in _ENDINGS)
             refuse(f"{file.name} ends with none of {listed}", "--output")
-        refuse_existing(file, overwrite)
+    written = [*files, *(f.with_stem(f"{f.stem}_spectrum") for f in files if f.suffix.lower() == ".png")]
+    if len({part.absolute() for part in written}) < len(written):
+        refuse("a file would be written twice: give each a name of its own", "--output")
+    for part in written:
+        refuse_existing(part, overwrite)
     asked = form.asked()
     from inputdesign_cli.questions.ready_made import make_signal
 
@@ -121,14 +125,15 @@ def signal(
 
         typer.echo(json_text(results.result), nl=False)
     elif not quiet:
-        typer.echo(_summary(results, files))
+        typer.echo(_summary(results, written))
 
 
 def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, float]:
     """Return two numbers, the second larger, or raise `typer.BadParameter`."""
     low, high = found = span(text, option, "LOW:HIGH")
-    if not (max(map(abs, found)) <= _LARGEST and high - low >= _SMALLEST and low >= least):
-        sizes = f"{max(least, -_LARGEST):g} to {_LARGEST:g}, {_SMALLEST:g} apart or more"
+    size = max(map(abs, found))  # values have 13 digits, most of which must be left for the moves
+    if not (size <= _LARGEST and high - low >= max(_SMALLEST, 1e-6 * size) and low >= least):
+        sizes = f"{max(least, -_LARGEST):g} to {_LARGEST:g}, {_SMALLEST:g} apart and a millionth of them"
         refuse(f"{text!r} is no LOW:HIGH within {sizes}", option)
     return found
 

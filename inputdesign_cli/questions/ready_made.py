@@ -56,7 +56,10 @@ def make_signal(asked: ReadyMade) -> Results:
     u, period = _made(asked)
     moved = u - u.mean(axis=0)
     rank = int(np.linalg.matrix_rank(moved.T @ moved, hermitian=True))
-    if asked.inputs > 1 and rank < asked.inputs:
+    if rank == 0:
+        message = f"over {len(u)} samples the signal keeps one value, so that it excites nothing"
+        raise bad_spec("bad-period", message, hint="take more --samples, a shorter --hold, or a wider --band")
+    if rank < asked.inputs:
         bits = (asked.inputs + 1).bit_length()
         longer = f"--prbs {bits} or more" if asked.kind == "prbs" else "more levels"
         raise bad_spec(
@@ -94,15 +97,15 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
     samples = asked.samples or period
     _check_size(max(samples, asked.hold), r, whole_period=bits is not None and asked.samples is None)
     settings = SignalSettings(asked.kind, phases="even", bits=bits, number=asked.number, seed=asked.seed)
-    _check_kind(asked, samples, asked.periods * kind_of(asked.kind).blocks(settings, r))
+    blocks = kind_of(asked.kind).blocks(settings, r)
+    _check_kind(asked, samples, asked.hold * asked.periods * blocks)
     values = -(-samples // (asked.hold * asked.periods))
     try:
         one = equal_lines(settings, values, r, _band(asked), asked.number, odd=asked.odd)
     except TooFewHarmonicsError as error:
         raise bad_spec(
             "too-few-lines",
-            f"a period of {values // kind_of(asked.kind).blocks(settings, r)} samples has {error.there} "
-            f"harmonics in the band, and {asked.number or 'at least one'} are asked for",
+            f"the band has {error.there} harmonics of {values // blocks} values, not {asked.number or 1}",
             hint="take more --samples, a wider --band, or fewer lines",
         ) from None
     u = np.tile(np.repeat(one, asked.hold, axis=0), (asked.periods, 1))[:samples]
@@ -110,7 +113,7 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
 
 
 def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
-    """Raise `SpecError` if the kind makes no signal of these samples, or none of `whole` equal parts."""
+    """Raise `SpecError` if the kind makes no signal of these samples, or none of multiples of `whole`."""
     kind = kind_of(asked.kind)
     if asked.inputs > 1 and not kind.several:
         raise bad_spec(
@@ -118,11 +121,11 @@ def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
             f"a signal of kind {asked.kind} moves one input, and cannot separate effects of several",
             hint="use a multisine for several inputs, or one signal after the other",
         )
-    turn = math.ceil(4.0 * math.pi / sum(_band(asked)))
+    turn = math.ceil(4.0 * math.pi / sum(_band(asked))) * whole
     if asked.kind == "chirp" and samples < turn:
         raise bad_spec(
             "bad-period",
-            f"over {samples} samples the chirp makes less than one turn, so that it does not excite its band",
+            f"over {samples // asked.periods} samples the chirp makes less than one turn: it misses its band",
             hint=f"write --samples {turn} or more, a wider band or a longer --sample-time",
         )
     if asked.kind == "steps" and asked.number is not None and asked.number > samples:
@@ -131,7 +134,7 @@ def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
             f"{asked.number} levels are more than the {samples} samples",
             hint=f"write at most --steps {samples}, or more --samples",
         )
-    if not kind.flat and (samples % whole or samples // whole < 3):
+    if (not kind.flat or asked.periods > 1) and (samples % whole or samples // whole < 3):
         each = f" for each of {asked.inputs} inputs" if asked.inputs > 1 else ""
         raise bad_spec(
             "bad-period",
@@ -155,16 +158,16 @@ def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> Non
 
 
 def _band(asked: ReadyMade) -> tuple[float, float]:
-    """Return the band in rad/sample, all frequencies where none is asked for."""
+    """Return the band in rad per value, all frequencies where none is asked for."""
     lo, hi = asked.band or (0.0, math.inf)
-    nyquist = math.pi / asked.sample_time
+    nyquist = math.pi / asked.sample_time / asked.hold
     if asked.band is not None and hi > nyquist * (1 + 1e-4):
         raise bad_spec(
             "beyond-nyquist",
             f"the band reaches {hi:g}, beyond the Nyquist frequency {nyquist:.6g} rad/{asked.time_unit}",
-            hint="frequencies are in rad per time unit and end at pi / sample time",
+            hint="frequencies are in rad per time unit and end at pi / sample time / hold",
         )
-    return lo * asked.sample_time, min(hi, nyquist) * asked.sample_time
+    return math.pi * lo / nyquist, math.pi * min(hi / nyquist, 1.0)
 
 
 def _lines(asked: ReadyMade, record: Array) -> Curves:

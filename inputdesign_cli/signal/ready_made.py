@@ -41,7 +41,7 @@ def equal_lines(
     powers = np.broadcast_to(np.eye(inputs, dtype=complex), (harmonics.size, inputs, inputs))
     draft = Draft(Lines(2.0 * np.pi * harmonics / period, powers, period), samples, settings, band)
     u = kind.draw(draft, np.random.default_rng(settings.seed))
-    return np.asarray(u / np.abs(u).max())
+    return np.asarray(u / (np.abs(u).max() or 1.0))
 
 
 @dataclass(frozen=True)

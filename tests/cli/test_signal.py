@@ -83,6 +83,14 @@ def test_pictures_are_drawn(tmp_path):
         (["--chirp", "0.1:1", "--hold", 7], "does nothing to"),
         (["--steps", 5, "--periods", 2], "does nothing to"),
         (["--chirp", "0.1:1", "--band", "0:3"], "does nothing to"),
+        (["--kind", "steps", "--samples", 20, "--hold", 30], "keeps one value"),
+        (["--kind", "white", "--samples", 30, "--band", "1.1:1.2"], "keeps one value"),
+        (["--kind", "white", "--samples", 61, "--periods", 3], "--samples 60"),
+        (["--kind", "multisine", "--samples", 60, "--periods", 2, "--hold", 7], "--samples 56"),
+        (["--kind", "chirp", "--samples", 120, "--periods", 3, "--band", "0.01:0.1"], "--samples 345"),
+        (["--kind", "white", "--band", "0.1:2", "--hold", 2], "Nyquist"),
+        (["--prbs", 5, "--range", "999999999:1000000000"], "millionth"),
+        (["--prbs", 5, "-o", "u.png", "-o", "u_spectrum.png"], "written twice"),
     ],
 )
 def test_signals_that_cannot_be_made_are_refused_with_the_reason(words, said, tmp_path):
@@ -92,10 +100,11 @@ def test_signals_that_cannot_be_made_are_refused_with_the_reason(words, said, tm
     assert not list(tmp_path.iterdir())
 
 
-def test_files_are_not_replaced_unasked(tmp_path):
-    file = tmp_path / "u.csv"
+@pytest.mark.parametrize(("asked", "there"), [("u.csv", "u.csv"), ("u.png", "u_spectrum.png")])
+def test_files_are_not_replaced_unasked(asked, there, tmp_path):
+    asked, file = tmp_path / asked, tmp_path / there
     file.write_text("mine")
-    assert run("--steps", 3, "-o", file).exit_code == 2
-    assert file.read_text() == "mine"
-    assert run("--steps", 3, "-o", file, "--overwrite").exit_code == 0
-    assert file.read_text() != "mine"
+    assert run("--steps", 3, "-o", asked).exit_code == 2
+    assert [one.read_text() for one in tmp_path.iterdir()] == ["mine"]
+    assert run("--steps", 3, "-o", asked, "--overwrite").exit_code == 0
+    assert file.read_bytes() != b"mine"

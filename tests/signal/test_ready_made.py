@@ -48,6 +48,18 @@ def test_a_prbs_is_white_over_its_period(bits):
     assert found.power == pytest.approx(1.0 - 1.0 / period**2)
 
 
+@pytest.mark.parametrize("kind", ["white", "multisine", "filtered_noise", "chirp"])
+def test_a_held_signal_keeps_its_band_and_its_periods(kind):
+    """Holding adds images beyond pi / hold only, so that below it the band of the spec is excited."""
+    asked = ReadyMade(kind, band=(0.2, 1.0), samples=3000, hold=2, periods=3, sample_time=0.5)
+    u = make_signal(asked).tables["signal"].columns["u1"]
+    assert np.array_equal(u[:1000], u[1000:2000])
+    power, w = np.abs(np.fft.rfft(u - u.mean())) ** 2, 2.0 * np.pi * np.arange(1501) / 3000 / 0.5
+    inside = (w >= 0.2) & (w <= 1.0)
+    assert power[inside].sum() > 0.95 * power[w <= np.pi].sum()
+    assert power[(w > 0.8) & inside].sum() > 0.1 * power[inside].sum()
+
+
 def test_inputs_of_a_prbs_are_hardly_correlated():
     u = made("prbs", 1023, 3, bits=10)
     gram = u.T @ u / 1023
