@@ -162,6 +162,17 @@ def met_within_table(kind: FindingKind, error: float) -> Finding:
     return kind.found(fact, where="spectrum.given", error=error)
 
 
+@finding(DOUBT, "given-level", "State the level of the plant at rest as `signal.offset`.")
+def given_level(kind: FindingKind, samples: Array, around: Array | None) -> list[Finding]:
+    """The given signal stands further from `signal.offset` than it moves. This level counts as excitation."""
+    levels = samples.mean(axis=0)
+    far = np.abs(levels) > np.abs(samples - levels).max(axis=0)
+    stated = [float(f"{x:.4g}") for x in far * levels + (0.0 if around is None else around)]
+    fact = ", ".join(f"input {j + 1} is {levels[j]:.4g} on average" for j in np.flatnonzero(far))
+    remedy = f"If the plant rests there, write signal.offset: {stated[0] if len(stated) == 1 else stated}."
+    return kind.when(far.any(), fact, where="signal.offset", remedy=remedy, offset=stated)
+
+
 LIMIT_NOT_KEPT = doubt(
     "limit-not-kept",
     "The given excitation breaks a limit. It is analysed unchanged. Its powers, samples and length are "

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import analyse, load_spec, parse_spec, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.text_formats import csv_text
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.spectrum import TabulatedSpectrum
 from tests.support.first_order_specs import PLANT
+from tests.support.refusals import refused
 
 BASE = PLANT + "accuracy: {model_error: {relative: 0.01, alpha: 1}}\nspectrum: {given: GIVEN}\n"
 
@@ -117,6 +119,40 @@ def test_a_record_longer_than_allowed_is_found(tmp_path):
     (found,) = limits_not_kept(spec)
     assert found.where == "limits.samples"
     assert dict(found.figures) == {"value": 120, "limit": 100}
+
+
+MOVES, AT = np.sign(np.random.default_rng(1).standard_normal(200)), np.arange(200.0)
+
+
+def given_samples(path, u, times, header, offset=0):
+    """The outcome of analyse for samples in a file, in the shipped spec with this offset."""
+    path.write_text(csv_text(Table({header: times, "u1": u})))
+    return analyse(load_spec(SHIPPED, [f"spectrum={{given: {{signal: {path}}}}}", f"signal.offset={offset}"]))
+
+
+@pytest.mark.parametrize(
+    ("times", "header", "hint"),
+    [
+        (AT, "time_ms", "sample_time: 0.001;"),
+        (1.004 * AT, "time_s", "sample_time: 1.004;"),
+        (AT + 3 * (AT > 99), "time", "once, in order"),
+        (-AT, "time_s", "once, in order"),
+    ],
+)
+def test_times_of_a_given_signal_are_those_of_the_spec(times, header, hint, tmp_path):
+    (told,) = refused(given_samples, tmp_path / "u.csv", MOVES, times, header, kind=DataError)
+    assert (told.code, told.key) == ("data-not-uniform", "spectrum.given.signal")
+    assert hint in told.hint
+
+
+@pytest.mark.parametrize(("level", "offset"), [(0, 0), (40, 40), (40, 0), (0, 40)])
+def test_samples_of_a_given_signal_count_from_the_offset(level, offset, tmp_path):
+    """A level that no offset explains is doubted."""
+    found = given_samples(tmp_path / "u.csv", MOVES + level, 1000.0 * AT, "time_ms", offset)
+    assert found.result["signal"]["input_peak"] == pytest.approx([np.abs(MOVES + level - offset).max()])
+    assert found.tables["signal"].columns["u1"] == pytest.approx(MOVES + level)
+    told = [one.figures["offset"] for one in found.outcome.findings or () if one.code == "given-level"]
+    assert told == ([] if level == offset else [pytest.approx([level + MOVES.mean()], abs=1e-2)])
 
 
 SPECS = Path(__file__).parents[2] / "specs"

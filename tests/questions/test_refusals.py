@@ -49,6 +49,7 @@ conflicting-keys signal.amplitudes | limits={amplitude: 1} | signal={amplitudes:
 coarse-converter limits.rate | limits={rate: 0.1} | signal={quantisation: {bits: 4, range: 5}}
 coarse-converter signal.offset | signal={offset: 9, quantisation: {bits: 4, range: 5}}
 no-sample-rate signal.also | sample_time=0.3 | signal={also: [wav]}
+no-sample-rate signal.also | sample_time=1.0e-10 | signal={also: [wav]}
 not-supported signal.order | signal={order: 3}
 unsuitable-key signal.type | signal={type: slewed}
 unknown-word signal.lines | signal={lines: even}

@@ -260,9 +260,10 @@ def _check_kind(spec: Spec, settings: SignalSettings) -> None:
         # Several inputs apply shifted parts of the sequence.
         message = f"a register of {bits} bits repeats after {2**bits - 1} values, too few for {inputs} inputs"
         raise spec.complain("out-of-range", message, hint="take more bits", key="signal.bits")
-    rate = sampling_rate(spec)
-    if "wav" in (spec.signal.also or ()) and (round(rate) < 1 or abs(rate - round(rate)) > 1e-9 * rate):
-        message = f"a WAV file needs a whole number of samples a second; the sample time gives {rate:.6g}"
+    rate, most = sampling_rate(spec), (2**32 - 1) // (4 * inputs)  # bytes a second, in its head
+    whole = 1 <= round(rate) <= most and abs(rate - round(rate)) <= 1e-9 * rate
+    if "wav" in (spec.signal.also or ()) and not whole:
+        message = f"a WAV file needs a whole number of samples a second up to {most}, and has {rate:.6g}"
         raise spec.complain("no-sample-rate", message, hint="use mat, or signal.csv", key="signal.also")
 
 

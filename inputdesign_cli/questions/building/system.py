@@ -260,12 +260,12 @@ def prior_record(spec: Spec) -> Array | None:
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
     """Return the samples (n, r) of an excitation from columns u1, u2, .. (in a loop r1, ..) of a file.
 
-    A single input may have the column u. Raises `DataError`: the file cannot be used.
+    A single input may have the column u. Samples count from `signal.offset`. Raises `DataError`.
     """
     units = build_units(spec)
     names = [units.excitation] if units.inputs == 1 else list(units.excitations)
-    columns = read_samples(spec.resolve_path(name), {column: column for column in names}, key=key)
-    return np.stack([columns[column] for column in names], axis=1)
+    columns = read_samples(spec.resolve_path(name), {one: one for one in names}, key=key, units=units)
+    return np.stack([columns[column] for column in names], axis=1) - np.asarray(spec.signal.offset or 0.0)
 
 
 def record_step(spec: Spec) -> float:

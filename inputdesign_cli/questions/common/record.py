@@ -390,7 +390,8 @@ def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Rec
     message = f"no record of {size} samples {what}; the dead time takes too many of them"
     key = "experiment.samples" if request.samples is None else "signal.samples"
     section = key.partition(".")[0]
-    hint = f"take more samples, {request.units.length(2 * size, section)} or more; or look at time_unit"
+    enough = max(2 * size, int(np.ceil(experiment.memory / (_LATE * request.step))))
+    hint = f"take more samples, {request.units.length(enough, section)} or more; or look at time_unit"
     raise InfeasibleError.because("record-too-short", message, hint, key)
 
 

@@ -71,7 +71,7 @@ def signal_of(
         limits=_limits(request, record) or None,
         of_limits=request.bounds.shares(u, y) or None,
         spectral_factor_residual=record.factor_residual,
-        operating_point=None if points is None or not made else _channels(points),
+        operating_point=None if points is None else _channels(points),
         wav_full_scale=_full_scale(request, record) if "wav" in request.also else None,
         # Moves that are held, or few, may be made by an operator.
         moves=_moves(samples, units.sample_time) if made and (held or request.bounds.moves) else None,
@@ -150,7 +150,7 @@ def _predicted(request: RecordRequest, experiment: Experiment, record: Record) -
     of_y, of_u = noise_deviation(experiment, n, units.step)
     if units.closed_loop:
         around, limits = request.operating_points, _limits(request, record)
-        u = u if around is None or record.method == "given" else u + around
+        u = u if around is None else u + around
         for i, values in enumerate(u.T):
             name = f"u{i + 1}"
             kept, label = limits.get(name), units.label(name)
@@ -201,7 +201,7 @@ def _largest_moves(u: Array) -> Array:
 def applied(request: RecordRequest, record: Record) -> Array:
     """Return samples (n, r) about the operating points; raise `out-of-range` where they lose their digits."""
     points = request.operating_points
-    if points is None or record.method == "given":
+    if points is None:
         return record.samples
     if np.any(np.spacing(np.abs(points)) > _LOST * np.abs(record.samples).max(axis=0)):
         message = "the operating point is so far off that the samples added to it lose their digits"
@@ -212,7 +212,7 @@ def applied(request: RecordRequest, record: Record) -> Array:
 
 def _full_scale(request: RecordRequest, record: Record) -> float:
     """Return the value at full scale in signal.wav, of all channels: the largest range or value."""
-    if request.full_scale is not None and record.method != "given":
+    if request.full_scale is not None:
         return request.full_scale
     return float(np.abs(applied(request, record)).max())
 

@@ -17,7 +17,7 @@ from inputdesign_cli.design.convex.demands import Alternative, RequirementFactor
 from inputdesign_cli.design.convex.limits import PowerLimit, Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.findings.designed_records import too_long
-from inputdesign_cli.findings.designs import limits_not_kept, met_within_table
+from inputdesign_cli.findings.designs import given_level, limits_not_kept, met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, spectral_information
 from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectrum, White
@@ -165,6 +165,8 @@ class GivenTask(SpectrumTask):
             found = too_long(self.record.length(experiment.samples), self.record.longest)
         else:
             signal, found = signal_of(self.record, experiment, record, requirements), []
+        if excitation.samples is not None:
+            found += given_level(excitation.samples, self.record.operating_points)
         power, stated = Powers.of(excitation.power), (self.limits, self.record.most_samples)
         found += limits_not_kept(*stated, experiment.samples, power, signal, self.record.bounds)
         if record is None or signal is None:
