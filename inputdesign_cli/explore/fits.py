@@ -83,13 +83,13 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
     """Return the per cent of white noise that the best of `tried` simulations explains in 5 % of cases.
 
-    Levels, starts and an agreement by chance take a chi-squared share of its power. The probabilities of the
-    tried structures add up at most (Bonferroni). Without samples the fit is 100.
+    Levels, starts and an agreement by chance take a share of its power that follows a beta distribution. The
+    probabilities of the tried structures add up at most (Bonferroni). Without further samples the fit is 100.
     """
-    if samples == 0:
+    if samples <= unknowns:
         return 100.0
-    share = scipy.special.chdtri(unknowns, _BY_CHANCE / tried) / samples
-    return float(100.0 * (1.0 - np.sqrt(max(1.0 - share, 0.0))))
+    left = scipy.special.betaincinv((samples - unknowns) / 2.0, unknowns / 2.0, _BY_CHANCE / tried)
+    return float(100.0 * (1.0 - np.sqrt(left)))
 
 
 def percent(errors: Array, varying: Array) -> tuple[float, ...]:
