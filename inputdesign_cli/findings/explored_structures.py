@@ -38,7 +38,7 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
     """A structure was chosen. Of structures that explain unseen data as well, the simplest wins."""
     said = []
     for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
-        orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
+        orders = [", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())]
         delays = " and ".join(
             f"{delay} from {signal_name('u', j, found.model.inputs)} (95 %: {low} to {high})"
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, taken.ranges, strict=True)
@@ -47,8 +47,9 @@ def _chosen(kind: FindingKind, log: Record, found: Found) -> list[Finding]:
         better = max(one.validation for one in chosen.candidates) - taken.validation
         name = signal_name("y", i, found.model.outputs)
         beside = f"another explains {better:.2g} % more" if better > _MORE else "no other explains more"
-        orders += f"; times in {log.time_unit}" if taken.orders.physical else f"; delay in samples {delays}"
-        fact = f"for {name}, {family} ({orders}), chosen of {tried} structures: {beside} of the record"
+        orders += [f"times in {log.time_unit}" if taken.orders.physical else f"delay in samples {delays}"]
+        said_of = "; ".join(filter(None, orders))
+        fact = f"for {name}, {family} ({said_of}), chosen of {tried} structures: {beside} of the record"
         said.append(kind.found(fact, where=name, family=family, structures=tried, better_percent=better))
     return said
 
