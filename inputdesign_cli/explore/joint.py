@@ -188,20 +188,21 @@ def _together(
 ) -> tuple[Estimate, Model]:
     """Return the estimate of structures of all outputs, which begins at the parameters that they have."""
 
-    def identified(structure: Model, parts: Parts) -> tuple[Estimate, Model]:
+    def identified(structure: Model, parts: Parts, *, near: bool) -> tuple[Estimate, Model]:
         u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
         lengths, start = [len(part) for _, part in parts], structure.theta
         estimate = identify(
-            structure, u, y, start=start, feedback=feedback, lengths=lengths, rest=False, near=True, ramp=ramp
+            structure, u, y, start=start, feedback=feedback, lengths=lengths, rest=False, near=near, ramp=ramp
         )
         return estimate, structure.at(estimate.theta, estimate.noise)
 
     if len(taken) > 1:
         # If an output has several minima, a search for all outputs together seldom leaves a wrong one.
-        each = [identified(c.model, _output(used, i))[1] for i, c in enumerate(taken)]
+        each = [identified(c.model, _output(used, i), near=not feedback)[1] for i, c in enumerate(taken)]
         taken = tuple(replace(c, model=model) for c, model in zip(taken, each, strict=True))
     inputs = used[0][0].shape[1]
-    return identified(joined(taken, inputs, range(inputs)), used)
+    # In a loop one part of the record seldom determines a dead time.
+    return identified(joined(taken, inputs, range(inputs)), used, near=len(taken) > 1 or not feedback)
 
 
 def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:

@@ -93,6 +93,20 @@ def only_answers(parts: Parts) -> list[int]:
     ]
 
 
+def autoregression(parts: Parts) -> Array:
+    """Return A (m,) of a long ARX model of one output y (n, 1), which a loop does not bias.
+
+    It whitens the noise without a model of the plant ([ljung-1999], Section 13.4).
+    """
+    lags = _lags(parts)
+    signals = _lagged(parts, lags)
+    if signals is None:
+        return np.ones(1)
+    _, y, past_u, past_y = signals
+    solution = np.linalg.lstsq(np.column_stack([past_y, past_u]), y[:, 0], rcond=1e-10)[0]
+    return np.append(1.0, -solution[:lags])
+
+
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
     """Return for each input the probability, by chance, that it answers y(t) between jumps of its own.
 

@@ -1,8 +1,9 @@
 """Find the structure that explains an output: estimated on one part of the record, validated on another.
 
 A sweep of regressions gives delays and orders. An autoregression of its residuals whitens the noise, and a
-second sweep of the whitened records gives starts. Up to a dozen structures are then estimated by output
-errors of the whitened records, which are prediction errors for that noise.
+second sweep of the whitened records gives starts. In a loop a long ARX model whitens it at once. Up to a
+dozen structures are then estimated by output errors of the whitened records, which are prediction errors for
+that noise.
 
 Structures that simulate unseen data about as well count alike. Of these the criterion takes one, in which
 every parameter must lower the variance of the prediction errors by a share. A structure with a parameter
@@ -23,6 +24,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import Counted, report_progress
 from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady
+from inputdesign_cli.explore.relation import autoregression
 from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import (
     Regressed,
@@ -53,8 +55,8 @@ _UNCERTAIN = 0.5
 _LEAST_PRICE, _PHYSICAL = 0.01, 0.02
 _MOST_SAMPLES = 4000
 _HIGHEST, _HIGHEST_ARX = 5, 8
-# The fewest samples per parameter; steps of a search; rounds of whitening, in open and in closed loop.
-_PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
+# The fewest samples per parameter; steps of a search.
+_PER_PARAMETER, _STEPS = 5, 30
 # A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
 _SETTLES, _RUN_OFF = 5, 2
 
@@ -263,13 +265,15 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
     """Return the records with their noise whitened, and the regressions of all orders."""
     samples, inputs = sum(len(y) for _, y in first), first[0][0].shape[1]
     highest = max(min(_HIGHEST, samples // (6 * (inputs + 1))), 1)
-    swept, white, C, D = sweep(first, highest, least=int(feedback)), first, np.ones(1), np.ones(1)
-    for _ in range(0 if only == "oe" else _ROUNDS_IN_LOOP if feedback else _ROUNDS):
-        left = Regressed(first, swept.best.order).errors(swept.best)
-        if all(np.all(np.isfinite(e)) for e in left):
-            C, D = noise_model(left, int(feedback or only == "bj"))
-            white = whitened(first, whitening(left)) or white
-        swept = sweep(white, highest, least=int(feedback))
+    looped = feedback and only != "oe"
+    # The output errors of a plant are biased in a loop, and so is their noise.
+    white = (whitened(first, autoregression(first)) if looped else first) or first
+    swept, C, D = sweep(white, highest, least=int(feedback)), np.ones(1), np.ones(1)
+    left = Regressed(first, swept.best.order).errors(swept.best)
+    if only != "oe" and all(np.all(np.isfinite(e)) for e in left):
+        C, D = noise_model(left, int(feedback or only == "bj"))
+        white = white if looped else whitened(first, whitening(left)) or white
+        swept = swept if looped else sweep(white, highest, least=0)
     longest = max(len(y) for _, y in judging)
     late = max(max(one.delays) for one in swept.by_order.values()) + _SETTLES
     return _Records(first, judging, white, swept, late if late < longest // 2 else 0, C, D, feedback, step)

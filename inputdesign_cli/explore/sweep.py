@@ -113,6 +113,11 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
         begin, price = found[n].delays, [*price, found[n].criterion(samples)]
         if len(price) - 1 - int(np.argmin(price)) == _WORSE:
             break
+    for n in range(len(found) - 1, 0, -1):
+        # Delays of a higher order are right where fewer poles led the wide sweep astray.
+        if found[n].delays != (delays := found[n + 1].delays):
+            other = Regressed(parts, n, line).settled(delays, None, np.ones(1), least)
+            found[n] = min(found[n], other, key=lambda one: one.loss)
     return Sweep(found, most, longest, samples)
 
 

@@ -12,6 +12,7 @@ from inputdesign_cli.explore.search import explore_structure, ranked
 from inputdesign_cli.plant import SampledModel
 from tests.explore.plants import column, held, with_noise
 from tests.explore.test_sweep import drifting
+from tests.support.loops import loop, pid
 from tests.support.plants import lag_of
 from tests.support.refusals import code_of
 
@@ -190,6 +191,23 @@ def test_a_controller_without_delay_is_not_taken_for_the_plant(noise):
     w = np.array([1e-4, 0.2])
     expected = 0.3 * np.exp(-1j * w) / (1.0 - 0.8 * np.exp(-1j * w))
     np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], expected, rtol=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "law", "of"),
+    [
+        (2, pid(0.4, 0.012), {"pole": 0.95, "delay": 31, "held": 200, "samples": 1600}),
+        (3, pid(0.3, 0.006), {"pole": 0.975, "delay": 51, "held": 300, "samples": 3000}),
+    ],
+)
+def test_a_long_dead_time_is_found_in_a_loop_whose_reference_seldom_moves(seed, law, of):
+    """Output errors of a loop have minima tens of samples, and of deviations, away."""
+    found = explore_records([loop(seed, law, steps=1.0, **of)], feedback=True)
+    estimate, truth = found.estimate, [1.0, -1.0 / np.log(of["pole"]), of["delay"] - 1]
+    assert found.taken[0].orders.family == "FOPDT"
+    assert not estimate.tests.failed
+    assert np.all(np.abs(estimate.theta[:3] - truth) < 3.0 * np.sqrt(np.diag(estimate.covariance))[:3])
 
 
 @pytest.mark.slow

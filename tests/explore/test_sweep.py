@@ -6,14 +6,22 @@ import scipy.signal
 
 from inputdesign_cli.explore.drift import levelled, slopes_of
 from inputdesign_cli.explore.joint import explore_records
+from inputdesign_cli.explore.relation import autoregression
 from inputdesign_cli.explore.sweep import Regressed, delay_ranges, noise_model, sweep, whitened, whitening
 from tests.explore.plants import column, held, with_noise
+from tests.support.loops import loop, pid
 
 
 def record(rng, delay, samples=400, ratio=10.0, F=(1.0, -0.85)):
     u = held(rng, samples)
     x = scipy.signal.lfilter(np.concatenate([np.zeros(delay), [0.15, 0.05]]), F, u)
     return column(u, with_noise(rng, x, ratio))
+
+
+def test_a_long_regression_whitens_the_noise_of_a_loop():
+    """A is that of the noise, [1, -0.9], to four deviations, without a model of the plant."""
+    A = autoregression([loop(2, pid(0.4, 0.012), steps=1.0, pole=0.95, delay=31, held=200, samples=1600)])
+    np.testing.assert_allclose(A, np.append([1.0, -0.9], np.zeros(A.size - 2)), atol=0.15)
 
 
 @pytest.mark.parametrize("delay", [1, 4, 9, 17, 90])

@@ -6,17 +6,17 @@ import scipy.signal
 SAMPLES = 800
 
 
-def loop(seed, law, *, steps=0.3, reported=0.0):
-    """u, y of a lag with three samples of delay and AR noise; `law` makes the controller of the error."""
+def loop(seed, law, *, steps=0.3, reported=0.0, pole=0.9, delay=3, held=100, samples=SAMPLES):
+    """u, y of a lag of gain 1 behind a delay, and AR noise; `law` makes the controller of the error."""
     rng = np.random.default_rng(seed)
-    v = scipy.signal.lfilter([1], [1, -0.9], 0.05 * rng.standard_normal(SAMPLES))
-    r = np.repeat(steps * rng.uniform(-1, 1, SAMPLES // 100), 100)
-    u, x, y, answer = np.zeros(SAMPLES), np.zeros(SAMPLES), np.zeros(SAMPLES), law()
-    for k in range(SAMPLES):
-        x[k] = 0.9 * x[k - 1] + 0.1 * u[k - 3] if k >= 3 else 0.0
+    v = scipy.signal.lfilter([1], [1, -0.9], 0.05 * rng.standard_normal(samples))
+    r = np.repeat(steps * rng.uniform(-1, 1, samples // held), held)
+    u, x, y, answer = np.zeros(samples), np.zeros(samples), np.zeros(samples), law()
+    for k in range(samples):
+        x[k] = pole * x[k - 1] + (1.0 - pole) * u[k - delay] if k >= delay else 0.0
         y[k] = x[k] + v[k]
         u[k] = answer(r[k] - y[k])
-    return u[:, None] + reported * rng.standard_normal((SAMPLES, 1)), y[:, None]
+    return u[:, None] + reported * rng.standard_normal((samples, 1)), y[:, None]
 
 
 def pid(gain, integral=0.0, derivative=0.0):
