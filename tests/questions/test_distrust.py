@@ -88,8 +88,8 @@ def a_sinusoid():
 LOGS = {
     "P control without reference": (partial(in_control, 0.0), "like-inverse-controller"),
     "PI control without reference": (partial(in_control, 0.1), "like-inverse-controller"),
-    # The reference has eight steps, which look like spikes to a model of -1/C.
-    "small steps of the reference": (partial(loop, 2, LAWS["PI"], steps=0.3), "input-only-answers"),
+    # The eight steps of the reference are too small to determine the plant.
+    "small steps of the reference": (partial(loop, 2, LAWS["PI"], steps=0.3), "structure-unexplained"),
     "proportional inputs": (proportional_inputs, "excitation-too-simple"),
     "nearly proportional inputs": (nearly_proportional_inputs, "excitation-too-simple"),
     "input proportional to the output": (input_proportional_to_output, "input-only-answers"),
@@ -172,9 +172,10 @@ def test_an_unstable_plant_is_reported_with_a_spec_that_identifies_it(tmp_path):
     log = stored(tmp_path / "log.csv", u, y)
     (told,) = explore(log).reasons
     assert told.startswith("The plant is unstable: y has a pole at a radius of 1.")
-    plant, noise = re.search(r"plant: (\{.*?\}), noise: (\{.*?\}),", told).groups()
-    loop = "experiment: {controller: {numerator: [2], denominator: [1]}}"
-    found = identify(parse_spec(f"plant: {plant}\nnoise: {noise}\n{loop}\n", design=False), log).result
+    (stated,) = re.findall(r"A: \[.*?\]", told)
+    plant = f"plant: {{{stated}, B: [0, 1]}}\nnoise: {{variance: 1}}\n"
+    loop = "experiment: {controller: {numerator: [2], denominator: [1]}}\n"
+    found = identify(parse_spec(plant + loop, design=False), log).result
     theta, deviation = (found["identification"][key] for key in ("theta", "standard_deviation"))
     assert theta["a1"] == pytest.approx(-1.1, abs=4.0 * deviation["a1"])
     assert theta["b1"] == pytest.approx(0.2, abs=4.0 * deviation["b1"])
