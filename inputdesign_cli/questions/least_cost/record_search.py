@@ -20,7 +20,7 @@ from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import Goal, PowerLimit
 from inputdesign_cli.design.convex.record_bound import RecordBound, bound_over_records
-from inputdesign_cli.errors import InfeasibleError, bad_spec
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.findings.designed_records import other_signal
 from inputdesign_cli.questions.common.record import (
     Made,
@@ -230,16 +230,10 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
 
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
-        SpecError: `conflicting-keys`, the spec states a length that is too short.
     """
     made = _first_fitting(request, question, design, samples)
-    if made.record is None or question.goal != "samples":
-        return made
-    if request.samples is not None and not made.record.met:
-        message = f"the shortest record is sought, and {request.samples} samples miss the accuracy"
-        hint = "leave it out; limits.samples states the longest experiment"
-        raise bad_spec("conflicting-keys", message, hint=hint, key="signal.samples")
-    if request.samples is not None or not searches(design, made.request.settings):
+    sought = question.goal == "samples" and request.samples is None
+    if made.record is None or not sought or not searches(design, made.request.settings):
         return made
     search = level_search(made.request, design)
     shortest = search.shortest(made.record.samples)
