@@ -131,9 +131,10 @@ def signal(
 def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, float]:
     """Return two numbers, the second larger, or raise `typer.BadParameter`."""
     low, high = found = span(text, option, "LOW:HIGH")
-    size = max(map(abs, found))  # values have 13 digits, most of which must be left for the moves
-    if not (size <= _LARGEST and high - low >= max(_SMALLEST, 1e-6 * size) and low >= least):
-        sizes = f"{max(least, -_LARGEST):g} to {_LARGEST:g}, {_SMALLEST:g} apart and a millionth of them"
+    size = max(map(abs, found))
+    apart = max(_SMALLEST, 1e-6 * size)  # values have 13 digits, most of which must be left for the moves
+    if not (size <= _LARGEST and high - low >= apart and low >= least):
+        sizes = f"{max(least, -_LARGEST):g} to {_LARGEST:g}, {_SMALLEST:g} apart or a millionth of the larger"
         refuse(f"{text!r} is no LOW:HIGH within {sizes}", option)
     return found
 

@@ -25,7 +25,7 @@ _ASSESS = "idesign assess SPEC "
 _AGAIN = _ASSESS + "{logs} "
 _ALONE = _ASSESS + "{last}"
 _EXPLORE = "idesign explore {columns}{logs}"
-_STATED = _AGAIN + " # after that: the plant is unstable, and explore looks for stable ones"
+_STATED = _AGAIN + " # with the finding mended: explore finds stable plants only, and this one is unstable"
 _NEXT = {
     # Samples that are wrong or of another system upset every test.
     "samples-repeated": _ALONE,

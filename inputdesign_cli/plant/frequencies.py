@@ -94,8 +94,7 @@ def local_maxima(
 
     It maps frequencies (n,) to values (n,), and `values` are those on the grid. Around every grid maximum the
     grid is refined once, which separates twin peaks in one bracket; then each bracket is narrowed by repeated
-    sampling, all at once. The function need only be continuous (tables have kinks). Values <= `above` are
-    left out.
+    sampling. The function need only be continuous (tables have kinks). Values <= `above` are left out.
 
     Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum that
     differs only by rounding from the value at an end of the grid is at that end.

@@ -15,8 +15,9 @@ from inputdesign_cli.findings.outlying_values import beyond_precision
 from inputdesign_cli.findings.places import SHORTEST
 from inputdesign_cli.findings.prepared_records import COLUMNS_JOINED, SHEETS_UNREAD, TIMES_READ
 from inputdesign_cli.records.cells import SAY_TIME
-from inputdesign_cli.records.columns import TIME_UNITS, column_named, columns_of, time_unit_in
+from inputdesign_cli.records.columns import TIME_UNITS, column_named, columns_of, time_columns, time_unit_in
 from inputdesign_cli.records.sheet import Preparation, Run, Sheet
+from inputdesign_cli.specification.models.units import SECONDS
 
 # Steps of time differ from a round number, and from each other, by less than these shares by rounding alone.
 _ROUND, _EVEN_STEPS = 1e-4, 0.01
@@ -179,6 +180,22 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
     )
     message = f"the times of {sheet.path.name} do not increase: {time[before]:.10g} is followed by "
     raise sheet.error("data-not-uniform", f"{message}{time[row]:.10g}", hint, int(row))
+
+
+def check_sampled(sheet: Sheet, step: float, unit: str) -> None:
+    """Raise `DataError` (`data-not-uniform`) if a time is half a `step` or more from its place in the sheet.
+
+    The rows of a given signal are applied one after the other. Without a column of times nothing is checked.
+    """
+    for name in time_columns(sheet)[:1]:
+        column = column_named(sheet, name)
+        scale = SECONDS[time_unit_in(sheet, name, dated=column.dated) or unit] / SECONDS[unit]
+        steps = np.diff(column.numbers) * scale
+        for row in np.flatnonzero(np.abs(np.nancumsum(steps - step)) > 0.5 * step)[:1]:
+            message = f"{name} advances by {steps[row]:.6g} {unit} here, but sample_time is {step:g} {unit}"
+            even = np.ptp(steps) < 0.25 * steps.min()  # otherwise rows are missing, or in disorder
+            hint = f"write sample_time: {steps.mean():.10g}" if even else "write each sample once, in order"
+            raise sheet.error("data-not-uniform", message, f"{hint}; or remove that column", int(row) + 1)
 
 
 def steps_without_gaps(time: Array) -> Array:

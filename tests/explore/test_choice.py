@@ -67,7 +67,12 @@ def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "pole", [0.0, 0.9, pytest.param(0.95, marks=pytest.mark.xfail(strict=True, reason="four of six"))]
+    "pole",
+    [
+        0.0,
+        0.9,
+        pytest.param(0.95, marks=pytest.mark.xfail(strict=True, reason="noise as slow as the plant: 4 of 6")),
+    ],
 )
 def test_a_lag_with_dead_time_is_preferred_where_it_explains_as_well(pole):
     """At least five of six records lead to it, in noise of this pole."""

@@ -13,7 +13,6 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.units import SECONDS
 
 _LARGEST = 1e40  # number in a data file, as elsewhere in a spec
 
@@ -45,8 +44,7 @@ def read_samples(
     Raises `DataError`: see `read_columns`; `beyond-precision`; `data-not-uniform`, times are not of `units`.
     """
     from inputdesign_cli.records import read_sheet
-    from inputdesign_cli.records.columns import column_named, time_columns, time_unit_in
-    from inputdesign_cli.records.signals import check_range
+    from inputdesign_cli.records.signals import check_range, check_sampled
 
     sheet = read_sheet(path, key=key)
     for line in sheet.passed:
@@ -56,18 +54,8 @@ def read_samples(
     found = read_columns(path, wanted, key=key)
     for role, numbers in found.items():
         check_range(sheet, wanted[role], numbers)
-    if units is None:
-        return found
-    due, unit = units.sample_time, units.time_unit
-    for name in time_columns(sheet)[:1]:
-        column = column_named(sheet, name)
-        steps = np.diff(column.numbers)
-        steps *= SECONDS[time_unit_in(sheet, name, dated=column.dated) or unit] / SECONDS[unit]
-        for row in np.flatnonzero(np.abs(np.nancumsum(steps - due)) > 0.5 * due)[:1]:
-            message = f"{name} advances by {steps[row]:.6g} {unit} here, but sample_time is {due:g} {unit}"
-            even = np.ptp(steps) < 0.25 * steps.min()  # otherwise rows are missing, or in disorder
-            hint = f"write sample_time: {steps.mean():.10g}" if even else "write each sample once, in order"
-            raise sheet.error("data-not-uniform", message, f"{hint}; or remove that column", int(row) + 1)
+    if units is not None:
+        check_sampled(sheet, units.sample_time, units.time_unit)
     return found
 
 

@@ -254,7 +254,8 @@ def _first_fitting(request: RecordRequest, question: Question, design: Design, s
                 return _longer(request, question, design, [pilot], request.length(samples))
     record = make_record(request, design, samples)
     if record is not None and not record.met and sought and not request.bounds.hard and request.meets:
-        # Powers alone are limited, and a record from rest loses the response to its last samples.
+        # Powers alone are limited, and a record from rest loses the response to its last samples. If longer
+        # ones fail too, the first record is kept with a doubt, unless its ratio is infinite.
         try:
             return _longer(request, question, design, [record], len(record.samples))
         except InfeasibleError:
