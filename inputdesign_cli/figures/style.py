@@ -213,7 +213,7 @@ def painted(paint: Callable[[Figure], object], width: Width = "page") -> Figure:
         paint(page)
         _typeset(page)
         for axis in (axes.yaxis for axes in page.axes):
-            if axis.get_scale() == "linear" and axis.isDefault_majfmt:
+            if axis.get_scale() == "linear" and type(axis.get_major_formatter()) is ScalarFormatter:
                 axis.set_major_formatter(_Numbers())
                 axis.offsetText.set_visible(False)
     return page

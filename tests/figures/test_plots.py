@@ -173,6 +173,12 @@ def test_no_power_of_ten_stands_over_the_axis_where_the_legend_is(page):
     assert "2e-18" in [tick.get_text() for tick in axes.get_yticklabels()]
 
 
+def test_names_along_an_axis_are_no_numbers():
+    categories = painted(lambda page: page.subplots().barh(["designed", "white"], [1.0, 6.6])).axes[0]
+    categories.figure.draw_without_rendering()
+    assert [tick.get_text() for tick in categories.get_yticklabels()] == ["designed", "white"]
+
+
 def headings(page):
     """Titles, labels of axes and of legends: all text but numbers along the axes."""
     labels = [text for legend in page.legends for text in legend.get_texts()]
